@@ -17,7 +17,7 @@ from foosim.capture.rows import CLIENTS, PACKETS, TICK, ClientRow, PacketRow, Ti
 from foosim.common.errors import BadValue
 from foosim.common.format import EXACT, time_text
 from foosim.common.names import nearest_name
-from foosim.vhub.state import OUTBOX_SHIFT
+from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.world.frame import Frame
 
 NAMES_SHOWN: Final = 8

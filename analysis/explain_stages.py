@@ -16,7 +16,6 @@ from foosim.capture.rows import ClientRow, PacketRow
 from foosim.common.format import EXACT, rate_text, time_text
 from foosim.common.keyed_random import UNIT, Slot, chance_threshold, draw_words
 from foosim.deployment.schema import Deployment
-from foosim.vhub.in_flight_limit import TRANSIT_FULL
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.custom_models import VERSION_KEY
 from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
@@ -31,6 +30,7 @@ from foosim.vhub.stages.duty import Duty
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 from foosim.vhub.stages.residual import Residual
+from foosim.vhub.state.in_flight_limit import TRANSIT_FULL
 from foosim.world.frame import Frame
 
 Told = tuple[str, dict[str, Any]]

@@ -11,36 +11,36 @@ from typing import Any, Final
 from rich.table import Table
 
 from foosim.common.format import range_text, rate_text, time_text
-from foosim.vhub.links.summary import MANY, SMALL_BYTES, Meaning
+from foosim.vhub.links.summary import MANY, SMALL_BYTES, LinkSummary
 from foosim.vhub.links.summary_text import burst_text, delay_text, loss_text
 
 
-def meaning_tables(meanings: Sequence[Meaning]) -> list[Table]:
+def summary_tables(summaries: Sequence[LinkSummary]) -> list[Table]:
     """Return tables for a terminal: what happens to packets, how media carry them, how far radios reach."""
     losses = Table(title="links", title_justify="left", box=None, pad_edge=False)
     for column in ("rule", "medium", "links in use", "mean loss", "bursts", "delay beside the medium"):
         losses.add_column(column, justify="right" if column == "links in use" else "left")
     media = _table("media", "rule", "rate", "bytes", "airtime", "1 station", f"{MANY} stations", "full queue")
     reach = _table("radios", "rule", "range in sight", "range behind walls", f"packets of {SMALL_BYTES} B an hour")
-    for meaning in meanings:
-        links = "?" if meaning.links is None else f"{meaning.used} of {meaning.links}"
+    for summary in summaries:
+        links = "?" if summary.links is None else f"{summary.used} of {summary.links}"
         losses.add_row(
-            meaning.name, meaning.medium, links, loss_text(meaning), burst_text(meaning), delay_text(meaning)
+            summary.name, summary.medium, links, loss_text(summary), burst_text(summary), delay_text(summary)
         )
-        for number, carried in enumerate(meaning.carried):
-            first, queue_ns = number == 0, meaning.queue_ns
+        for number, carried in enumerate(summary.carried):
+            first, queue_ns = number == 0, summary.queue_ns
             media.add_row(
-                meaning.name if first else "",
-                rate_text(meaning.rate_bps or 0) if first else "",
+                summary.name if first else "",
+                rate_text(summary.rate_bps or 0) if first else "",
                 str(carried.size),
                 time_text(carried.airtime_ns),
                 rate_text(carried.goodput_bps),
                 "-" if carried.shared_bps is None else rate_text(carried.shared_bps),
                 time_text(queue_ns) if first and queue_ns is not None else "",
             )
-        if meaning.range_los_m is not None:
-            ranges = range_text(meaning.range_los_m), range_text(meaning.range_nlos_m)
-            reach.add_row(meaning.name, *ranges, "-" if meaning.duty_packets_h is None else str(meaning.duty_packets_h))
+        if summary.range_los_m is not None:
+            ranges = range_text(summary.range_los_m), range_text(summary.range_nlos_m)
+            reach.add_row(summary.name, *ranges, "-" if summary.duty_packets_h is None else str(summary.duty_packets_h))
     return [table for table in (losses, media, reach) if table.row_count]
 
 

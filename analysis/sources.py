@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from foosim.common.format import rate_text
+from foosim.deployment.network.link_settings import preset_radio
 from foosim.deployment.network.radios import LORA_LONGEST, Radio
-from foosim.vhub.network.link_settings import preset_radio
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import LRWPAN_OVERHEAD_BYTES, WIFI_ACK_BYTES, WIFI_OVERHEAD_BYTES
 from foosim.vhub.radio.noise import NEGLIGIBLE_CDB, THERMAL_DBM_HZ
@@ -33,7 +33,7 @@ _READ: Final = ("best_effort", "voice")
 _LORAWAN: Final = "signetlabdei/lorawan"
 
 
-def held(preset: str) -> Iterator[Row]:
+def parameters_of(preset: str) -> Iterator[Row]:
     """Yield (name, value, source) of each number that decides on a preset's links and is no setting."""
     settings = preset_radio(preset)
     if not settings.is_on_air:

@@ -18,9 +18,9 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 from bench.machine import use_of
+from foosim.client import control
 from foosim.common.errors import Refused
 from foosim.runtime.children import script
-from foosim.supervisor import control
 
 START_S = 120.0
 

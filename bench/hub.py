@@ -32,8 +32,8 @@ from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Sa
 from foosim.runtime.journal import Journal
 from foosim.runtime.loop import collect_seldom
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording.queue import Keep
 from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.world.robot_packets import RobotPacket
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
@@ -167,7 +167,7 @@ def _perform(core: HubCore, journal: Journal | None, writer: CaptureWriter | Non
     for action in core.actions:
         if isinstance(action, actions.Journal) and journal is not None:
             journal.append(action.record)
-        elif isinstance(action, Keep) and writer is not None:
+        elif isinstance(action, RecordClosing) and writer is not None:
             writer.keep(action.closing)
     core.actions.clear()
 

@@ -22,7 +22,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -40,9 +40,9 @@ from foosim.protocol.messages import (
 from foosim.rehearsal.journals import HubJournal
 from foosim.vhub.core import HubCore
 from foosim.vhub.network.packet import IN_FLIGHT
-from foosim.vhub.recording.queue import Keep
-from foosim.vhub.records import Closing
-from foosim.vhub.state import OUTBOX_SHIFT
+from foosim.vhub.state.capture_queue import RecordClosing
+from foosim.vhub.state.hub_state import OUTBOX_SHIFT
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
@@ -177,7 +177,7 @@ class Talk:
         build = Build(VHUB, core.member.boot, "first", RUN, TABLE.name, self._text, "fast", [])
         self._say(channels.BUILD, VHUB, encode(build))
         core.begin(self._journal.past(core, RUN), 0)
-        self._say(channels.PROCEED, VHUB, encode(Proceed(VHUB, core.member.boot, 0)))
+        self._say(channels.RESUME_GRANT, VHUB, encode(ResumeGrant(VHUB, core.member.boot, 0)))
         self._perform()
         for name in (*self._clients, EAR):
             self._come(name, self.count.crashes)
@@ -212,7 +212,7 @@ class Talk:
         for action in actions:
             if isinstance(action, Journal):
                 self._journal.append(action.record)
-            elif isinstance(action, Keep):
+            elif isinstance(action, RecordClosing):
                 self._journal.captured_tick = action.closing.frame.tick
                 self._take(action.closing)
             elif isinstance(action, Publish) and action.channel is channels.CLIENT_WELCOME:

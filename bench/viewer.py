@@ -11,9 +11,9 @@ import sys
 import time
 from typing import Final
 
+from foosim.client.control import Control, NoAnswer
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import ConnectError
-from foosim.supervisor.control import Control, NoAnswer
 
 ORDER: Final = (False, True, True, False)
 """Who looks now and not then, so that a load that grows weighs on both."""

@@ -30,7 +30,7 @@ from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, Joined
 from foosim.capture.reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK
-from foosim.capture.state_at import InForce
+from foosim.capture.state_at import ActiveState
 from foosim.common.errors import BadValue, Failed
 from foosim.common.units import format_ns
 from foosim.world.frame import chain_next
@@ -55,7 +55,7 @@ class Cut:
 class _Start:
     """What is in force at the last tick that was read."""
 
-    in_force: InForce
+    in_force: ActiveState
     tick: int = -1
     digest: bytes = b""
     chain: bytes = b""
@@ -105,7 +105,7 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
     """Return the frame to begin with and what is in force there, the tick in ns, and the last tick."""
     tick_ns = deployment_of(read_about(path)).tick_ns
     scan = Scan(path)
-    start, held = (_Start(InForce(str(path))) for _ in range(2))
+    start, held = (_Start(ActiveState(str(path))) for _ in range(2))
     for message in scan.messages():
         if message.topic != FRAME:
             held.take(scan, message)

@@ -1,37 +1,41 @@
-"""What holds at a tick of a capture until something else of its kind comes: epoch, layout, scene, who takes part.
+"""The state of a capture at a tick: epoch, layout, scene and clients, each as its last message.
 
-A file that begins within a run repeats these rows, as they were written, so that it can be read by itself.
+A file that begins within a run repeats these messages, so that it can be read by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
 from typing import Final
 
 import msgspec
 
 from foosim.capture.foxglove import SCENE
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.mcap.format import Message
+from foosim.capture.mcap.format import Book, Message
+from foosim.capture.mcap.repair import read_messages, scan
+from foosim.capture.parts import files_from
 from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, ClientRow
 
 _ONE: Final = (EPOCHS, LAYOUT, SCENE)
-"""Of these the last one holds."""
+"""Of these the last message is in force."""
 HOLDING: Final = frozenset({*_ONE, CLIENTS})
 _decoder: Final = msgspec.json.Decoder(ClientRow)
 
 
-class InForce:
-    """The messages of a capture, which has a name, that hold behind those that it took."""
+class ActiveState:
+    """The messages of a capture that are in force after those that it took. `name` is the capture's, for errors."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._last: dict[str, Message] = {}
         self._clients: dict[str, Message] = {}
-        """Who takes part, in the order of coming."""
+        """The join of each present client, in the order of joining."""
 
     def take(self, message: Message) -> None:
-        """Take one more message; what it brings holds from here on. Raises CaptureError for a damaged one."""
+        """Take the next message. Raises CaptureError for a damaged one."""
         if message.topic == CLIENTS:
             try:
                 row = _decoder.decode(message.data)
@@ -43,17 +47,57 @@ class InForce:
         elif message.topic in _ONE:
             self._last[message.topic] = message
 
-    def copy(self) -> InForce:
-        """Return the same, which takes no more."""
-        copied = InForce(self._name)
+    def copy(self) -> ActiveState:
+        """Return a copy."""
+        copied = ActiveState(self._name)
         copied._last, copied._clients = dict(self._last), dict(self._clients)
         return copied
 
     def messages(self) -> Iterator[Message]:
-        """Yield what is repeated at the start of a file, in its order."""
+        """Yield the messages that a new file begins with, in their order."""
         for topic in (EPOCHS, LAYOUT):
             if topic in self._last:
                 yield self._last[topic]
         yield from self._clients.values()
         if SCENE in self._last:
             yield self._last[SCENE]
+
+
+class LatchedTopics:
+    """Finds messages of some topics in a capture and the files behind it, without unpacking chunks that have none."""
+
+    def __init__(self, path: Path, topics: Collection[str]) -> None:
+        """Raises CaptureError for what cannot be read."""
+        self._topics = topics
+        self._books = [(file, _book_of(file, topics)) for file in files_from(path)]
+
+    def before(self, time_ns: int) -> Message | None:
+        """Return the last message before a time, None when there is none. Raises CaptureError."""
+        for path, book in reversed(self._books):
+            for index in reversed(book.chunks):
+                if index.message_start_time >= time_ns:
+                    continue
+                one = Book(channels=book.channels, chunks=[index])
+                with path.open("rb") as stream:
+                    found = list(read_messages(stream, one, self._topics))
+                latched = [message for message in found if message.log_ns < time_ns]
+                if latched:
+                    return latched[-1]
+        return None
+
+
+def _book_of(path: Path, topics: Collection[str]) -> Book:
+    """Return the channels of a file, and the chunks with something of the topics."""
+    try:
+        size = path.stat().st_size
+        with (
+            path.open("rb") as stream,
+            mmap(stream.fileno(), size, access=ACCESS_READ) as whole,
+            memoryview(whole) as content,
+        ):
+            book = scan(stream, size, str(path), content).book
+    except (OSError, ValueError) as error:  # an empty file is no map
+        raise CaptureError(f"{path}: cannot be read, {error}") from None
+    wanted = {channel.id for channel in book.channels if channel.topic in topics}
+    chunks = [index for index in book.chunks if wanted & index.message_index_offsets.keys()]
+    return Book(channels=book.channels, chunks=chunks)

@@ -17,9 +17,10 @@ from rich.console import Console
 from rich.live import Live
 
 from foosim.analysis.explain import explain_packet, parse_packet
-from foosim.analysis.network_tables import RANGE_NOTE, link_line, link_table, links_shown, meaning_tables, use_text
-from foosim.analysis.sources import held
+from foosim.analysis.network_tables import RANGE_NOTE, link_line, link_table, links_shown, summary_tables, use_text
+from foosim.analysis.sources import parameters_of
 from foosim.capture.reader import open_capture
+from foosim.client import control
 from foosim.common.errors import BadValue
 from foosim.common.json_text import encode_json
 from foosim.common.names import nearest_name
@@ -33,8 +34,7 @@ from foosim.protocol.channels import VHUB
 from foosim.protocol.messages import Answer
 from foosim.runtime.command import VersionOption, new_app, run_app
 from foosim.runtime.process import Stop
-from foosim.supervisor import control
-from foosim.vhub.links.summary import Meaning, meaning_of, meanings, uses_alone
+from foosim.vhub.links.summary import LinkSummary, summaries, summary_of, uses_alone
 from foosim.vhub.links.summary_text import meaning_lines
 from foosim.vhub.network.custom_models import check_link_models
 
@@ -81,25 +81,25 @@ def lint(
     """
     found, is_alone = linted(file, sets or [])
     if json:
-        print(encode_json({"alone": is_alone, "rules": [asdict(meaning) for meaning in found]}).decode())
+        print(encode_json({"alone": is_alone, "rules": [asdict(summary) for summary in found]}).decode())
         return
     console = Console()
     if is_alone:
         _say(console, ALONE)
     if console.is_terminal:
-        for table in meaning_tables(found):
+        for table in summary_tables(found):
             console.print(table, "")
-        for meaning in found:
-            for warning in meaning.warnings:
-                _say(console, f"warning: {meaning.name}: {warning}")
+        for summary in found:
+            for warning in summary.warnings:
+                _say(console, f"warning: {summary.name}: {warning}")
     else:
         for line in meaning_lines(found):
             _say(console, line)
-    if any(meaning.range_los_m is not None for meaning in found):
+    if any(summary.range_los_m is not None for summary in found):
         _say(console, RANGE_NOTE)
 
 
-def linted(file: Path, sets: list[str]) -> tuple[list[Meaning], bool]:
+def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
     """Return what a file's network means, and whether it stands alone. Raises DeploymentError or AssetError."""
     name, text = str(file), read_deployment_text(file)
     network = load_network(text, name, sets)
@@ -108,11 +108,11 @@ def linted(file: Path, sets: list[str]) -> tuple[list[Meaning], bool]:
         deployment = load_deployment(pinned, name).with_assets(files)
         if VHUB not in places(deployment):  # else its machine has them, and looks
             check_link_models(deployment.network, text, name, sets)
-        return meanings(deployment), False
+        return summaries(deployment), False
     files = read_files(file.parent, ".", network_files(network))
     check_files(network, files)
     check_link_models(network, text, name, sets)
-    return [meaning_of(use, files) for use in uses_alone(network)], True
+    return [summary_of(use, files) for use in uses_alone(network)], True
 
 
 @app.command()
@@ -130,7 +130,7 @@ def presets(
         raise BadValue(
             f"no such preset, there are {', '.join(PRESETS)}", name, None if nearest is None else repr(nearest)
         )
-    chosen = {one: [*provenance(one), *held(one)] for one in ([name] if name is not None else PRESETS)}
+    chosen = {one: [*provenance(one), *parameters_of(one)] for one in ([name] if name is not None else PRESETS)}
     if json:
         content = {
             one: [{"key": key, "value": value, "source": source} for key, value, source in rows]

@@ -28,7 +28,7 @@ from foosim.rehearsal.swarm.faults import TICKS
 from foosim.rehearsal.system import Settings
 from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.supervisor.status import score_text
-from foosim.vhub.links.summary import meanings
+from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 
 app = new_app()
@@ -88,7 +88,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     for warning in check_rooms(plan.deployment.capture, capture, None):
         _note(f"warning: {warning}")
     if not json:
-        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
+        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(summaries(plan.deployment), str(file))):
             typer.echo(line)
     raise typer.Exit(_rehearse(plan, nodes, capture, json))
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from foosim.client import control
 from foosim.common.errors import BadValue, Refused, read_at
 from foosim.common.json_text import encode_json
 from foosim.common.units import parse_pace
@@ -45,7 +46,6 @@ from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import has_launcher
 from foosim.runtime.run_folder import RunFolder, create_run, open_run, run_exists, runs_folder
 from foosim.runtime.usage import BadUsage
-from foosim.supervisor import control
 from foosim.supervisor.main import serve
 
 app = new_app()

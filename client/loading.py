@@ -41,9 +41,8 @@ def load_player(path: str) -> Callable[..., Any]:
     if not (module_name and colon and class_name):
         raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
     if module_name in MOVED:
-        raise ClassPathError(
-            path, f"the module has moved to {MOVED[module_name]}", f"{MOVED[module_name]}:{class_name}"
-        )
+        moved = f"{MOVED[module_name]}:{class_name}"
+        raise ClassPathError(path, f"the module has moved to {MOVED[module_name]}", moved)
     module = _import(path, module_name)
     made: Any = getattr(module, class_name, None)
     if made is None:

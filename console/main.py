@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from foosim.capture.mcap.checks import CaptureError
+from foosim.client.control import Control, connect
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
 from foosim.console.clock.leading import Leader
@@ -23,7 +24,6 @@ from foosim.deployment.loader import load_deployment
 from foosim.runtime.command import VersionOption, new_app, run_app
 from foosim.runtime.process import die_with_parent
 from foosim.runtime.run_folder import find_run, open_run
-from foosim.supervisor.control import Control, connect
 
 app = new_app()
 

@@ -12,8 +12,9 @@ from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
 from foosim.deployment.checks import BODILESS, View
 from foosim.deployment.network.impairments import Impairments
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.presets import PRESETS, preset_settings
-from foosim.deployment.network.radios import Radio, lora_longest
+from foosim.deployment.network.radios import lora_longest
 from foosim.deployment.network.rules import Event, LinkRule, Network
 from foosim.deployment.schema import Deployment
 
@@ -136,8 +137,9 @@ def rule_findings(network: Network, ends: Sequence[str], carriers: Mapping[str, 
 
     `ends` are the endpoints, none where they are not known: then only what a rule says by `via` is.
     """
+    profiles = Profiles(network, carriers)
     for number, rule in enumerate(network.links):
-        yield from _asked(network, rule, rule, ("network", "links", number), ends, carriers)
+        yield from _asked(profiles, rule, rule, ("network", "links", number), ends)
     for number, event in enumerate(network.events):
         yield from set_findings(network, event, ("network", "events", number), ends, carriers)
 
@@ -149,38 +151,29 @@ def set_findings(
     change = event.set
     rule = None if change is None else next((rule for rule in network.links if rule.id == change.link), None)
     if change is not None and rule is not None:
-        yield from _asked(network, rule, change, (*location, "set"), ends, carriers)
+        yield from _asked(Profiles(network, carriers), rule, change, (*location, "set"), ends)
 
 
 def _asked(
-    network: Network,
-    rule: LinkRule,
-    settings: Impairments,
-    location: Location,
-    ends: Sequence[str],
-    carriers: Mapping[str, str],
+    profiles: Profiles, rule: LinkRule, settings: Impairments, location: Location, ends: Sequence[str]
 ) -> Iterator[Finding]:
     asked = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
-    ways = list(dict.fromkeys(_ways(network, rule, ends, carriers))) if asked else []
+    ways = list(dict.fromkeys(_ways(profiles, rule, ends))) if asked else []
     for field in asked:
         key = _LIMITING[field]
         for way in ways:
-            radio = _radio(network, way)
+            radio = profiles.base(way)
             what = unheeded(key, radio.medium)
             if key == "mtu" and radio.medium == "lora":
                 longest = lora_longest(radio.spreading_factor) or 0
                 what = _too_long(radio.spreading_factor, longest) if (settings.payload_max or 0) > longest else None
             if what is not None:
-                by = way or network.defaults.preset
+                by = way or profiles.network.defaults.preset
                 yield Finding((*location, key), f"via {by}, {what}", key, at="key")
                 break
 
 
-def _radio(network: Network, way: str) -> Radio:
-    return network.radios[way] if way else Radio.model_validate({"preset": network.defaults.preset})
-
-
-def _ways(network: Network, rule: LinkRule, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[str]:
+def _ways(profiles: Profiles, rule: LinkRule, ends: Sequence[str]) -> Iterator[str]:
     """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
 
     Where there are but wires, which all heed the same, only what a rule says by `via`.
@@ -188,27 +181,28 @@ def _ways(network: Network, rule: LinkRule, ends: Sequence[str], carriers: Mappi
     if rule.via is not None:
         yield rule.via
         return
-    if not any(_radio(network, way).is_on_air for way in ("", *network.radios)):
+    if not any(profiles.base(way).is_on_air for way in ("", *profiles.network.radios)):
         return
     for source in ends:
         for destination in ends:
-            if source != destination and any(met is rule for met in network.rules_for(source, destination)):
-                way = network.way(rule, source, destination, carriers)
+            if source != destination and any(met is rule for met in profiles.rules_for(source, destination)):
+                way = profiles.way(rule, source, destination)
                 if way is not None:
                     yield way
 
 
 def place_findings(deployment: Deployment) -> Iterator[Finding]:
     """Return who is nowhere and yet on air, by a rule's `via` or by the defaults: it carries no radio itself."""
-    network, ends, carriers = deployment.network, deployment.endpoints(), deployment.carriers()
-    on_air = {way for way in ("", *network.radios) if _radio(network, way).is_on_air}
+    network, ends = deployment.network, deployment.endpoints()
+    profiles = Profiles(network, deployment.carriers())
+    on_air = {way for way in ("", *network.radios) if profiles.base(way).is_on_air}
     for end in ends if on_air else ():
-        robot = deployment.robots.get(carriers.get(end, end))
+        robot = deployment.robots.get(profiles.body(end))
         has_body = robot is not None and (deployment.is_hall or robot.model != BODILESS)
         if has_body or network.place_of(end) is not None:
             continue
         pairs = [pair for other in ends if other != end for pair in ((end, other), (other, end))]
-        met = ((rule, network.way(rule, *pair, carriers)) for pair in pairs for rule in network.rules_for(*pair))
+        met = ((rule, profiles.way(rule, *pair)) for pair in pairs for rule in profiles.rules_for(*pair))
         found = next(((rule, way) for rule, way in met if way in on_air), None)
         if found is not None:
             rule, way = found

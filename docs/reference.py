@@ -101,7 +101,11 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "supervisor",
         "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
     ),
-    ("supervisor.vhub_loss", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
+    ("supervisor.roster", "IN_FLIGHT_NS"): ("supervisor", "the last messages of a process whose connection has closed"),
+    ("supervisor.roster", "SILENT_NS"): (
+        "supervisor",
+        "a sign of life; until then the hello of a successor is refused, afterwards it waits for the connection's end",
+    ),
     ("supervisor.failover", "REJOIN_NS"): (
         "supervisor",
         "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
@@ -123,8 +127,8 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to tell its pages that the run has ended"),
     ("runtime.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
     ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
-    ("supervisor.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
-    ("supervisor.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
+    ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
+    ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
     ("vhub.main", "CONNECT_S"): ("vHub", "a supervisor to connect to; then it fails"),
     ("node.main", "CONNECT_S"): ("nodes", "the same"),
     ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),

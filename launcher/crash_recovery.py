@@ -16,7 +16,7 @@ from foosim.protocol.codec import decode_any
 from foosim.runtime.journal import JournalError, journal_files, read_records, remove_journal
 from foosim.runtime.run_folder import RunFolder, left_runs
 from foosim.vhub.recording.recovery import recover_capture
-from foosim.vhub.records import HeadRecord, HubRecord
+from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
 def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> None:

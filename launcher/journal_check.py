@@ -15,8 +15,8 @@ from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Commit
 from foosim.runtime.journal import journal_files, read_journal, read_newest, read_whole
 from foosim.runtime.run_folder import RunFolder
-from foosim.supervisor.records import CommitRecord, HeadRecord, Record
-from foosim.vhub.resume import last_tick_of
+from foosim.supervisor.records import Checkpoint, CommitRecord, Record
+from foosim.vhub.state.resume import last_tick_of
 
 
 def check_journals(folder: RunFolder, options: RunOptions) -> None:
@@ -67,7 +67,7 @@ def _last_commit(records: list[bytes]) -> int:
     """Return the tick of the last commit, -1 when there is none."""
     for raw in reversed(records):
         record = decode_any(Record, raw)
-        commits = record.commits if isinstance(record, HeadRecord) else []
+        commits = record.commits if isinstance(record, Checkpoint) else []
         if isinstance(record, CommitRecord):
             commits = [record.commit]
         if commits:

@@ -23,9 +23,9 @@ from typing import Final
 from foosim.common.errors import Failed
 from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.memory import OomKills, oom_kills
+from foosim.launcher.restarts import Ending
 from foosim.runtime.children import GRACE_S, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
-from foosim.supervisor.ending import Ending
 
 POLL_S: Final = 0.02
 PLAYER: Final = "foosim-player"

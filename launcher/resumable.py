@@ -20,7 +20,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
 from foosim.runtime.journal import JournalError, journal_files, read_records
 from foosim.runtime.run_folder import RunFolder
-from foosim.vhub.records import HeadRecord, HubRecord
+from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
 def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None, *, has_hub_here: bool) -> None:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from foosim.client.control import Control, NoAnswer
 from foosim.common.addresses import parse_address
 from foosim.common.errors import Failed, Refused
 from foosim.launcher.console_child import ConsoleChild, Page
@@ -34,8 +35,7 @@ from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError
-from foosim.supervisor.control import Control, NoAnswer
-from foosim.vhub.links.summary import meanings
+from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 
 POLL_S: Final = 0.02
@@ -149,7 +149,7 @@ class Up:
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
-        for line in start_lines(meanings(self.plan.deployment), str(options.file)):
+        for line in start_lines(summaries(self.plan.deployment), str(options.file)):
             display.say(line)
         info = self._await(self._own_info)
         if info is None:

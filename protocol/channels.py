@@ -97,8 +97,8 @@ REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the nam
 READY: Final = _simulation(
     "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
 )
-STANDING: Final = _simulation("standing", hub_messages.Standing, "vhub", "supervisor", "with each ready")
-PROCEED: Final = _simulation("proceed", hub_messages.Proceed, "supervisor", "the named one", "an answer")
+RESUME_STATE: Final = _simulation("standing", hub_messages.ResumeState, "vhub", "supervisor", "with each ready")
+RESUME_GRANT: Final = _simulation("proceed", hub_messages.ResumeGrant, "supervisor", "the named one", "an answer")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
@@ -144,8 +144,8 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     PIECE,
     REFUSAL,
     READY,
-    STANDING,
-    PROCEED,
+    RESUME_STATE,
+    RESUME_GRANT,
     PREPARE,
     EPOCH,
     ORDER,
@@ -200,12 +200,12 @@ NODE_READS: Final[Reads] = (*((channel, True) for channel in (
     RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
 VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
-    BUILD, PIECE, REFUSAL, PROCEED, COMMIT
+    BUILD, PIECE, REFUSAL, RESUME_GRANT, COMMIT
 )), *((channel, False) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, WATCHED, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
-    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY
+    HELLO, FETCH, READY, RESUME_STATE, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY
 ))  # fmt: skip
 CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final[Reads] = ((ANSWER, True), (PIECE, True))

@@ -6,14 +6,14 @@ from foosim.common.struct_types import Counter, Digest, Message, Name, Numbers
 from foosim.world.initial_state import Added
 
 
-class Standing(Message, frozen=True):
+class ResumeState(Message, frozen=True):
     """How far the vHub has come: the highest epoch and the last branch that it knows, its last commit as it came (empty
     before the first), the chain over the frames up to it, its layout beside the deployment's, and the last tick whose
     deliveries are `final`.
 
     It is for the supervisor that was started as `supervisor`. A vHub that `waits` goes on from a journal, and closes
-    nothing until it may `Proceed`. The journal of one that `lost_machine` was written before its machine was started
-    the last time: what came last may not have reached the disk.
+    nothing until it has its `ResumeGrant`. The journal of one that `lost_machine` was written before its machine was
+    started the last time: what came last may not have reached the disk.
     """
 
     name: Name
@@ -30,7 +30,7 @@ class Standing(Message, frozen=True):
     lost_machine: bool
 
 
-class Proceed(Message, frozen=True):
+class ResumeGrant(Message, frozen=True):
     """The supervisor knows where the vHub that was started as `boot` stands: it goes on, in `epoch` or a later one."""
 
     name: Name

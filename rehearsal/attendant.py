@@ -43,7 +43,7 @@ class Attendant:
     ) -> None:
         """`say` takes lines of progress; `on_stuck` is told of a player that cannot be interrupted, and may end the
         process."""
-        self._onlooker = Onlooker(system.supervisor, time.monotonic())
+        self._onlooker = Onlooker(system.supervisor.state, time.monotonic())
         self._system, self._say, self._on_stuck = system, say, on_stuck
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._attend, name="attendant", daemon=True)

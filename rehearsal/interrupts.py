@@ -38,7 +38,7 @@ class Interrupts:
 
     def last_line(self, capture: Path | None, *, is_finished: bool) -> str:
         """`interrupted at 3.20 s of 20.00 s, capture run.mcap`."""
-        how_far = "its start" if self._system is None else reached(self._system.supervisor)
+        how_far = "its start" if self._system is None else reached(self._system.supervisor.state)
         where = "no capture" if capture is None or not capture.exists() else f"capture {capture}"
         unfinished = "" if is_finished or not where.endswith(str(capture)) else " (unfinished)"
         return f"interrupted at {how_far}, {where}{unfinished}"

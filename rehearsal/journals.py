@@ -9,8 +9,8 @@ from typing import Final, Literal, get_args
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
 from foosim.vhub.core import HubCore
-from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
-from foosim.vhub.resume import Captured, Past, recall
+from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
+from foosim.vhub.state.resume import Captured, Past, recall
 
 Ending = Literal["now", "torn", "unsaid"]
 """When a vHub dies: at once; while it writes its next record, which is torn then; behind that, with nothing said."""

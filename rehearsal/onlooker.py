@@ -11,7 +11,7 @@ from typing import Final
 
 from foosim.common.names import TEAMS
 from foosim.rehearsal.settings import AtWork
-from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.state import RunState
 from foosim.supervisor.status import score_text
 from foosim.world.frame import Frame
 
@@ -22,20 +22,20 @@ STOOD_S: Final = 4 * LOOK_S
 """A longer time between two looks is one in which this process was not given the processor: it counts for no player."""
 
 
-def reached(core: SupervisorCore) -> str:
+def reached(state: RunState) -> str:
     """How far a run is: `3.20 s of 20.00 s`."""
-    tick_s = core.deployment.tick_ns / 1e9
-    last = core.settings.last_tick
-    return f"{(core.frame.tick - core.first_tick) * tick_s:.2f} s of {(last - core.first_tick) * tick_s:.2f} s"
+    tick_s = state.deployment.tick_ns / 1e9
+    last = state.settings.last_tick
+    return f"{(state.frame.tick - state.first_tick) * tick_s:.2f} s of {(last - state.first_tick) * tick_s:.2f} s"
 
 
 class Onlooker:
     """Looks on one rehearsal."""
 
-    def __init__(self, core: SupervisorCore, now_s: float) -> None:
-        self._core = core
+    def __init__(self, state: RunState, now_s: float) -> None:
+        self._state = state
         self._line_s = self._looked_s = now_s
-        self._line_tick = core.frame.tick
+        self._line_tick = state.frame.tick
         self._turns: Counter[str] = Counter()
         """Whose turn it was how often when it was looked, since the last line."""
         self._turn = -1
@@ -50,7 +50,7 @@ class Onlooker:
         self._turns[at_work.name] += 1
         if now_s < self._line_s + LINE_S:
             return ""
-        frame = self._core.frame
+        frame = self._state.frame
         line = self._line(now_s - self._line_s, frame)
         self._line_s, self._line_tick = now_s, frame.tick
         self._turns.clear()
@@ -59,13 +59,13 @@ class Onlooker:
     @property
     def allowed_s(self) -> float:
         """How long a player's turn may take at this stage of the run: the first ones import its module."""
-        deadlines, core = self._core.deployment.deadlines, self._core
-        first_ns = deadlines.start_ns if core.frame.tick == core.first_tick else 0
+        state, deadlines = self._state, self._state.deployment.deadlines
+        first_ns = deadlines.start_ns if state.frame.tick == state.first_tick else 0
         return max(first_ns, deadlines.lockstep_fast_ns) / 1e9
 
     def overdue(self, at_work: AtWork) -> str:
         """Return what is said of a player that has not returned within its deadline; empty when none is overdue."""
-        deadlines = self._core.deployment.deadlines
+        deadlines = self._state.deployment.deadlines
         is_first = at_work.tick < 0
         allowed_ns = deadlines.start_ns if is_first else deadlines.lockstep_fast_ns
         if not at_work.acts or at_work.turns != self._turn or self._in_turn_s < allowed_ns / 1e9:
@@ -75,8 +75,8 @@ class Onlooker:
         return f"{at_work.name} {what} for {allowed_ns / 1e9:g} s (deadlines.{which})"
 
     def _line(self, elapsed_s: float, frame: Frame) -> str:
-        speed = (frame.tick - self._line_tick) * self._core.deployment.tick_ns / 1e9 / elapsed_s
-        parts = [f"{reached(self._core)} simulated, {speed:.2f}x"]
+        speed = (frame.tick - self._line_tick) * self._state.deployment.tick_ns / 1e9 / elapsed_s
+        parts = [f"{reached(self._state)} simulated, {speed:.2f}x"]
         if frame.score is not None:
             parts.append(score_text({"score": dict(zip(TEAMS, frame.score, strict=True))}))
         name, count = max(sorted(self._turns.items()), key=lambda item: item[1])

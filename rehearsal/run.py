@@ -25,9 +25,8 @@ from foosim.rehearsal.attendant import Attendant
 from foosim.rehearsal.system import Settings, System
 from foosim.runtime.disk import Level
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import result
 from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 from foosim.world.initial_state import Start
 
@@ -121,7 +120,7 @@ def _run(
     begun_ns = time.perf_counter_ns()
 
     def told() -> dict[str, Any]:
-        wall_ns, found = time.perf_counter_ns() - begun_ns, result(system.supervisor)
+        wall_ns, found = time.perf_counter_ns() - begun_ns, system.supervisor.result()
         rtf = round((found["ticks"] - found["first_tick"]) * found["tick_ns"] / wall_ns, 3)
         return {**found, "rtf": rtf, "capture": None if capture is None else str(first_there(capture))}
 
@@ -135,7 +134,7 @@ def _run(
         with Attendant(system, progress, stuck):
             system.run()
         if writer is not None:
-            end = system.supervisor.end
+            end = system.supervisor.state.end
             writer.finish({} if end is None else ending_metadata(end))
     finally:
         system.close()

@@ -16,7 +16,7 @@ from foosim.rehearsal.clock import Clock
 from foosim.runtime.standstill import Standstill
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 
 

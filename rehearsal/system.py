@@ -32,9 +32,8 @@ from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.closing import ClosingCore
-from foosim.vhub.core import HubCore
-from foosim.vhub.recording.queue import Keep, KeepEpoch
+from foosim.vhub.core import ClosingCore, HubCore
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.world.frame import Frame
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
@@ -85,7 +84,7 @@ class System:
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, self._clock(channels.SUPERVISOR).at(0))
-        deployment = self.supervisor.deployment
+        deployment = self.supervisor.state.deployment
         self._enter_supervisor()
         self.hub_journal = HubJournal()
         self.hub: HubCore
@@ -115,8 +114,8 @@ class System:
         core.on_commit = self._frames.append
         self.enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         process = self.processes[channels.SUPERVISOR]
-        process.took = core.watch.took
-        process.stood = lambda stood_ns, now_ns: core.watch.rest(core, stood_ns, now_ns)
+        process.took = core.progress.took
+        process.stood = core.on_standstill
         self._hub_hears(True)
 
     def _enter_hub(self, fingerprint: bytes) -> None:
@@ -134,7 +133,7 @@ class System:
                 self.soon(lambda: self._hub_again(hub))
 
         self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.door.rest
+        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -160,7 +159,7 @@ class System:
         """Run until the supervisor has finished."""
         bus = self.bus
         self._wake_due()
-        while not self.supervisor.finished:
+        while not self.supervisor.state.finished:
             while self._next:
                 self._next.pop(0)()
             arrival_ns = bus.next_ns()
@@ -176,7 +175,7 @@ class System:
             elif self._is_soonest_known():
                 bus.now_ns = max(bus.now_ns, self._soonest_ns)
                 self._wake_due()
-                if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
+                if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.state.pacer.paused:
                     raise Stuck(self._where())
 
     def close(self) -> None:
@@ -342,11 +341,11 @@ class System:
                 self.journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
-        elif isinstance(action, Keep):
+        elif isinstance(action, RecordClosing):
             self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
-        elif isinstance(action, KeepEpoch):
+        elif isinstance(action, RecordEpoch):
             self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)
@@ -363,7 +362,7 @@ class System:
         """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
         frames = self._frames.copy()
         self._frames.clear()
-        written = fold(self.supervisor.deployment, self.journal).frame.tick if was_cut else frames[-1].tick
+        written = fold(self.supervisor.state.deployment, self.journal).frame.tick if was_cut else frames[-1].tick
         for frame in frames:
             if frame.tick <= written:
                 self._last_commit_ns = self.bus.now_ns
@@ -373,7 +372,8 @@ class System:
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
-        return f"stuck at tick {self.supervisor.frame.tick}: nodes wait for {nodes}, vHub for {self.hub.waiting_for!r}"
+        tick = self.supervisor.state.frame.tick
+        return f"stuck at tick {tick}: nodes wait for {nodes}, vHub for {self.hub.waiting_for!r}"
 
     # --- from outside ------------------------------------------------------------------------------------------------
 
@@ -397,7 +397,7 @@ class System:
 
     def _enter_clients(self) -> None:
         """Let in the players of the deployment and the lockstep clients of the rehearsal."""
-        for name, player in sorted(self.supervisor.deployment.players.items()):
+        for name, player in sorted(self.supervisor.state.deployment.players.items()):
             assert player.lockstep, "a rehearsal has lockstep players only"
             self._enter_player(name, "boot")
         for name, client in sorted(self.settings.clients.items()):
@@ -452,7 +452,7 @@ class System:
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
-            history = fold(self.supervisor.deployment, self.journal)
+            history = fold(self.supervisor.state.deployment, self.journal)
             boot = f"boot-{self._boots}"
             now_ns = self.now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)

@@ -22,14 +22,14 @@ from foosim.analysis.age_tallies import AgeAtUse, AgeTallies
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData
 from foosim.capture.rows import ClientRow, PacketRow, edit_of
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.replay.what_if_reader import Frames, Offers, caveats, frames_for, world_of
-from foosim.vhub.network.link_settings import Profiles
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import IN_FLIGHT, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 
 CHANGED_KEPT: Final = 10_000
 """How many changed packets a result names."""
@@ -162,7 +162,7 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     """
     compared = _Compared(capture)
     deployment = deployment or capture.deployment
-    frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
+    frames = frames_for(capture, on_radio=Profiles(deployment.network, deployment.carriers()).on_radio)
     before, after = AgeTallies(deployment.tick_ns), AgeTallies(deployment.tick_ns)
     offers = Offers(capture, frames, compared.keep, before.take_row)
     for flight in _judged(capture, deployment, offers, frames, after):

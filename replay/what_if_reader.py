@@ -22,7 +22,7 @@ from foosim.capture.rows import AGES, CLIENTS, PACKETS, TICK, AgeRow, ClientRow,
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.resimulation import Replica
 from foosim.replay.verify import start_of
-from foosim.vhub.state import OUTBOX_SHIFT
+from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
 

@@ -1,19 +1,18 @@
-"""Balancing: robots move, one at a time, from the busiest node to the idlest.
+"""Load balancing: robots move, one at a time, from the busiest node to the idlest.
 
-A node's load is the share of its time in which its loop does not sleep, as its heartbeats tell. A move is an epoch as
-any other: the world does not notice. A robot's cost is taken to be an equal share of its node's load; it moves only
-when that makes the two nodes more alike, and then the loads settle before the next one. Where an operator asks for it,
-all move at once of which that is expected.
+A node's load is the share of its time in which its loop does not sleep, as its heartbeats report. A move is an epoch
+like any other and does not change the world. The cost of a robot is estimated as an equal share of its node's load; it
+moves only when that makes the two loads more equal, and then the loads settle before the next move. A request of an
+operator makes all such moves at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.state import RunState
 
 EVERY_NS: Final = 1_000_000_000
 """How often loads are looked at: a heartbeat tells the load of the last second."""
@@ -37,12 +36,17 @@ class Shift:
     source_load: float
     target_load: float
 
+    def __str__(self) -> str:
+        return (
+            f"{self.robot} moves from {self.source} ({self.source_load:.0%}) to {self.target} ({self.target_load:.0%})"
+        )
+
 
 def best_shift(
     loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str], stay: Collection[str]
 ) -> Shift | None:
-    """Return which robot should move now, if any, but none of those that `stay`: from the busiest to the idlest node,
-    and home rather than elsewhere."""
+    """Return the robot that should move now, if any, but none of those that `stay`: from the busiest to the idlest
+    node, preferably one whose home that is."""
     source = max(sorted(loads), key=lambda name: loads[name])
     target = min(sorted(loads), key=lambda name: loads[name])
     mine = sorted(robot for robot, owner in owners.items() if owner == source)
@@ -57,8 +61,8 @@ def best_shift(
 
 
 def shifts_at_once(loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str]) -> list[Shift]:
-    """Return all that should move if each takes its share of the load with it; a node gives, or takes. The loads in a
-    shift are those that were measured."""
+    """Return all moves that make loads more equal if each robot takes its share of the load with it; no node both
+    gives and takes. The loads in a shift are the measured ones."""
     expected, placed = dict(loads), dict(owners)
     shifts: list[Shift] = []
     while (shift := best_shift(expected, placed, homes, {known.robot for known in shifts})) is not None:
@@ -72,10 +76,10 @@ def shifts_at_once(loads: Mapping[str, float], owners: Mapping[str, str], homes:
     return shifts
 
 
-def loads_of(core: SupervisorCore) -> dict[str, float]:
-    """Return the load of each node that takes part and has told it."""
-    known = core.roster.by_name
-    beats = {name: known[name].heartbeat for name in core.members if name in known}
+def loads_of(state: RunState) -> dict[str, float]:
+    """Return the load of each member that has reported one."""
+    known = state.roster.by_name
+    beats = {name: known[name].heartbeat for name in state.members if name in known}
     return {name: beat.busy for name, beat in beats.items() if beat is not None}
 
 
@@ -108,15 +112,9 @@ class Balancer:
         self._means = {}
         return shift
 
-    def wake(self, core: SupervisorCore, now_ns: int) -> None:
-        """Look at the nodes of a running world, and move what should."""
-        if not core.is_open or core.end is not None or core.pacer.paused:
-            return
-        loads = loads_of(core)
-        shift = self.look(loads, core.owners, now_ns) if len(loads) == len(core.members) else None
-        if shift is None:
-            return
-        core.account.moves += 1
-        core.open_epoch({**core.owners, shift.robot: shift.target}, now_ns)
-        source, target = f"{shift.source} ({shift.source_load:.0%})", f"{shift.target} ({shift.target_load:.0%})"
-        core.say("info", f"{shift.robot} moves from {source} to {target} at tick {core.frame.tick}")
+    def wake(self, state: RunState, now_ns: int) -> Shift | None:
+        """Return what should move now in a running world, by the loads that its members reported last."""
+        if not state.is_open or state.end is not None or state.pacer.paused:
+            return None
+        loads = loads_of(state)
+        return self.look(loads, state.owners, now_ns) if len(loads) == len(state.members) else None

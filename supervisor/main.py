@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
 import msgspec
 
@@ -21,10 +22,10 @@ from foosim.common.errors import Malformed, Refused
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.access import access_to
-from foosim.protocol.actions import Say
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.disk import Level, room_on_disk
 from foosim.runtime.journal import Journal, JournalError, journal_files, remove_journal
 from foosim.runtime.loop import Loop, Wire
 from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot, start_log
@@ -36,10 +37,40 @@ from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import result
+
+LOOK_NS: Final = 1_000_000_000
+"""How often the free space of the journal's disk is looked at."""
+
+
+class JournalRoom:
+    """Watches the free space for the journal: a run ends in order while its end can still be written."""
+
+    def __init__(self, folder: Path, reserve: int, core: SupervisorCore) -> None:
+        """At `reserve` bytes of free space the run ends."""
+        self._folder = folder
+        self._reserve = reserve
+        self._core = core
+        self._level = Level.FINE
+        self._look_ns = 0
+
+    def look(self, now_ns: int) -> None:
+        """Once a second: log that space gets low, and at the reserve end the run."""
+        if now_ns < self._look_ns:
+            return
+        self._look_ns = now_ns + LOOK_NS
+        try:
+            room = room_on_disk(self._folder, self._reserve)
+        except OSError:
+            return  # writing the next record reports it
+        if room.level > self._level:
+            self._level = room.level
+            if room.level is Level.LOW:
+                text = f"room gets little, at the reserve the run ends: {self._folder}: {room}"
+                self._core.state.log("warning", text)
+            else:
+                self._core.fail(f"lost room for the journal: {self._folder}: {room}")
 
 
 class SupervisorProcess:
@@ -63,7 +94,7 @@ class SupervisorProcess:
         self._is_told_to_end = False
         self._info = RunInfo(
             folder.name,
-            self.core.deployment.world,
+            self.core.state.deployment.world,
             str(Path(settings.deployment_name).absolute()),
             os.getpid(),
             wall_clock.now_text(),
@@ -84,9 +115,10 @@ class SupervisorProcess:
         self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.on_unwritten = self._on_unwritten
-        self._room = JournalRoom(folder.journals, self.core.deployment.capture.reserve_bytes)
-        self._loop.took = self.core.watch.took
-        self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
+        reserve = self.core.state.deployment.capture.reserve_bytes
+        self._room = JournalRoom(folder.journals, reserve, self.core)
+        self._loop.took = self.core.progress.took
+        self._loop.stood = self.core.on_standstill
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
@@ -98,14 +130,14 @@ class SupervisorProcess:
         go on, nothing is written, so that it can be resumed again."""
         info = self._info
         self._folder.write_info(info)
-        self.core.say("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
-        self._loop.run(lambda: self.core.finished)
+        self.core.state.log("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
+        self._loop.run(lambda: self.core.state.finished)
         self._loop.perform()
-        if self.core.beginning.abandoned:
+        if self.core.state.abandoned:
             return REFUSED
-        if self.core.closing.cut_off and self._has_capture():
-            self.core.closing.cut_off = ""
-        told = result(self.core)
+        if self.core.state.cut_off and self._has_capture():
+            self.core.state.cut_off = ""
+        told = self.core.result()
         self._folder.write_result(told)
         return FAILED if told["failed"] else DONE
 
@@ -115,15 +147,15 @@ class SupervisorProcess:
         return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
 
     def stop(self) -> None:
-        """Have the run end in order, as the command `down` does; a signal handler may call this."""
+        """End the run in order, as the command `down` does; a signal handler may call this."""
         self._is_told_to_end = True
         self._inbox.wake()
 
     def _turn(self, now_ns: int) -> None:
-        self.core.busy = self._loop.busy
+        self.core.state.busy = self._loop.busy
         reminder = self._exposure.due(now_ns)
         if reminder:
-            self.core.say("warning", reminder)
+            self.core.state.log("warning", reminder)
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
@@ -134,10 +166,10 @@ class SupervisorProcess:
 
     def _turn_journal(self, now_ns: int) -> None:
         """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
-        tick = self.core.frame.tick
-        self._room.look(now_ns, self.core)
+        tick = self.core.state.frame.tick
+        self._room.look(now_ns)
         try:
-            if self._journal.rotate_if_full(self.core.head, tick):
+            if self._journal.rotate_if_full(self.core.state.checkpoint, tick):
                 self._journal.forget_before(self._turned_tick)
                 self._turned_tick = tick
         except JournalError as error:
@@ -145,17 +177,17 @@ class SupervisorProcess:
             self._on_unwritten(error)
 
     def _on_unwritten(self, error: JournalError) -> None:
-        """The journal has failed: the run ends. What is committed by then is said, so that the capture has it."""
-        self.core.finish(f"lost the journal: {error}", failed=True)
+        """The journal has failed: the run ends. Frames committed by then are published, so the capture has them."""
+        self.core.fail(f"lost the journal: {error}")
 
     def _note_radio(self) -> None:
-        """Write into the run file where clients find the vHub, when it tells."""
-        hub = self.core.roster.by_name.get(VHUB)
+        """Write the address of the vHub for clients into the run file, once the vHub reports it."""
+        hub = self.core.state.roster.by_name.get(VHUB)
         address = "" if hub is None else hub.report.get("radio_address", "")
         if isinstance(address, str) and address not in ("", self._info.radio):
             self._info = msgspec.structs.replace(self._info, radio=address)
             self._folder.write_info(self._info)
-            self.core.actions.append(Say("info", f"clients find the vHub at {address}"))
+            self.core.state.log("info", f"clients find the vHub at {address}")
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if not is_alive:

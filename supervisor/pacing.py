@@ -88,8 +88,8 @@ class Pacer:
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
-    def set_back(self, ticks: int, tick: int, now_ns: int) -> None:
-        """The run goes on from an earlier tick, so many before: now, and while paused no further than it was to go."""
+    def roll_back(self, ticks: int, tick: int, now_ns: int) -> None:
+        """Continue from an earlier tick, `ticks` before; while paused, grant no later tick than before."""
         if self.paused:
             self.granted = max(tick, self.granted - ticks)
         self.start(now_ns, tick)

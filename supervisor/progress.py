@@ -1,25 +1,22 @@
-"""Who is waited for, who is late, who is lost.
+"""Progress of a run: which process is waited for, which is late, which is lost, and whether the capture gets closed.
 
-Who is waited for is who has all its inputs and has not answered (node: order and deliveries; vHub: commit, samples and
-Dones; lockstep client: Go). Only that one can be late or overdue. A late tick is blamed on who took the longest on the
-way from the last commit to its own, on a clock that stands still while the supervisor itself was busy; ticks that only
-catch up keep the name of who made them late.
+A process is waited for when it has all its inputs and has not answered (node: order and deliveries; vHub: commit,
+samples and Dones; lockstep client: Go). Only such a process can be late or overdue. A late tick is blamed on the
+process with the longest share of the time from the last commit to its own, on a clock that stands still while the
+supervisor itself is busy; ticks that only catch up keep the blame of the tick that made them late.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 from foosim.common import limits
-from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
 from foosim.runtime.standstill import TOLD_NS, told
-from foosim.supervisor.roster import Process, Roster
-
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.roster import Process
+from foosim.supervisor.state import RunState
 
 DOUBT_NS: Final = 1_000_000_000
 """For how long behind a standstill of the supervisor connections end that it has itself kept silent on."""
@@ -29,21 +26,20 @@ LATE_EVERY_NS: Final = 1_000_000_000
 """How often late ticks are logged at most."""
 
 
-class Watch:
-    """When each input of the last ticks came, by the supervisor's clock less what it was busy itself."""
+class ProgressMonitor:
+    """Times of the inputs of the last ticks, by the supervisor's clock less its own busy time."""
 
-    def __init__(self, deployment: Deployment, roster: Roster, now_ns: int) -> None:
-        self.deployment = deployment
-        self.roster = roster
+    def __init__(self, state: RunState, now_ns: int) -> None:
+        self._state = state
         self.now_ns = now_ns
-        self.ended_ns = 0
+        """When `lost` was asked last."""
         self.late = ""
         """The process that the last late tick waited for."""
         self.late_tick = -1
         self._busy_ns = 0
         self._begun_ns = self._progress_ns = now_ns
         self._doubt_ns = 0
-        """Until when the end of a connection may come of the supervisor's own standstill."""
+        """Until when a connection may close because of the supervisor's own standstill."""
         self._named = ""
         self._lag_ns = 0
         self._late_ticks = 0
@@ -54,43 +50,37 @@ class Watch:
         """Of each frame: when it was committed, and how long the supervisor had been busy until then."""
         self._parts: dict[int, dict[str, int]] = {}
         self._told: dict[int, str] = {}
-        """By tick: whom its deliveries waited for, as the vHub said."""
+        """By tick: which process its deliveries waited for, as the vHub reported."""
 
     # --- what came when ----------------------------------------------------------------------------------------------
 
     def took(self, begun_ns: int, ended_ns: int) -> None:
-        """A turn of the supervisor took this long."""
+        """Count a turn of the supervisor as its own busy time."""
         self._busy_ns += max(0, ended_ns - begun_ns)
 
     def begun(self, now_ns: int) -> None:
-        """An epoch begins."""
+        """An epoch begins: nothing is overdue."""
         self._begun_ns = self._progress_ns = now_ns
 
-    def rest(self, core: SupervisorCore, stood_ns: int, now_ns: int) -> None:
-        """The supervisor's own loop stood still for so long: no deadline of another one runs then (`standstill`)."""
-        for process in self.roster.by_name.values():
+    def on_standstill(self, stood_ns: int, now_ns: int) -> None:
+        """The supervisor's own loop stood still for so long: no deadline of another process runs then."""
+        for process in self._state.roster.by_name.values():
             process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
         self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
-        self.ended_ns = min(now_ns, self.ended_ns + stood_ns)
-        core.absence.rest(stood_ns)
-        core.closing.rest(stood_ns, now_ns)
-        if core.take_over is not None:
-            core.take_over.rest(stood_ns)
         if stood_ns >= TOLD_NS:
             self._doubt_ns = now_ns + DOUBT_NS
-            core.say("warning", told(stood_ns))
+            self._state.log("warning", told(stood_ns))
 
     def doubts(self, process: Process, now_ns: int) -> bool:
-        """Whether a connection that has ended says nothing of its process, which is lost when it stays silent.
-
-        One that ends a second time, or whose successor is here, is beyond doubt.
+        """Whether a closed connection may be due to the supervisor's own standstill: then its process is lost only when
+        it stays silent. A connection that closes a second time, or whose successor is here, is beyond doubt.
         """
         process.in_doubt = now_ns < self._doubt_ns and not process.in_doubt
         return process.in_doubt
 
-    def set_back(self, tick: int, now_ns: int) -> None:
-        """The run goes on from an earlier tick: nothing has come for those behind it."""
+    def roll_back(self, tick: int, now_ns: int) -> None:
+        """The run goes on from an earlier tick: nothing has come for those after it."""
         for known in (self._released, self._delivered, self._committed, self._parts, self._told):
             for behind in [each for each in known if each > tick]:
                 known.pop(behind)
@@ -106,8 +96,8 @@ class Watch:
     def delivered(self, tick: int, now_ns: int) -> None:
         self._delivered[tick] = now_ns - self._busy_ns
 
-    def told(self, heartbeat: Heartbeat) -> None:
-        """The vHub says whom its closing waited for: the deliveries of the tick after are late because of it."""
+    def on_heartbeat(self, heartbeat: Heartbeat) -> None:
+        """The vHub reports which process its closing waited for: the deliveries of the next tick are late by it."""
         names = _names(heartbeat.waiting_for)
         if names:
             self._told[heartbeat.tick + 1] = names[0]
@@ -132,7 +122,7 @@ class Watch:
 
     def _late_line(self, frame_tick: int, lag_ns: int, now_ns: int) -> str:
         """Return a line about late ticks, once a second at most."""
-        if lag_ns < self.deployment.tick_ns:
+        if lag_ns < self._state.deployment.tick_ns:
             return ""
         self._late_ticks += 1
         if now_ns - self._late_said_ns < LATE_EVERY_NS:
@@ -141,7 +131,7 @@ class Watch:
         return f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late} ({count} late ticks)"
 
     def _waited_for(self, tick: int, due_ns: int, now_ns: int) -> str:
-        """Return who took the longest between the commit of frame `tick` and that of the next one."""
+        """Return the process with the longest share of the time from the commit of frame `tick` to the next one."""
         before, busy_before_ns = self._committed.get(tick, (self._begun_ns - self._busy_ns, self._busy_ns))
         begun = max(before, due_ns - busy_before_ns)
         released = max(begun, self._released.get(tick, begun))
@@ -155,57 +145,60 @@ class Watch:
 
     # --- who is waited for -------------------------------------------------------------------------------------------
 
-    def waiting_for(self, core: SupervisorCore) -> list[str]:
-        """Return who is being waited for: processes and lockstep clients, in name order."""
-        if not core.is_open:
-            missing = self.roster.missing(core.frame.layout.digest)
+    def waiting_for(self) -> list[str]:
+        """Return the processes and lockstep clients that are waited for, in name order."""
+        state = self._state
+        if not state.is_open:
+            missing = state.roster.missing(state.frame.layout.digest)
             clients = self._hub_waits_for() if missing == [VHUB] else []
             return clients or missing
-        tick = core.frame.tick
-        if tick >= core.released:
+        tick = state.frame.tick
+        if tick >= state.released:
             return []
         if tick not in self._delivered:
             return self._hub_waits_for() or [VHUB]
-        return core.missing_nodes
+        return state.missing_nodes
 
     def _hub_waits_for(self) -> list[str]:
-        """Return the clients or nodes that the vHub says it waits for."""
-        hub = self.roster.by_name.get(VHUB)
+        """Return the clients or nodes that the vHub reports to wait for."""
+        hub = self._state.roster.by_name.get(VHUB)
         return [] if hub is None or hub.heartbeat is None else _names(hub.heartbeat.waiting_for)
 
     def _has_sensed(self, name: str) -> bool:
-        """Whether a node that the vHub waits for has said what its robots measure: it is at that tick, or further.
+        """Whether a node that the vHub waits for has sent the samples: its heartbeat is at that tick, or further.
 
-        Then perhaps the vHub does not hear it, which shows when its connection closes.
+        Then the vHub perhaps does not hear it, which shows when its connection closes.
         """
-        node, hub = self.roster.by_name.get(name), self.roster.by_name.get(VHUB)
+        by_name = self._state.roster.by_name
+        node, hub = by_name.get(name), by_name.get(VHUB)
         if node is None or node.role != "node" or node.heartbeat is None or hub is None or hub.heartbeat is None:
             return False
         return hub.heartbeat.waiting_for.startswith(SAMPLES_OF) and node.heartbeat.tick >= hub.heartbeat.tick
 
-    def lost(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
-        """Return who is lost, and why."""
+    def lost(self, now_ns: int) -> dict[str, str]:
+        """Return the processes that are lost, and why."""
         self.now_ns = now_ns
-        deadlines = self.deployment.deadlines
-        if core.epoch == 0:
-            return self._late_to_start(core, now_ns)
-        tick = core.frame.tick
-        heartbeat_ns = core.beginning.patience_ns(tick, deadlines.heartbeat_ns)
-        silent = self.roster.silent(now_ns, heartbeat_ns)
+        state, deployment = self._state, self._state.deployment
+        deadlines = deployment.deadlines
+        if state.epoch == 0:
+            return self._late_to_start(now_ns)
+        tick = state.frame.tick
+        heartbeat_ns = state.wait_ns(deadlines.heartbeat_ns)
+        silent = state.roster.silent(now_ns, heartbeat_ns)
         if silent:
             return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
-        if core.take_over is not None:
+        if state.is_resuming:
             return {}  # nobody is waited for yet
-        if core.absence.is_away:
+        if state.is_vhub_away:
             self._progress_ns = now_ns  # nothing goes on without it, and nobody else is to blame
             return {}
-        names = [name for name in self.waiting_for(core) if name in core.members or name not in self.deployment.nodes]
-        if all(name in self.deployment.players or name in self.deployment.clients for name in names):
+        names = [name for name in self.waiting_for() if name in state.members or name not in deployment.nodes]
+        if all(name in deployment.players or name in deployment.clients for name in names):
             self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)  # the vHub has their deadline
             return {}
         waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
-        lost_ns = core.beginning.patience_ns(tick, deadlines.tick_lost_ns)
+        lost_ns = state.wait_ns(deadlines.tick_lost_ns)
         if names and all(map(self._has_sensed, names)):
             lost_ns = max(lost_ns, CUT_SEEN_NS)
         if self._waits_for_capture(names):
@@ -214,32 +207,79 @@ class Watch:
             return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
-            core.say("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
+            state.log("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
 
     def _waits_for_capture(self, names: list[str]) -> bool:
-        """Whether the vHub, which alone is waited for, says that it waits for its disk."""
-        hub = self.roster.by_name.get(VHUB)
+        """Whether only the vHub is waited for, and reports to wait for its disk."""
+        hub = self._state.roster.by_name.get(VHUB)
         told = None if hub is None else hub.heartbeat
         return names == [VHUB] and told is not None and told.waiting_for == CAPTURE
 
-    def _late_to_start(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
-        """Give local processes and players their time to start; what is started by hand is waited for."""
-        local = {name for name, node in self.deployment.nodes.items() if node.launch == "local"}
-        local |= {VHUB, *self.deployment.players}
-        missing = [name for name in self.waiting_for(core) if name in local]
-        if not missing or now_ns - self._begun_ns <= self.deployment.deadlines.start_ns:
+    def _late_to_start(self, now_ns: int) -> dict[str, str]:
+        """Return the local processes and players that did not start in time; one started by hand has no limit."""
+        deployment = self._state.deployment
+        local = {name for name, node in deployment.nodes.items() if node.launch == "local"}
+        local |= {VHUB, *deployment.players}
+        missing = [name for name in self.waiting_for() if name in local]
+        if not missing or now_ns - self._begun_ns <= deployment.deadlines.start_ns:
             return {}
-        return dict.fromkeys(missing, f"not ready within {self.deployment.deadlines.start_ns / 1e9:g} s")
+        return dict.fromkeys(missing, f"not ready within {deployment.deadlines.start_ns / 1e9:g} s")
+
+
+class ClosingMonitor:
+    """Waits until the vHub of a run that has ended has closed the capture, for as long as it makes progress.
+
+    The account of the capture in its heartbeats shows progress. A vHub without any for `deadlines.close`, or that ends
+    meanwhile, leaves a capture that is cut off: an error, though the run itself may have been in order. A vHub has
+    ended when its connection has closed and nothing was heard of it for `deadlines.heartbeat` since. The shell reads
+    the file before it reports that: a capture that has its end was closed, whatever was heard of its vHub.
+    """
+
+    def __init__(self, state: RunState) -> None:
+        self._state = state
+        self._account: Any = None
+        self._progress_ns = self._ended_ns = 0
+
+    def ended(self, now_ns: int) -> None:
+        """The run has ended."""
+        self._ended_ns = now_ns
+
+    def on_standstill(self, stood_ns: int, now_ns: int) -> None:
+        """The supervisor stood still for so long and could not hear of any progress."""
+        self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
+        self._ended_ns = min(now_ns, self._ended_ns + stood_ns)
+
+    def is_over(self, now_ns: int) -> bool:
+        """Whether nothing is waited for any more."""
+        hub, deadlines = self._state.roster.by_name.get(VHUB), self._state.deployment.deadlines
+        if hub is None or hub.farewell:
+            return True
+        account = hub.report.get("recording"), hub.report.get("disk_progress")
+        if account != self._account:
+            self._account, self._progress_ns = account, now_ns
+        silent_ns = now_ns - max(hub.gone_ns, hub.heard_ns)
+        if hub.gone_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
+            self._cut_off(hub, "its vHub ended before it was closed")
+            return True
+        if now_ns > max(self._progress_ns, self._ended_ns) + deadlines.close_ns:
+            wait_s = deadlines.close_ns / 1e9
+            self._cut_off(hub, f"its vHub has made no progress in closing it for {wait_s:g} s (deadlines.close)")
+            return True
+        return False
+
+    def _cut_off(self, hub: Process, why: str) -> None:
+        if hub.report.get("capture"):
+            self._state.cut_off = f"the capture is cut off: {why}"
 
 
 def losses(lost: Mapping[str, str]) -> str:
-    """Return who is lost and why as a reason to end."""
+    """Return the lost processes and why as a reason to end."""
     return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())
 
 
 def _names(waiting_for: str) -> list[str]:
-    """Return the names in what a heartbeat of the vHub says that it waits for."""
+    """Return the names in the `waiting_for` of a heartbeat of the vHub."""
     for what in (DONE_OF, SAMPLES_OF, JOIN_OF):
         if waiting_for.startswith(what):
             return [name for name in waiting_for.removeprefix(what).split(", ") if name]

@@ -1,13 +1,13 @@
-"""The supervisor's journal: epochs, requests and commits, each written before it is spoken.
+"""The records of the supervisor's journal, the account of a run, and the fold of a journal.
 
-A fold gives everything that a supervisor needs which was started again: the last committed frames, the epoch, the edits
-of ticks that are not committed, answers, pace, and the account of the run. What belongs together is one record, so that
-a journal never ends between a request and what it did.
+Each record is written before its message is published. A fold gives everything that a restarted supervisor needs: the
+last committed frames, the epoch, the edits of ticks that are not committed, answers, pace, and the account. What
+belongs together is one record, so that a journal never ends between a request and its effect.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -17,15 +17,100 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.histogram import Lags
 from foosim.deployment.schema import Deployment
+from foosim.protocol import messages
 from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Answer, Commit, End, Epoch
-from foosim.supervisor.account import Account, Recovered, close_outages
-from foosim.supervisor.issued import Issued
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.initial_state import AddedEntity, Start, first_chain, first_frame
 from foosim.world.layout import BALL, Layout, build_layout
+
+ANSWERS_KEPT: Final = 1024
+"""Answers that are kept for requests that are repeated."""
+
+
+@dataclass(slots=True)
+class Account:
+    """Counts of a run. A hand-over is a change of the ball's solver, a move one of a robot's owner."""
+
+    solved_ticks: dict[str, int] = field(default_factory=dict)
+    """By node: the ticks in which it solved a body."""
+    ball_ticks: dict[str, int] = field(default_factory=dict)
+    """By node: the ticks in which it solved the ball."""
+    handovers: int = 0
+    moves: int = 0
+    ball_solver: str = ""
+
+    def count(self, solved: Iterable[str], ball_solver: str) -> None:
+        """Count a committed frame: the nodes that solved a body for it, and who solved the ball."""
+        for name in solved:
+            self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
+        if self.ball_solver and ball_solver != self.ball_solver:
+            self.handovers += 1
+        self.ball_solver = ball_solver
+        if ball_solver:
+            self.ball_ticks[ball_solver] = self.ball_ticks.get(ball_solver, 0) + 1
+
+
+@dataclass(slots=True)
+class Recovered:
+    """One loss or return. `outage_ns` is the wall time without a commit, -1 until one follows, and `told` the tick of
+    the commit that reports it."""
+
+    what: str
+    name: str
+    reason: str
+    tick: int
+    epoch: int
+    outage_ns: int = -1
+    told: int = -1
+
+    def message(self) -> messages.Recovered:
+        """Return it as a commit reports it, when it is over."""
+        return messages.Recovered(self.what, self.name, self.reason, self.tick, self.epoch, self.outage_ns)
+
+
+def reopen_outages(recovered: Sequence[Recovered], tick: int) -> None:
+    """Open the outages that were reported by commits after a tick: these commits are void."""
+    for entry in recovered:
+        if entry.told > tick:
+            entry.outage_ns = entry.told = -1
+
+
+def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int, tick: int) -> list[Recovered]:
+    """Close the outages that end with frame `tick`, committed at `now_ns`; the frame before was at `before_ns`.
+
+    Return those, the oldest first; no more than a commit can report, the next one has the rest.
+    """
+    first = len(recovered)
+    while first > 0 and recovered[first - 1].outage_ns < 0:
+        first -= 1
+    over = list(recovered[first : first + limits.RECOVERIES_PER_COMMIT_MAX])
+    for entry in over:
+        entry.outage_ns, entry.told = max(0, now_ns - before_ns), tick
+    return over
+
+
+class EditLog:
+    """The edits of the last ticks that have any: what a rollback orders again. Bounded."""
+
+    def __init__(self) -> None:
+        self.by_tick: dict[int, list[Edit]] = {}
+        self.forgotten = -1
+        """The last tick whose edits are not known any more."""
+
+    def add(self, tick: int, edits: Sequence[Edit]) -> None:
+        """Note what is added to the order of a tick."""
+        if edits:
+            self.by_tick.setdefault(tick, []).extend(edits)
+        while len(self.by_tick) > limits.EDITED_TICKS_KEPT:
+            self.forgotten = min(self.by_tick)
+            self.by_tick.pop(self.forgotten)
+
+    def since(self, tick: int) -> dict[int, list[Edit]]:
+        """Return the edits of a tick and of those after it."""
+        return {known: list(edits) for known, edits in sorted(self.by_tick.items()) if known >= tick}
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
@@ -44,9 +129,9 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
 
 
 class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
-    """What people have set, as it is now; `granted` is the tick up to which `step` allows, `returns` says which node
-    gets a robot back that was adopted, `starts` how often somebody asked for a node to be started, `disruptions` how
-    often for something to happen to the network."""
+    """What operators have set. `granted` is the tick up to which `step` allows, `returns` has the node that gets an
+    adopted robot back, `starts` how often the start of a node was requested, `disruptions` how often an event of the
+    network was."""
 
     pace: str
     paused: bool
@@ -59,7 +144,7 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
 
 
 class Asked(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What somebody asked for to change something, and what came of it: the tick and text of the answer."""
+    """A request that changes something, with the tick and text of its answer."""
 
     tick: int
     verb: str
@@ -73,14 +158,14 @@ ASKED_TEXT_MAX: Final = 200
 
 
 def asked(verb: str, answer: Answer) -> Asked:
-    """Return what is kept for people of a request."""
+    """Return what is kept of a request, for people."""
     return Asked(answer.tick, verb, answer.text[:ASKED_TEXT_MAX], answer.sender, answer.accepted)
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
-    """A request whose tick is chosen: what it adds to that tick's order, its answer, and what it changes beside.
+    """A request whose tick is chosen: the edits for the order of that tick, its answer, and its other effects.
 
-    `owners` is who owns what by it, from the epoch on that follows.
+    `owners` are those of the epoch that follows.
     """
 
     tick: int
@@ -92,7 +177,7 @@ class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request",
 
 
 class OrderedRecord(msgspec.Struct, frozen=True, array_like=True, tag="ordered", forbid_unknown_fields=True):
-    """What the supervisor itself adds to the order of a tick."""
+    """Edits of the supervisor's own for the order of a tick."""
 
     tick: int
     edits: list[Edit]
@@ -110,13 +195,13 @@ class CommitRecord(msgspec.Struct, frozen=True, array_like=True, tag="commit", f
 
 
 class RecoveredRecord(msgspec.Struct, frozen=True, array_like=True, tag="recovered", forbid_unknown_fields=True):
-    """Somebody was lost or came; who owns what by it is in the epoch that follows."""
+    """A loss or a return; the epoch that follows has the owners that it leads to."""
 
     entry: Recovered
 
 
-class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
-    """Where a further file of a journal starts: what the files before say and is still needed, so that they can go.
+class Checkpoint(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
+    """The first record of a further journal file: what is still needed of the files before, so that they can go.
 
     `added` is the layout of the last commit beside the deployment's; epoch and commits are as they were published.
     """
@@ -145,12 +230,12 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
 
 
 Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
-Record = RunRecord | HeadRecord | Change
+Record = RunRecord | Checkpoint | Change
 
 
 @dataclass(slots=True)
 class History:
-    """What a fold of the supervisor's journal gives."""
+    """The result of folding the supervisor's journal."""
 
     run: RunRecord
     frame: Frame
@@ -174,9 +259,9 @@ class History:
     committed_ns: int = 0
     end: End | None = None
     branch: tuple[int, int] = (0, 0)
-    issued: Issued = field(default_factory=Issued)
+    edit_log: EditLog = field(default_factory=EditLog)
     asked: list[Asked] = field(default_factory=list)
-    """What was asked for last."""
+    """The last requests that change something."""
 
 
 Solved = tuple[list[str], str]
@@ -199,7 +284,7 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
     history: History | None = None
     for raw in records:
         record = decode_any(Record, raw)
-        if isinstance(record, RunRecord | HeadRecord):
+        if isinstance(record, RunRecord | Checkpoint):
             history = _begin(deployment, record)
         elif history is None:
             raise Malformed("a journal of the supervisor that does not start with its run")
@@ -215,7 +300,7 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
     return history
 
 
-def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
+def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
         begun = 0 if first.start is None else first.start.origin.tick
@@ -224,8 +309,8 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)
         return History(first, frame, frame.layout, deployment.owners(), control, account, chain=chain)
-    issued = Issued()
-    issued.forgotten, issued.by_tick = first.forgotten, {tick: list(edits) for tick, edits in first.issued}
+    edit_log = EditLog()
+    edit_log.forgotten, edit_log.by_tick = first.forgotten, {tick: list(edits) for tick, edits in first.issued}
     return History(
         first.run,
         first_frame(deployment, first.run.start),
@@ -244,7 +329,7 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
         committed_ns=first.committed_ns,
         end=first.end,
         branch=first.branch,
-        issued=issued,
+        edit_log=edit_log,
         asked=list(first.asked),
     )
 
@@ -277,7 +362,7 @@ def _apply(history: History, record: Change) -> None:
 def _order(history: History, record: RequestRecord | OrderedRecord) -> None:
     if record.edits:
         history.edits.setdefault(record.tick, []).extend(record.edits)
-        history.issued.add(record.tick, record.edits)
+        history.edit_log.add(record.tick, record.edits)
 
 
 def _commit(history: History, record: CommitRecord) -> None:

@@ -1,19 +1,18 @@
-"""What people ask of a running system: pause, resume, step, rate, add, remove, move, balance, push,
-network, stop and start (a node), down; status, describe, watch.
+"""Requests of operators: pause, resume, step, rate, add, remove, move, balance, push, network, stop and start (a
+node), down; and of viewers: status, describe, watch.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
-first tick not yet released, network with what is sent at the one behind it, add and remove at the first not yet
-released when all nodes are ready for it, a move at the last commit, with its epoch. It is journalled when its tick is
-chosen, then answered; what only reads is neither journalled nor kept. To add a verb: a method and a row.
+first tick not yet released, network with what is sent at the next one, add and remove at the first not yet released
+when all nodes are ready for it, a move at the last commit, with its epoch. A request is journalled when its tick is
+chosen, then answered; one that only reads is neither journalled nor kept. To add a verb: a method and a row.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import hypot
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused, show
@@ -23,21 +22,15 @@ from foosim.common.units import parse_pace
 from foosim.deployment.event_requests import event_text, told
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.protocol import channels
-from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.codec import encode
 from foosim.protocol.messages import Answer, Inquiry, Request
-from foosim.supervisor.choices import chosen
-from foosim.supervisor.issued import Issued
 from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once
-from foosim.supervisor.records import ASKED_KEPT, Asked, OrderedRecord, RequestRecord, asked
-from foosim.supervisor.status import status
+from foosim.supervisor.node_loss import NodeLoss
+from foosim.supervisor.records import RequestRecord, asked
+from foosim.supervisor.state import RunState
+from foosim.supervisor.viewing import Viewing, chosen
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.world.layout import BALL, Layout
 
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
-
-ANSWERS_KEPT = 1024
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
 READS: Final = ("status", "describe", "watch")
@@ -45,7 +38,7 @@ READS: Final = ("status", "describe", "watch")
 TEXT_MAX = 4000
 """Characters of a refusal."""
 NUMBER_MAX = 1e100
-"""More than anybody means, less than what overflows when squared."""
+"""Larger than any useful value, and its square does not overflow."""
 
 
 @dataclass
@@ -60,21 +53,29 @@ class _Waiting:
 class Requests:
     """Takes requests, chooses their ticks, answers."""
 
-    def __init__(self, core: SupervisorCore) -> None:
-        self._core = core
-        self._answers: dict[tuple[str, str], Answer] = {}
-        """By sender and id."""
+    def __init__(
+        self,
+        state: RunState,
+        viewing: Viewing,
+        node_loss: NodeLoss,
+        status: Callable[[int], dict[str, Any]],
+        open_epoch: Callable[[dict[str, str], int], None],
+        stop: Callable[[], int],
+        finish: Callable[[str], None],
+    ) -> None:
+        """`status` returns that of the run at a time, `open_epoch` opens one for owners and the time, `stop` ends the
+        run in order and returns at which tick, `finish` ends it at once as failed."""
+        self._state = state
+        self._node_loss = node_loss
+        self._status_of_run = status
+        self._open_epoch = open_epoch
+        self._stop_run = stop
+        self._finish = finish
         self._pending: list[_Waiting] = []
-        self._edits: dict[int, list[Edit]] = {}
-        self.issued = Issued()
-        self.disruptions = 0
-        """Events of the network that were asked for."""
-        self.asked: deque[Asked] = deque(maxlen=ASKED_KEPT)
-        """What was asked for last, for people."""
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
             "status": self._status,
-            "describe": self._core.viewing.describe,
-            "watch": self._core.viewing.watch,
+            "describe": viewing.describe,
+            "watch": viewing.watch,
             "pause": self._pause,
             "resume": self._resume,
             "step": self._step,
@@ -90,37 +91,37 @@ class Requests:
             "down": self._down,
         }
 
-    def take(self, request: Request, payload: bytes, now_ns: int) -> None:
-        """Take one request: answer it now, or when all nodes are ready for what it asks."""
+    def on_request(self, request: Request, payload: bytes, now_ns: int) -> None:
+        """Answer a request now, or when all nodes are ready for it."""
         key = request.sender, request.id
-        answer = self._answers.get(key)
+        answer = self._state.answers.get(key)
         if answer is None:
             if any((waiting.request.sender, waiting.request.id) == key for waiting in self._pending):
                 return
             answer = self._decide(request, now_ns)
         if answer is not None:
-            self._say(answer)
+            self._reply(answer)
 
-    def inquire(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
-        """Answer who may only look."""
+    def on_inquiry(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
+        """Answer a viewer, who may only read."""
         if inquiry.verb in READS:
             answer = self._decide(inquiry, now_ns)
             assert answer is not None, inquiry.verb
         else:
             why = f"{show(inquiry.verb)} is for operators: who only looks may ask for {', '.join(READS)}"
-            answer = Answer(inquiry.sender, inquiry.id, False, self._core.frame.tick, why, b"{}")
-        self._say(answer)
+            answer = Answer(inquiry.sender, inquiry.id, False, self._state.frame.tick, why, b"{}")
+        self._reply(answer)
 
     def _decide(self, request: Request, now_ns: int) -> Answer | None:
         try:
             verb = self._verbs.get(request.verb)
             if verb is None:
                 raise Refused(f"no verb {show(request.verb)}; there are {', '.join(self._verbs)}")
-            if self._core.end is not None and request.verb not in (*READS, "down"):
+            if self._state.end is not None and request.verb not in (*READS, "down"):
                 raise Refused("the run has ended")
-            if not self._core.is_open and request.verb not in (*READS, "down"):
-                if self._core.take_over is not None:
-                    return None  # whoever asks asks again
+            if not self._state.is_open and request.verb not in (*READS, "down"):
+                if self._state.is_resuming:
+                    return None  # the request is repeated
                 raise Refused("the run has not started yet")
             arguments = decode_json(request.arguments)
             if not isinstance(arguments, dict):
@@ -129,31 +130,28 @@ class Requests:
         except Refused as refused:
             return self._refuse(request, str(refused))
 
-    def _say(self, answer: Answer) -> None:
-        self._core.actions.append(Publish(channels.ANSWER, answer.sender, encode(answer)))
+    def _reply(self, answer: Answer) -> None:
+        self._state.publish(channels.ANSWER, answer.sender, answer)
 
     def _refuse(self, request: Request, why: str) -> Answer:
-        """Journal a refusal as well: asked again, a supervisor that was started again might see it otherwise."""
-        answer = Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}")
+        """Journal a refusal as well: a restarted supervisor might decide otherwise when the request is repeated."""
+        answer = Answer(request.sender, request.id, False, self._state.released, why[:TEXT_MAX], b"{}")
         if request.verb in READS:
             return answer
-        return self._write(request.verb, answer, answer.tick, [], self._core.owners)
+        return self._write(request.verb, answer, answer.tick, [], self._state.owners)
 
     def _write(self, verb: str, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
         """Journal an answer and what is added to the order of `tick`; keep it for when the request is repeated."""
-        record = RequestRecord(tick, edits, answer, self._core.control(), owners, verb)
-        self._core.actions.append(Journal(encode(record)))
-        self.asked.append(asked(verb, answer))
-        self._answers[answer.sender, answer.id] = answer
-        if len(self._answers) > ANSWERS_KEPT:
-            self._answers.pop(next(iter(self._answers)))
+        self._state.journal(RequestRecord(tick, edits, answer, self._state.control(), owners, verb))
+        self._state.asked.append(asked(verb, answer))
+        self._state.keep_answer(answer)
         return answer
 
     def end(self) -> None:
-        """The run has ended: refuse what still waits for engines."""
+        """The run has ended: refuse the changes that still wait for engines."""
         pending, self._pending = self._pending, []
         for waiting in pending:
-            self._say(self._refuse(waiting.request, "the run has ended"))
+            self._reply(self._refuse(waiting.request, "the run has ended"))
 
     def _accept(
         self,
@@ -164,101 +162,62 @@ class Requests:
         owners: dict[str, str] | None = None,
         effective: int | None = None,
     ) -> Answer:
-        """Journal a request whose tick is chosen, with all that it does, and keep its answer.
+        """Journal a request whose tick is chosen, with its whole effect, and keep its answer.
 
         `effective` is the tick that the answer names, where that is not the one whose order has the edits.
         """
         answer = Answer(request.sender, request.id, True, tick if effective is None else effective, text, b"{}")
-        self._write(request.verb, answer, tick, edits or [], owners or self._core.owners)
+        self._write(request.verb, answer, tick, edits or [], owners or self._state.owners)
         if edits:
-            self.issued.add(tick, edits)
-            self._edits.setdefault(tick, []).extend(edits)
+            self._state.edit_log.add(tick, edits)
+            self._state.coming_edits.setdefault(tick, []).extend(edits)
         return answer
 
-    def edits_for(self, tick: int) -> list[Edit]:
-        """Take what requests add to the order of `tick`."""
-        return self._edits.pop(tick, [])
-
-    def order(self, tick: int, edits: list[Edit]) -> None:
-        """Add what the supervisor itself wants to the order of a tick that is not committed.
-
-        The epoch that follows says the orders again that were released.
-        """
-        core = self._core
-        if not edits:
-            return
-        core.actions.append(Journal(encode(OrderedRecord(tick, edits))))
-        self.issued.add(tick, edits)
-        if tick < core.released:
-            core.orders[tick] = [*core.orders[tick], *edits]
-        else:
-            self._edits.setdefault(tick, []).extend(edits)
-
-    def coming_edits(self) -> list[Edit]:
-        """Return what requests add to ticks that are not released yet."""
-        return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
-
-    def resume(
-        self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued, disruptions: int
-    ) -> None:
-        """Take what a journal says of requests; of answers the last ones, as many as are kept."""
-        self._edits, self.issued, self.disruptions = edits, issued, disruptions
-        self._answers = dict(list(answers.items())[-ANSWERS_KEPT:])
-
-    def set_back(self, tick: int) -> None:
-        """The last commit is that of another tick now: what was issued from there on is to come (again)."""
-        self._edits = self.issued.behind(tick)
+    def rolled_back(self) -> None:
+        """The run goes on from an earlier tick: the first change that waits builds on what is ordered then."""
         if self._pending:
             first = self._pending[0]
-            first.layout = layout_after(self._next_layout(), [first.edit])
-
-    def journalled(self) -> tuple[dict[int, list[Edit]], list[Answer]]:
-        """Return what of the requests a further journal file has to say again: edits to come by tick, answers."""
-        return self._edits, list(self._answers.values())
-
-    def _next_layout(self) -> Layout:
-        """Return the layout after everything that is already ordered."""
-        return layout_after(self._core.frame.layout, self._core.ordered_edits())
+            first.layout = layout_after(self._state.next_layout(), [first.edit])
 
     # --- pace --------------------------------------------------------------------------------------------------------
 
     def _status(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        result = encode_json(status(self._core, now_ns))
-        return Answer(request.sender, request.id, True, self._core.frame.tick, "", result)
+        result = encode_json(self._status_of_run(now_ns))
+        return Answer(request.sender, request.id, True, self._state.frame.tick, "", result)
 
     def _pause(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        tick = self._core.released
-        self._core.pacer.pause(tick)
+        tick = self._state.released
+        self._state.pacer.pause(tick)
         return self._tempo(request, tick, f"paused at tick {tick}")
 
     def _resume(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        tick = self._core.released
-        self._core.pacer.resume(tick, now_ns)
+        tick = self._state.released
+        self._state.pacer.resume(tick, now_ns)
         return self._tempo(request, tick, f"resumed at tick {tick}")
 
     def _step(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         count = _integer(arguments, "count", 1, 10**9)
-        tick = self._core.released
-        self._core.pacer.step(tick, count)
+        tick = self._state.released
+        self._state.pacer.step(tick, count)
         return self._tempo(request, tick, f"{count} tick{'' if count == 1 else 's'} from tick {tick}, then paused")
 
     def _rate(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         pace = parse_pace(arguments.get("pace"))
-        tick = self._core.released
-        self._core.pacer.set_pace(pace, tick, now_ns)
+        tick = self._state.released
+        self._state.pacer.set_pace(pace, tick, now_ns)
         return self._tempo(request, tick, f"pace {pace} from tick {tick}")
 
     def _tempo(self, request: Request, tick: int, text: str) -> Answer:
         answer = self._accept(request, tick, text)
-        self._core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self._core.tempo()))
+        self._state.publish_tempo()
         return answer
 
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
-        if self._core.deployment.is_hall:
+        if self._state.deployment.is_hall:
             raise Refused("this world is a hall: balls are added to a table")
-        layout = self._next_layout()
+        layout = self._state.next_layout()
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
         name = _name(arguments, "name", _free_name(taken))
         if not is_name(name):
@@ -267,7 +226,7 @@ class Requests:
             raise Refused(f"name {show(name)} is taken; taken are {', '.join(sorted(taken))}")
         if len(taken) >= limits.ENTITIES_MAX:
             raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
-        table = self._core.deployment.table
+        table = self._state.deployment.table
         position = _vector(arguments, "position", (0.0, 0.0, table.ball.radius))
         velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
         bounds = (table.field.length / 2, table.field.width / 2, table.walls.height)
@@ -280,44 +239,46 @@ class Requests:
     def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
         name = _name(arguments, "name")
         going = {waiting.edit.name for waiting in self._pending}
-        added = [entity.name for entity in self._core.added_to(self._next_layout()) if entity.name not in going]
+        added = [entity.name for entity in self._state.added(self._state.next_layout()) if entity.name not in going]
         if name not in added:
             balls = f"those are {', '.join(added)}" if added else "none was"
             raise Refused(f"{show(name)} cannot be removed: only a ball that was added can, and {balls}")
         self._wait_for_engines(request, Remove(name))
 
     def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
-        """Have the engines built; the first change that waits goes first, since each builds on the one before."""
+        """Have the engines built, for one change after the other, since each builds on the one before."""
         if len(self._pending) >= PENDING_MAX:
             raise Refused(f"{PENDING_MAX} additions and removals wait for engines already")
-        self._pending.append(_Waiting(request, edit, layout_after(self._next_layout(), [edit])))
+        self._pending.append(_Waiting(request, edit, layout_after(self._state.next_layout(), [edit])))
         if len(self._pending) == 1:
             self.prepare()
 
     def prepare(self) -> None:
-        """Say (again) which layout the first change that waits needs."""
+        """Publish (again) the layout of the first change that waits."""
         if self._pending:
-            self._core.prepare(self._pending[0].layout)
+            self._state.prepare(self._pending[0].layout)
 
     def layout_ready(self, now_ns: int) -> None:
-        """Order the change whose layout every node has built."""
+        """Order each change whose layout every node has built."""
         while self._pending:
             waiting = self._pending[0]
-            if self._core.unready_nodes(waiting.layout.digest):
+            if self._state.unready_nodes(waiting.layout.digest):
                 return
             self._pending.pop(0)
-            tick = self._core.released
+            tick = self._state.released
             verb = "added" if isinstance(waiting.edit, Add) else "removed"
-            self._say(self._accept(waiting.request, tick, f"{waiting.edit.name} {verb} at tick {tick}", [waiting.edit]))
+            text = f"{waiting.edit.name} {verb} at tick {tick}"
+            self._reply(self._accept(waiting.request, tick, text, [waiting.edit]))
             if self._pending:
                 following = self._pending[0]
-                following.layout = layout_after(self._next_layout(), [following.edit])
+                following.layout = layout_after(self._state.next_layout(), [following.edit])
                 self.prepare()
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        name = chosen("free body", _name(arguments, "name", BALL), [ball.name for ball in self._next_layout().balls])
+        balls = [ball.name for ball in self._state.next_layout().balls]
+        name = chosen("free body", _name(arguments, "name", BALL), balls)
         impulse = _vector(arguments, "impulse", None)
-        ball = self._core.deployment.table.ball
+        ball = self._state.deployment.table.ball
         size, most = hypot(*impulse), ball.mass * ball.speed_limit
         if size > most:
             limit = f"at most {most:g} N s, which are the ball's limit of {ball.speed_limit:g} m/s at {ball.mass:g} kg"
@@ -327,101 +288,96 @@ class Requests:
 
     def _tick_for_edit(self) -> int:
         """Return the first tick that is not released; raises Refused when its order is full."""
-        tick = self._core.released
-        if len(self._edits.get(tick, ())) >= limits.ENTITIES_MAX - PENDING_MAX:
-            raise Refused(f"tick {tick} has {len(self._edits[tick])} edits already")
+        tick = self._state.released
+        if len(self._state.coming_edits.get(tick, ())) >= limits.ENTITIES_MAX - PENDING_MAX:
+            raise Refused(f"tick {tick} has {len(self._state.coming_edits[tick])} edits already")
         return tick
 
     def _network(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """What the order of a tick says of the network holds for the frame behind it, and for what is sent from it."""
+        """An event in the order of a tick holds from the next frame on, and for packets that are sent from it."""
         tick = self._tick_for_edit()
-        effective, deployment = tick + 1, self._core.deployment
+        state, effective, deployment = self._state, tick + 1, self._state.deployment
         text = event_text(deployment, arguments.get("event"), effective * deployment.tick_ns)
-        if self.disruptions >= EVENTS_MAX:
+        if state.disruptions >= EVENTS_MAX:
             raise Refused(f"{EVENTS_MAX} events were asked for already")
-        self.disruptions += 1
+        state.disruptions += 1
         event = event_of(text, effective * deployment.tick_ns)
         what = f"{told(event)} from tick {effective} on" if event.heal is None else f"{told(event)} at tick {effective}"
         return self._accept(request, tick, what, [Disrupt(text)], effective=effective)
 
-    def network_events(self) -> list[tuple[int, str]]:
-        """Return what was asked of the network at the last ticks at which something was: the tick, the event."""
-        by_tick = sorted(self.issued.by_tick.items())
-        return [(tick + 1, edit.event) for tick, edits in by_tick for edit in edits if isinstance(edit, Disrupt)]
-
     def _move(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        core = self._core
-        robot = chosen("robot", _name(arguments, "robot"), sorted(core.owners))
-        node = chosen("node", _name(arguments, "node"), core.members)
-        tick = core.frame.tick
-        if core.owners[robot] == node:
-            core.recovery.moved(robot)
+        state = self._state
+        robot = chosen("robot", _name(arguments, "robot"), sorted(state.owners))
+        node = chosen("node", _name(arguments, "node"), state.members)
+        tick = state.frame.tick
+        if state.owners[robot] == node:
+            self._node_loss.moved(robot)
             return self._accept(request, tick, f"{robot} is on {node} already, at tick {tick}")
-        owners = {**core.owners, robot: node}
-        core.recovery.moved(robot)
+        owners = {**state.owners, robot: node}
+        self._node_loss.moved(robot)
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}", owners=owners)
-        core.account.moves += 1
-        core.open_epoch(owners, now_ns)
+        state.account.moves += 1
+        self._open_epoch(owners, now_ns)
         return answer
 
     def _balance(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Move what makes the loads of the nodes more alike, and say what and why; or that nothing does."""
-        core, loads = self._core, loads_of(self._core)
-        tick = core.frame.tick
-        silent = [node for node in core.members if node not in loads]
+        """Move all robots at once whose move makes the loads of the nodes more equal; the answer says which and why."""
+        state, loads = self._state, loads_of(self._state)
+        tick = state.frame.tick
+        silent = [node for node in state.members if node not in loads]
         if silent or len(loads) < 2:
             why = f"no load is known of {', '.join(silent)}" if silent else "one node takes part: nothing can move"
             raise Refused(why)
-        shifts = shifts_at_once(loads, core.owners, core.deployment.owners())
+        shifts = shifts_at_once(loads, state.owners, state.deployment.owners())
         told = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
         if not shifts:
             least = f"no move would win more than a robot's share, or {WORTH:.0%}"
             return self._accept(request, tick, f"nothing moves at tick {tick}: loads are {told}; {least}")
-        owners = dict(core.owners)
+        owners = dict(state.owners)
         moved: dict[tuple[str, str], list[str]] = {}
         for shift in shifts:
             owners[shift.robot] = shift.target
-            core.recovery.moved(shift.robot)
+            self._node_loss.moved(shift.robot)
             moved.setdefault((shift.source, shift.target), []).append(shift.robot)
         ways = "; ".join(f"{', '.join(robots)} from {source} to {node}" for (source, node), robots in moved.items())
         text = f"moved at tick {tick}, for loads were {told}: {ways}"
         answer = self._accept(request, tick, text[:TEXT_MAX], owners=owners)
-        core.account.moves += len(shifts)
-        core.open_epoch(owners, now_ns)
+        state.account.moves += len(shifts)
+        self._open_epoch(owners, now_ns)
         return answer
 
     def _stop_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        core = self._core
-        node = chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
-        tick = core.frame.tick
-        if node in core.roster.stopped:
+        state = self._state
+        node = chosen("node", _name(arguments, "node"), sorted(state.deployment.nodes))
+        tick = state.frame.tick
+        if node in state.roster.stopped:
             return self._accept(request, tick, f"{node} is stopped already")
-        if core.deployment.nodes[node].required:
+        if state.deployment.nodes[node].required:
             raise Refused(f"{node} is required by the deployment: the run cannot do without it")
-        if core.members == (node,):
+        if state.members == (node,):
             raise Refused(f"{node} is the only node that is left")
-        core.roster.stopped.add(node)
+        state.roster.stopped.add(node)
         answer = self._accept(request, tick, f"{node} stopped at tick {tick}")
-        core.recovery.stop(node, now_ns)
+        self._node_loss.stop(node, now_ns)
         return answer
 
     def _start_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        core = self._core
-        node = chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
-        if node in core.members:
-            return self._accept(request, core.frame.tick, f"{node} takes part already")
-        core.roster.stopped.discard(node)
-        core.roster.starts[node] = core.roster.starts.get(node, 0) + 1
-        text = f"{node} may take part from tick {core.frame.tick} on, when it has built the world"
-        return self._accept(request, core.frame.tick, text)
+        state = self._state
+        node = chosen("node", _name(arguments, "node"), sorted(state.deployment.nodes))
+        if node in state.members:
+            return self._accept(request, state.frame.tick, f"{node} takes part already")
+        state.roster.stopped.discard(node)
+        state.roster.starts[node] = state.roster.starts.get(node, 0) + 1
+        text = f"{node} may take part from tick {state.frame.tick} on, when it has built the world"
+        return self._accept(request, state.frame.tick, text)
 
     def _down(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """End the run; by a loss that only its launcher knows of, `lost`, at once."""
+        """End the run in order; at once, as failed, with `lost`: a loss that only the launcher knows of."""
         lost = arguments.get("lost")
         if isinstance(lost, str) and lost:
-            self._core.finish(f"lost {lost}", failed=True)
-            return self._accept(request, self._core.frame.tick, f"the run ends at tick {self._core.frame.tick}")
-        tick = self._core.stop()
+            self._finish(f"lost {lost}")
+            return self._accept(request, self._state.frame.tick, f"the run ends at tick {self._state.frame.tick}")
+        tick = self._stop_run()
         return self._accept(request, tick, f"the run ends at tick {tick}")
 
 

@@ -1,7 +1,7 @@
-"""Who takes part: the handshake as the supervisor sees it, and who is heard of.
+"""The processes that take part, and the checks that admit them.
 
-A hello is checked (protocol version, world, a free and declared name, the arithmetic fingerprint) and answered with a
-build or a refusal that says why.
+A hello is checked for protocol version, world, a free and declared name, and the arithmetic fingerprint; the first
+layout that a node has built is checked for the digest of a small run of its engine.
 """
 
 from __future__ import annotations
@@ -13,11 +13,17 @@ from foosim.common import limits
 from foosim.common.errors import show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
+from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import VHUB
-from foosim.protocol.messages import Heartbeat, Hello, Ready
+from foosim.protocol.codec import encode
+from foosim.protocol.messages import Heartbeat, Hello, Ready, Refusal
 
 SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
 """A process that lives is not silent for so long, unless its machine or its loop stands."""
+IN_FLIGHT_NS: Final = 500_000_000
+"""How long the last messages of a process may take after its connection has closed: they do not mean that it is back.
+"""
 ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 
@@ -154,3 +160,9 @@ class Roster:
             for name, process in sorted(self.by_name.items())
             if now_ns - process.heard_ns > deadline_ns and not process.farewell and not process.lost
         ]
+
+
+def refuse(role: str, name: str, boot: str, reason: str) -> list[Action]:
+    """Return the actions that tell a process that it does not take part, and why."""
+    refusal = encode(Refusal(name, boot, reason))
+    return [Say("warning", f"{role} {name} refused: {reason}"), Publish(channels.REFUSAL, name, refusal)]

@@ -1,4 +1,4 @@
-"""What a supervisor is started with."""
+"""The settings with which a supervisor is started."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from foosim.world.initial_state import Origin, Start
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What a supervisor is started with. `ticks` is how many there are; 0 is until it is asked to end.
+    """The settings of one run. It ends after `ticks`, or by request where that is 0.
 
     `start` is the frame of another run that it begins with; None: frame 0.
     """
@@ -25,7 +25,7 @@ class RunSettings:
     ticks: int = 0
     start: Start | None = None
     balance: bool = False
-    """Whether robots move by the nodes' measured load."""
+    """Whether robots move between nodes by measured load."""
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """The contents of the files that the deployment refers to, by path."""
 

@@ -1,85 +1,441 @@
-"""What the supervisor's core stands on, as a record, and the core put on it again.
+"""The state of a run as the supervisor keeps it: one value that the core and its helpers share.
 
-A head begins a file of the journal, so that the files before it can go.
+`RunState` holds the last committed frame, the epoch and who owns what in it, orders and commits of the last ticks, what
+requests have asked for, the account, and the actions for the shell. `checkpoint` returns it as the record with which a
+journal file starts, `restore` puts it where a journal ends, `roll_back` at an earlier frame. Its methods change the
+state and append the records and messages that belong to the change; decisions are those of the core and its helpers.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import deque
+from collections.abc import Collection, Iterable
+from typing import Any
 
+from foosim.common import limits
+from foosim.common.errors import Malformed
 from foosim.common.units import parse_pace
-from foosim.protocol.actions import Journal
-from foosim.protocol.codec import encode
-from foosim.supervisor.records import Control, HeadRecord, History
-from foosim.world.frame import Frame
-from foosim.world.initial_state import added_to
-
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
-
-
-def control_of(core: SupervisorCore) -> Control:
-    """Return what people have set."""
-    pacer = core.pacer
-    people = sorted(core.roster.stopped), dict(core.recovery.returns), dict(core.roster.starts)
-    return Control(str(pacer.pace), pacer.paused, pacer.granted, core.stop_at, *people, core.requests.disruptions)
-
-
-def head_of(core: SupervisorCore) -> bytes:
-    """Return the record with which a file of the journal starts."""
-    coming, answers = core.requests.journalled()
-    orders = {tick: core.orders[tick] for tick in range(core.frame.tick, core.released)}
-    head = HeadRecord(
-        core.run_record,
-        added_to(core.deployment, core.frame.layout),
-        core.epoch_payload,
-        list(core.commits.values()),
-        core.chain,
-        sorted((tick, edits) for tick, edits in {**orders, **coming}.items() if edits),
-        answers,
-        core.owners,
-        control_of(core),
-        core.account,
-        core.pacer.lags,
-        core.recovery.recovered,
-        core.started_ns,
-        core.committed_ns,
-        core.end,
-        (core.branches.number, core.branches.tick),
-        core.requests.issued.forgotten,
-        sorted(core.requests.issued.by_tick.items()),
-        list(core.requests.asked),
-    )
-    return encode(head)
+from foosim.protocol import channels
+from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
+from foosim.protocol.messages import Answer, Commit, Deliveries, End, Epoch, Part, Prepare, Tempo
+from foosim.supervisor.pacing import Pacer
+from foosim.supervisor.records import (
+    ANSWERS_KEPT,
+    ASKED_KEPT,
+    Account,
+    Asked,
+    Checkpoint,
+    Control,
+    EditLog,
+    History,
+    OrderedRecord,
+    Recovered,
+    RecoveredRecord,
+    RunRecord,
+)
+from foosim.supervisor.roster import Roster
+from foosim.supervisor.settings import RunSettings
+from foosim.world.edits import Edit, layout_after
+from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.initial_state import AddedEntity, added_to, first_chain, first_frame
+from foosim.world.layout import Layout, build_layout
 
 
-def stand_on(core: SupervisorCore, history: History) -> None:
-    """Put a core that has not begun where a journal ends, before an epoch."""
-    core.frame, core.chain = history.frame, history.chain
-    core.released = core.frame.tick
-    core.arrivals.stand_at(core.frame.tick, history.branch[0])
-    core.commits = dict(history.commits)
-    if history.epoch is not None:
-        core.epoch, core.owners = history.epoch.epoch, dict(history.epoch.owners)
-        core.epoch_payload = encode(history.epoch)
-    core.stop_at, core.end, core.account = history.control.stop_at, history.end, history.account
-    core.started_ns, core.committed_ns = history.started_ns, history.committed_ns
-    control, pacer = history.control, core.pacer
-    pacer.pace, pacer.paused, pacer.granted = parse_pace(control.pace), control.paused, control.granted
-    pacer.lags = history.lags
-    core.roster.stopped, core.roster.starts = set(control.stopped), dict(control.starts)
-    core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
-    core.branches.number, core.branches.tick = history.branch
-    core.requests.resume(history.edits, history.answers, history.issued, control.disruptions)
-    core.requests.asked.extend(history.asked)
+class InputBuffer:
+    """Parts of nodes and deliveries of the vHub for ticks that are not committed."""
+
+    def __init__(self) -> None:
+        self.parts: dict[int, list[Part]] = {}
+        """By the tick of the frame that they are parts of."""
+        self.deliveries: dict[int, bytes] = {}
+        self.delivered = 0
+        """The last tick whose deliveries are here."""
+        self.branch = 0
+        """The branch whose deliveries count."""
+
+    def reset(self, tick: int, branch: int) -> None:
+        """Drop everything: frame `tick` of `branch` is the last committed one."""
+        self.parts.clear()
+        self.deliveries.clear()
+        self.delivered, self.branch = tick - 1, branch
+
+    def take_part(self, part: Part, committed: int, members: Collection[str]) -> bool:
+        """Take a part of the present epoch; False for a repeat. Raises Malformed for a part of another node."""
+        if not committed < part.tick <= committed + limits.KEPT_TICKS:
+            return False
+        if part.node not in members:
+            raise Malformed(f"a part of {part.node}, the roster is {', '.join(members)}")
+        parts = self.parts.setdefault(part.tick, [])
+        if any(known.node == part.node for known in parts):
+            return False
+        parts.append(part)
+        return True
+
+    def take_deliveries(self, deliveries: Deliveries, payload: bytes, committed: int) -> bool:
+        """Take deliveries as they came; False for a repeat, and for those of another branch.
+
+        Raises Malformed for a tick too far ahead.
+        """
+        is_known = deliveries.tick in self.deliveries or deliveries.tick < committed
+        if is_known or deliveries.branch != self.branch:
+            return False
+        if deliveries.last > committed + limits.KEPT_TICKS:
+            raise Malformed(f"deliveries of tick {deliveries.last}, the last commit is {committed}")
+        self.deliveries[deliveries.tick] = payload
+        self.delivered = max(self.delivered, deliveries.last)
+        for tick in range(deliveries.tick + 1, deliveries.last + 1):
+            self.deliveries.setdefault(tick, encode(Deliveries(tick, [], branch=self.branch)))
+        return True
+
+    def missing(self, tick: int, members: Collection[str]) -> list[str]:
+        """Return the nodes whose parts of frame `tick` have not come."""
+        known = {part.node for part in self.parts.get(tick, ())}
+        return [node for node in members if node not in known]
+
+    def drop(self, tick: int, nodes: Collection[str]) -> None:
+        """Drop the parts of these nodes, which did not fit and are asked for again."""
+        self.parts[tick] = [part for part in self.parts[tick] if part.node not in nodes]
+
+    def committed(self, tick: int) -> None:
+        """Tick `tick` is computed: drop its parts, and the deliveries that nobody asks for any more."""
+        self.parts.pop(tick + 1)
+        self.deliveries.pop(tick - limits.KEPT_TICKS, None)
 
 
-def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:
-    """Put it at a frame that is committed and not the last one in the journal, which begins anew with it."""
-    core.frame, core.chain = frame, chain
-    core.released = frame.tick
-    core.arrivals.stand_at(frame.tick, core.branches.number)
-    core.orders.clear()
-    core.requests.set_back(frame.tick)
-    core.commits = {frame.tick: commit}
-    core.actions.append(Journal(head_of(core)))
+class RunState:
+    """The state of one run."""
+
+    actions: list[Action]
+    """What the shell performs next."""
+    run_record: RunRecord
+    roster: Roster
+    pacer: Pacer
+    busy: float
+    """The share of its time in which the supervisor's loop does not sleep."""
+    repeated: int
+    """Messages that came twice, or of a process that does not take part any more."""
+
+    frame: Frame
+    """The last committed one."""
+    chain: bytes
+    """The digest over all frames up to it."""
+    first_tick: int
+    epoch: int
+    epoch_payload: bytes
+    """The epoch as it was published."""
+    is_open: bool
+    """Whether an epoch of this supervisor has begun."""
+    owners: dict[str, str]
+    members: tuple[str, ...]
+    """The nodes that take part in the epoch, in name order."""
+    inputs: InputBuffer
+    released: int
+    """The first tick whose order is not released."""
+    orders: dict[int, list[Edit]]
+    commits: dict[int, bytes]
+    """The last ones, as they were published."""
+    branch: int
+    """Number of the last branch, which is that of the first epoch in it (`failover.Rollback`)."""
+    branch_tick: int
+    """The tick at which it begins."""
+
+    coming_edits: dict[int, list[Edit]]
+    """Edits of ticks that are not released yet."""
+    edit_log: EditLog
+    answers: dict[tuple[str, str], Answer]
+    """By sender and id of the request."""
+    asked: deque[Asked]
+    """The last requests that change something, for people."""
+    disruptions: int
+    """Events of the network that were asked for."""
+
+    account: Account
+    recovered: list[Recovered]
+    """Losses and returns, the oldest first."""
+    returns: dict[str, str]
+    """Robots that were adopted: the node that they go back to."""
+    started_ns: int
+    committed_ns: int
+
+    stop_at: int
+    """The tick of the frame that ends the run; 0: none."""
+    end: End | None
+    cut_off: str
+    """Why the capture has no end; empty where it has one, or where there is none."""
+    finished: bool
+
+    is_resuming: bool
+    """Whether a supervisor that was started again waits for vHub and nodes (`failover`)."""
+    is_vhub_away: bool
+    """Whether the run waits for a vHub that was lost (`vhub_loss`)."""
+    granted_boot: str
+    """Boot of the vHub that was last allowed to go on."""
+    found_living: bool
+    """Whether a process was heard that takes part since before this supervisor was started."""
+    abandoned: str
+    """Why a run that was resumed does not go on."""
+
+    def __init__(self, settings: RunSettings, fingerprint: bytes, boot: str, clock: str) -> None:
+        """`boot` names this start of the supervisor, `clock` the monotonic clock of its times."""
+        self.settings = settings
+        self.boot = boot
+        self.clock = clock
+        self.actions = []
+        self.deployment = settings.load_deployment()
+        text = settings.deployment_name, settings.deployment_text
+        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock, settings.start)
+        self.roster = Roster(self.deployment, fingerprint)
+        self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
+        self.busy, self.repeated = 0.0, 0
+
+        self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
+        self.first_tick = self.released = self.frame.tick
+        self.epoch, self.epoch_payload, self.is_open = 0, b"", False
+        self.owners, self.members = self.deployment.owners(), ()
+        self.inputs = InputBuffer()
+        self.orders, self.commits = {}, {}
+        self.branch = self.branch_tick = 0
+
+        self.coming_edits, self.edit_log, self.disruptions = {}, EditLog(), 0
+        self.answers, self.asked = {}, deque(maxlen=ASKED_KEPT)
+
+        self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
+        self.recovered, self.returns = [], {}
+        self.started_ns = self.committed_ns = 0
+
+        self.stop_at = settings.last_tick
+        self.end, self.cut_off, self.finished = None, "", False
+        self.is_resuming = self.is_vhub_away = self.found_living = self._is_resumed = False
+        self.granted_boot = self.abandoned = ""
+        self._resumed_tick = self.first_tick
+
+    # --- output ------------------------------------------------------------------------------------------------------
+
+    def log(self, level: str, text: str) -> None:
+        """Log a line for people."""
+        self.actions.append(Say(level, text))
+
+    def publish(self, channel: Channel, name: str, message: Any) -> None:
+        """Publish a message on a channel; `name` fills the key."""
+        self.actions.append(Publish(channel, name, encode(message)))
+
+    def journal(self, record: Any) -> None:
+        """Write one record to the journal."""
+        self.actions.append(Journal(encode(record)))
+
+    def publish_epoch(self) -> None:
+        """Publish the present epoch again."""
+        self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self.epoch_payload))
+
+    def publish_tempo(self) -> None:
+        """Tell the vHub the pace."""
+        self.publish(channels.TEMPO, channels.SUPERVISOR, Tempo(str(self.pacer.pace), self.pacer.paused))
+
+    def publish_end(self) -> None:
+        """Publish the end of the run again, if there is one."""
+        if self.end is not None:
+            self.publish(channels.END, channels.SUPERVISOR, self.end)
+
+    def prepare(self, layout: Layout) -> None:
+        """Have every node build an engine for a layout."""
+        self.publish(channels.PREPARE, channels.SUPERVISOR, Prepare(self.added(layout)))
+
+    def grant(self, standing: ResumeState) -> None:
+        """Let the vHub go on: its resume position is known.
+
+        A branch without an epoch, since no node is here, begins with the first epoch that is opened.
+        """
+        self.granted_boot = standing.boot
+        grant = ResumeGrant(channels.VHUB, standing.boot, max(self.epoch, self.branch))
+        self.publish(channels.RESUME_GRANT, channels.VHUB, grant)
+
+    # --- epochs ------------------------------------------------------------------------------------------------------
+
+    def begin_epoch(self, owners: dict[str, str], members: Iterable[str] | None) -> None:
+        """Begin a new epoch at the last commit: journal it, then publish it. Without `members` they stay."""
+        self.epoch += 1
+        self.is_open = True
+        self.owners = owners
+        if members is not None:
+            self.members = tuple(sorted(members))
+        self.inputs.parts.clear()
+        frame, added = self.frame, self.added(self.frame.layout)
+        who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
+        self.epoch_payload = encode(Epoch(self.epoch, frame.tick, frame.digest, *who, self.branch, self.branch_tick))
+        self.actions.append(Journal(self.epoch_payload))
+        self.publish_epoch()
+
+    def hold(self) -> None:
+        """No node is left: nothing is computed until one joins."""
+        self.members = ()
+        self.inputs.parts.clear()
+
+    def note_recovery(
+        self, what: str, name: str, reason: str, epoch: int | None = None, tick: int | None = None
+    ) -> Recovered:
+        """Add a loss or a return to the account: by default at the last commit, with the next epoch."""
+        at = self.frame.tick if tick is None else tick
+        entry = Recovered(what, name, reason, at, self.epoch + 1 if epoch is None else epoch)
+        self.recovered.append(entry)
+        self.journal(RecoveredRecord(entry))
+        return entry
+
+    # --- the world ---------------------------------------------------------------------------------------------------
+
+    @property
+    def lacks_inputs(self) -> bool:
+        """Whether a released tick waits for parts or deliveries."""
+        return self.is_open and self.end is None and self.frame.tick < self.released
+
+    @property
+    def missing_nodes(self) -> list[str]:
+        """The nodes without whose parts the next frame cannot be put together."""
+        return self.inputs.missing(self.frame.tick + 1, self.members)
+
+    def unready_nodes(self, layout: bytes) -> list[str]:
+        """Return the nodes that have no engine for a layout yet."""
+        return [name for name in self.members if layout not in self.roster.by_name[name].ready]
+
+    def added(self, layout: Layout) -> list[AddedEntity]:
+        """Return the entities of a layout beside the deployment's."""
+        return added_to(self.deployment, layout)
+
+    def next_layout(self) -> Layout:
+        """Return the layout after all edits that are ordered, released or not."""
+        edits = [edit for tick in range(self.frame.tick, self.released) for edit in self.orders[tick]]
+        edits += [edit for tick in sorted(self.coming_edits) for edit in self.coming_edits[tick]]
+        return layout_after(self.frame.layout, edits)
+
+    def order(self, tick: int, edits: list[Edit]) -> None:
+        """Add edits of the supervisor's own to the order of a tick that is not committed.
+
+        The epoch that follows publishes again the orders that were released.
+        """
+        if not edits:
+            return
+        self.journal(OrderedRecord(tick, edits))
+        self.edit_log.add(tick, edits)
+        if tick < self.released:
+            self.orders[tick] = [*self.orders[tick], *edits]
+        else:
+            self.coming_edits.setdefault(tick, []).extend(edits)
+
+    def keep_answer(self, answer: Answer) -> None:
+        """Keep an answer for a request that is repeated."""
+        self.answers[answer.sender, answer.id] = answer
+        if len(self.answers) > ANSWERS_KEPT:
+            self.answers.pop(next(iter(self.answers)))
+
+    # --- the start of a run ------------------------------------------------------------------------------------------
+
+    @property
+    def is_starting(self) -> bool:
+        """Whether processes are still being started.
+
+        All processes of a run that is started or resumed start at about the same time, some of them slowly. A
+        supervisor that alone was started again finds processes that live: they send heartbeats before a hello.
+        """
+        tick = self.frame.tick
+        return tick <= self.first_tick or (tick <= self._resumed_tick and not self.found_living)
+
+    def wait_ns(self, deadline_ns: int) -> int:
+        """Return how long to wait where a running world waits for `deadline_ns`: until the first commit only
+        `deadlines.start` counts."""
+        return max(deadline_ns, self.deployment.deadlines.start_ns) if self.is_starting else deadline_ns
+
+    def resumed(self) -> None:
+        """The run goes on from the present frame."""
+        self._resumed_tick, self._is_resumed = self.frame.tick, True
+
+    def abandons(self, reason: str) -> bool:
+        """Whether a run that cannot go on, for this reason, is left as it was when it was resumed, with its journals
+        and its capture, so that it can be resumed once more: before its first commit."""
+        if self._is_resumed and not self.found_living and self.frame.tick <= self._resumed_tick:
+            self.abandoned = reason
+        return bool(self.abandoned)
+
+    # --- checkpoint, restore, rollback -------------------------------------------------------------------------------
+
+    def control(self) -> Control:
+        """Return what people have set, for the journal."""
+        pacer, roster = self.pacer, self.roster
+        people = sorted(roster.stopped), dict(self.returns), dict(roster.starts)
+        return Control(str(pacer.pace), pacer.paused, pacer.granted, self.stop_at, *people, self.disruptions)
+
+    def checkpoint(self) -> bytes:
+        """Return the record with which a journal file starts, so that the files before it can go."""
+        orders = {tick: self.orders[tick] for tick in range(self.frame.tick, self.released)}
+        checkpoint = Checkpoint(
+            self.run_record,
+            self.added(self.frame.layout),
+            self.epoch_payload,
+            list(self.commits.values()),
+            self.chain,
+            sorted((tick, edits) for tick, edits in {**orders, **self.coming_edits}.items() if edits),
+            list(self.answers.values()),
+            self.owners,
+            self.control(),
+            self.account,
+            self.pacer.lags,
+            self.recovered,
+            self.started_ns,
+            self.committed_ns,
+            self.end,
+            (self.branch, self.branch_tick),
+            self.edit_log.forgotten,
+            sorted(self.edit_log.by_tick.items()),
+            list(self.asked),
+        )
+        return encode(checkpoint)
+
+    def restore(self, history: History) -> None:
+        """Put the state of a run that has not begun where a journal ends, before an epoch."""
+        self.frame, self.chain = history.frame, history.chain
+        self.released = self.frame.tick
+        self.branch, self.branch_tick = history.branch
+        self.inputs.reset(self.frame.tick, self.branch)
+        self.commits = dict(history.commits)
+        if history.epoch is not None:
+            self.epoch, self.owners = history.epoch.epoch, dict(history.epoch.owners)
+            self.epoch_payload = encode(history.epoch)
+        self.stop_at, self.end, self.account = history.control.stop_at, history.end, history.account
+        self.started_ns, self.committed_ns = history.started_ns, history.committed_ns
+        control, pacer = history.control, self.pacer
+        pacer.pace, pacer.paused, pacer.granted = parse_pace(control.pace), control.paused, control.granted
+        pacer.lags = history.lags
+        self.roster.stopped, self.roster.starts = set(control.stopped), dict(control.starts)
+        self.recovered, self.returns = history.recovered, dict(control.returns)
+        self.restore_requests(history)
+        self.asked.extend(history.asked)
+
+    def restore_requests(self, history: History) -> None:
+        """Restore what requests have asked for, and the last answers, as many as are kept."""
+        self.coming_edits, self.edit_log = history.edits, history.edit_log
+        self.disruptions = history.control.disruptions
+        self.answers = dict(list(history.answers.items())[-ANSWERS_KEPT:])
+
+    def roll_back(self, frame: Frame, chain: bytes, commit: bytes) -> None:
+        """Put the state at a committed frame that is not the last one in the journal, which begins anew with it."""
+        self.frame, self.chain = frame, chain
+        self.released = frame.tick
+        self.inputs.reset(frame.tick, self.branch)
+        self.orders.clear()
+        self.reorder_from(frame.tick)
+        self.commits = {frame.tick: commit}
+        self.actions.append(Journal(self.checkpoint()))
+
+    def reorder_from(self, tick: int) -> None:
+        """Order the known edits of a tick, and of those after it, once more."""
+        self.coming_edits = self.edit_log.since(tick)
+
+    def frame_of(self, standing: ResumeState) -> Frame:
+        """Return the vHub's last committed frame. Raises Malformed for a commit that does not fit its frame."""
+        commit = decode(Commit, standing.commit)
+        layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in standing.added])
+        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        if frame.digest != commit.digest:
+            raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
+        return frame

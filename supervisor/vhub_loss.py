@@ -1,109 +1,148 @@
-"""The vHub that is gone: the run waits for it to come back, and ends in order when it does not.
+"""Loss of the vHub and of players: the run waits for a lost vHub, and the account has how long the world stood still.
 
-Nodes just lack deliveries, so nothing is given up and no epoch begins. It comes back by the handshake, as a process
-that was started again and goes on from its journal, or is heard again, when only its connection or its loop had stood.
+Nodes only lack deliveries meanwhile, so no robot moves and no epoch begins. The vHub returns by the handshake, as a
+process that was started again and goes on from its journal, or by a heartbeat, when only its connection or its loop had
+stalled. The vHub itself deals with lost players and reports them in its heartbeats.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections import Counter
+from typing import Any
 
 from foosim.protocol import channels
-from foosim.protocol.actions import Publish
-from foosim.supervisor.account import Recovered
-from foosim.supervisor.departures import Departures
-
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
-
-SAID_NS: Final = 500_000_000
-"""How long what it said last may take after the news that it is gone: that does not mean that it is back."""
+from foosim.supervisor.progress import ProgressMonitor
+from foosim.supervisor.records import Recovered
+from foosim.supervisor.roster import IN_FLIGHT_NS, Process
+from foosim.supervisor.state import RunState
 
 
-class Absence:
-    """Whether the vHub is away, and since when."""
+class VhubLoss:
+    """Waits for a vHub that was lost."""
 
-    def __init__(self, core: SupervisorCore) -> None:
-        self.is_away = False
-        self.players = Departures(core)
-        self._core = core
+    def __init__(self, state: RunState, progress: ProgressMonitor) -> None:
+        self._state = state
+        self._progress = progress
         self._since_ns = 0
         self._reason = ""
         self._lost_at = 0, 0
-        """The epoch and the tick at which it went."""
+        """The epoch and the tick at which it was lost."""
         self._gap_ns = 0
-        """The longest time between two commits since it is gone."""
+        """The longest time between two commits since then."""
         self._entry: Recovered | None = None
         self._tick = -1
-        """Where it stood when it was lost for not going on; -1 when it was lost for anything else."""
+        """Its tick when it was lost for making no progress; -1 when it was lost for another reason."""
 
     def lose(self, reason: str, now_ns: int) -> None:
-        """The vHub is gone: a run that goes on waits for it, and says for how long in its account."""
-        core = self._core
-        process = core.roster.by_name.get(channels.VHUB)
+        """The vHub is lost: an open run waits for it, and has the outage in its account."""
+        state = self._state
+        process = state.roster.by_name.get(channels.VHUB)
         if process is not None:
-            core.roster.lose(process)
-        if self.is_away:
+            state.roster.lose(process)
+        if state.is_vhub_away:
             return
-        self._since_ns, self._reason, self._lost_at = now_ns, reason, (core.epoch, core.frame.tick)
-        if not core.is_open:  # it is waited for as those are who have not come yet
-            if core.take_over is not None:
-                core.take_over.lose_hub()
-            core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
+        self._since_ns, self._reason, self._lost_at = now_ns, reason, (state.epoch, state.frame.tick)
+        if not state.is_open:  # the run waits for it as for any process that has not come yet
+            state.log("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
-        told = None if process is None else process.heartbeat
-        self._tick = told.tick if told is not None and "overdue" in reason else -1
-        self.is_away, self._gap_ns = True, 0
-        core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
+        heartbeat = None if process is None else process.heartbeat
+        self._tick = heartbeat.tick if heartbeat is not None and "overdue" in reason else -1
+        state.is_vhub_away, self._gap_ns = True, 0
+        state.log("warning", f"lost the vHub: {reason}; the run waits for it at tick {state.frame.tick}")
 
     def as_json(self, now_ns: int) -> dict[str, Any]:
         """Return why the vHub was lost last, at which tick, and how many seconds of wall time ago."""
         return {"reason": self._reason, "tick": self._lost_at[1], "for_s": round((now_ns - self._since_ns) / 1e9, 1)}
 
-    def hear(self, now_ns: int) -> None:
-        """The vHub that is lost is heard of: it is back, unless that was said before it went, or it still stands."""
-        core = self._core
-        process = core.roster.by_name[channels.VHUB]
-        told = process.heartbeat
-        goes_on = self._tick < 0 or (told is not None and told.tick > self._tick)
-        if core.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
+    def on_heartbeat(self, process: Process, now_ns: int) -> None:
+        """A lost vHub sends a heartbeat: it is back, unless that was sent before its loss, or its tick stands still."""
+        state, heartbeat = self._state, process.heartbeat
+        goes_on = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
+        if state.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
             process.lost = False
-            if core.is_open:  # else it says itself that it is ready, until it is told of an epoch
-                self.ready(now_ns)
+            if state.is_open:  # else it repeats that it is ready, until it gets an epoch
+                self.on_ready(now_ns)
 
-    def ready(self, now_ns: int) -> None:
-        """The vHub takes part: tell it what it does not know."""
-        core = self._core
-        core.say_epoch()
-        core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
-        if self.is_away:
-            self.is_away = False
+    def on_ready(self, now_ns: int) -> None:
+        """The vHub takes part: send it the epoch and the pace."""
+        state = self._state
+        state.publish_epoch()
+        state.publish_tempo()
+        if state.is_vhub_away:
+            state.is_vhub_away = False
             self._note()
-            core.watch.begun(now_ns)
-            core.say("info", f"the vHub is back after {(now_ns - self._since_ns) / 1e9:.2f} s")
+            self._progress.begun(now_ns)
+            state.log("info", f"the vHub is back after {(now_ns - self._since_ns) / 1e9:.2f} s")
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`."""
-        self.players.committed(before_ns, now_ns)
-        if self.is_away:  # what was on its way when it went, or the first that it made possible
+        if self._state.is_vhub_away:  # from deliveries that were in flight
             self._gap_ns = max(self._gap_ns, now_ns - before_ns)
-        elif self._entry is not None:
+        elif self._entry is not None:  # the first one since the vHub is back
             self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
-    def rest(self, stood_ns: int) -> None:
-        """The supervisor stood still for so long: that is no time in which the vHub could be heard."""
+    def on_standstill(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long and could not hear of the vHub."""
         self._since_ns += stood_ns
 
-    def is_over(self, now_ns: int) -> bool:
-        """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
-        core = self._core
-        wait_ns = core.beginning.patience_ns(core.frame.tick, core.deployment.deadlines.vhub_back_ns)
-        if not self.is_away or now_ns < self._since_ns + wait_ns:
-            return False
+    def timeout(self, now_ns: int) -> str:
+        """Return why the run ends when the vHub was away for longer than a run waits; else an empty string."""
+        state = self._state
+        wait_ns = state.wait_ns(state.deployment.deadlines.vhub_back_ns)
+        if not state.is_vhub_away or now_ns < self._since_ns + wait_ns:
+            return ""
         self._note()
-        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s", failed=True)
-        return True
+        return f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s"
 
     def _note(self) -> None:
-        """Put it into the account, when it is over: the world stood still until now."""
-        self._entry = self._core.recovery.note("vhub", channels.VHUB, self._reason, *self._lost_at)
+        """Add the loss to the account: the world has stood still until now."""
+        self._entry = self._state.note_recovery("vhub", channels.VHUB, self._reason, *self._lost_at)
+
+
+class PlayerLosses:
+    """Adds to the account which players were away, as the vHub reports it.
+
+    Its heartbeats have the players that are away, and numbered what is over; a vHub that was started again reports from
+    its journal once more what the one before did.
+    """
+
+    def __init__(self, state: RunState) -> None:
+        self._state = state
+        self._boot = ""
+        """The start of the vHub that has reported last."""
+        self._heard = 0
+        """The number of its last entry."""
+        self._known: Counter[tuple[str, str, str, int]] = Counter()
+        """The account when this supervisor first heard of this start of the vHub, which reports that once more."""
+        self._gaps_ns: dict[str, int] = {}
+        """Of the players that are away: the longest time between two commits since."""
+        self._open: list[tuple[Recovered, int]] = []
+
+    def on_report(self, hub: Process) -> None:
+        """Add the new entries of a vHub's report; those that the journal has are not new."""
+        state, told = self._state, hub.report.get("absences")
+        if told is None or not state.is_open or state.end is not None:
+            return
+        if told["boot"] != hub.boot:
+            return  # a late report of a vHub before this one
+        if hub.boot != self._boot:
+            self._boot, self._heard = hub.boot, 0
+            self._known = Counter((entry.what, entry.name, entry.reason, entry.tick) for entry in state.recovered)
+        gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in told["away"]}
+        for number, what, name, reason, tick in told["over"]:
+            if number <= self._heard:
+                continue
+            self._heard = number
+            if self._known[what, name, reason, tick] > 0:
+                self._known[what, name, reason, tick] -= 1
+                continue
+            entry = state.note_recovery(what, name, reason, state.epoch, tick)
+            self._open.append((entry, gaps_ns.get(name, 0)))
+
+    def committed(self, before_ns: int, now_ns: int) -> None:
+        """A frame is committed, the one before it was at `before_ns`."""
+        for name, gap_ns in self._gaps_ns.items():
+            self._gaps_ns[name] = max(gap_ns, now_ns - before_ns)
+        for entry, gap_ns in self._open:
+            entry.outage_ns = max(gap_ns, now_ns - before_ns)
+        self._open.clear()

@@ -1,9 +1,9 @@
-"""Who looks at a run: committed frames for people, as long as somebody has a lease on them.
+"""Viewers of a run: committed frames are published for as long as a viewer has a lease.
 
-`watch` begins or renews a lease of the one who asks, `describe` says what one has to know to read frames. A frame goes
-out on `view` as the bytes that were journalled, at the highest rate that a lease asks for on the wall, one whose edits
-change the layout at once, and what is behind them at the next wake: of a world that is paused the last frame was shown.
-Leases are in no journal: after a loss of the supervisor they are asked for again.
+The verb `watch` begins or renews a lease, `describe` returns what a viewer needs to read frames. A frame is published
+on `view` as the bytes that were journalled, at the highest rate of the leases by wall time; a frame whose edits change
+the layout at once; the last one at the next wake, so that a paused world shows its last frame. Leases are not
+journalled: viewers renew them with a supervisor that was started again.
 """
 
 from __future__ import annotations
@@ -11,25 +11,22 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from foosim.common import limits
 from foosim.common.errors import Refused, show
 from foosim.common.json_text import encode_json
+from foosim.common.names import nearest_name
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import encode
 from foosim.protocol.messages import Answer, Heartbeat, Request, Watched
-from foosim.supervisor.choices import chosen
+from foosim.supervisor.state import RunState
 from foosim.world.edits import Add, Edit, Remove
-
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
 
 LEASE_NS: Final = 5_000_000_000
 HZ_MAX: Final = 100.0
 BYTES_PER_S_MAX: Final = 5_000_000
-"""Of frames: a large world is shown less often."""
+"""Of frames: those of a large world are published less often."""
 FRAME_BYTES_MAX: Final = 384 * 1024
 """A larger commit is not in the answer to `describe`, and comes with the lease."""
 _NS_PER_S: Final = 1_000_000_000
@@ -39,7 +36,7 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Lease:
-    """What somebody wants to see: frames per second, links and readings; and until when."""
+    """The frames per second, links and readings that one viewer wants, and until when."""
 
     hz: float
     links: list[Pair]
@@ -48,16 +45,16 @@ class _Lease:
 
 
 class Viewing:
-    """The leases, and what is published by them."""
+    """The leases, and the frames that are published for them."""
 
-    def __init__(self, core: SupervisorCore) -> None:
+    def __init__(self, state: RunState) -> None:
         self.is_shown = False
-        """Whether somebody wants frames: all that a commit has to ask while nobody does."""
-        self._core = core
+        """Whether a viewer wants frames: the only question of a commit while none does."""
+        self._state = state
         self._leases: dict[str, _Lease] = {}
         """By who asks."""
         self._watched = Watched([], [])
-        """What the vHub was told last."""
+        """As the vHub was told last."""
         self._told_at: Heartbeat | None = None
         """Its last heartbeat before that."""
         self._period_ns = self._due_ns = 0
@@ -65,7 +62,7 @@ class Viewing:
         """The last commit, while it has not been shown."""
 
     def watch(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Begin or renew a lease; the answer has the rate that it gets and for how long. Raises Refused."""
+        """Begin or renew a lease; the answer has its rate and duration. Raises Refused."""
         hz = _rate(arguments.get("hz"))
         links = _pairs("links", arguments.get("links"), self._link)
         readings = _pairs("readings", arguments.get("readings"), self._reading)
@@ -85,33 +82,33 @@ class Viewing:
         return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
 
     def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Say what is run, who owns what, and where the world is: what one has to know to read the frames."""
-        core, run = self._core, self._core.settings
+        """Answer with deployment, owners and the present layout: what a viewer needs to read the frames."""
+        state, run = self._state, self._state.settings
         commit = self._last_commit
         has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
         what = {
             "run": run.run,
             "deployment_name": run.deployment_name,
             "deployment": run.deployment_text,
-            "added": [(entity.name, entity.model) for entity in core.added_to(core.frame.layout)],
-            "layout": core.frame.layout.digest.hex(),
-            "pace": str(core.pacer.pace),
-            "owners": core.owners,
-            "epoch": core.epoch,
-            "first_tick": core.first_tick,
-            "tick": core.frame.tick,
+            "added": [(entity.name, entity.model) for entity in state.added(state.frame.layout)],
+            "layout": state.frame.layout.digest.hex(),
+            "pace": str(state.pacer.pace),
+            "owners": state.owners,
+            "epoch": state.epoch,
+            "first_tick": state.first_tick,
+            "tick": state.frame.tick,
             "frame": base64.b64encode(commit).decode() if has_frame else None,
         }
         return self._answer(request, what)
 
     def committed(self, payload: bytes, edits: Sequence[Edit], now_ns: int) -> None:
-        """Show a commit when it is due, or when another layout begins with it."""
+        """Publish a commit when it is due, or when a new layout begins with it."""
         self._unseen = payload
         if now_ns >= self._due_ns or any(isinstance(edit, Add | Remove) for edit in edits):
             self._show(now_ns)
 
     def wake(self, now_ns: int) -> None:
-        """End leases that were not renewed; show what was committed last, if nothing came behind it."""
+        """End leases that were not renewed; publish the last commit if it has not been."""
         if self._leases:
             self._end_leases(now_ns)
         if self._hub_is_wrong():
@@ -120,7 +117,7 @@ class Viewing:
             self._show(now_ns)
 
     def _show(self, now_ns: int) -> None:
-        self._core.actions.append(Publish(channels.VIEW, channels.SUPERVISOR, self._unseen))
+        self._state.actions.append(Publish(channels.VIEW, channels.SUPERVISOR, self._unseen))
         self._unseen = b""
         self._due_ns += self._period_ns
         if self._due_ns <= now_ns:  # nothing is made up for
@@ -137,45 +134,45 @@ class Viewing:
                 self._say_watched(watched)
 
     def hub_ready(self) -> None:
-        """Tell a vHub that was started again what is looked at."""
+        """Tell a vHub that was started again which links and readings to report."""
         if self._is_watching:
             self._say_watched(self._watched)
 
     def _hub_is_wrong(self) -> bool:
-        """Whether the vHub keeps what nobody looks at: it has missed that, or another supervisor told it to."""
-        hub = self._core.roster.by_name.get(channels.VHUB)
+        """Whether the vHub reports what no viewer wants: it has missed that, or an earlier supervisor told it to."""
+        hub = self._state.roster.by_name.get(channels.VHUB)
         keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
-        return keeps and not self._is_watching and self._core.end is None
+        return keeps and not self._is_watching and self._state.end is None
 
     def _say_watched(self, watched: Watched) -> None:
         self._watched = watched
-        hub = self._core.roster.by_name.get(channels.VHUB)
+        hub = self._state.roster.by_name.get(channels.VHUB)
         self._told_at = None if hub is None else hub.heartbeat
-        self._core.actions.append(Publish(channels.WATCHED, channels.SUPERVISOR, encode(watched)))
+        self._state.publish(channels.WATCHED, channels.SUPERVISOR, watched)
 
     @property
     def _is_watching(self) -> bool:
         return bool(self._watched.links or self._watched.readings)
 
     def _link(self, source: str, destination: str) -> None:
-        """Raise Refused for a link without ends."""
-        ends = self._core.deployment.endpoints()
+        """Raise Refused for a link whose ends are no endpoints."""
+        ends = self._state.deployment.endpoints()
         for name in (source, destination):
             chosen("endpoint", name, ends)
 
     def _reading(self, robot: str, channel: str) -> None:
-        """Raise Refused for what no sensor measures."""
-        robots = self._core.deployment.robots
+        """Raise Refused for a channel that is no sensor of the robot."""
+        robots = self._state.deployment.robots
         sensors = robots[chosen("robot", robot, sorted(robots))].sensors
         chosen(f"sensor of {robot}", channel, sorted(sensors))
 
     @property
     def _last_commit(self) -> bytes:
         """The last commit as it was published; empty before the first."""
-        return self._core.commits.get(self._core.frame.tick, b"")
+        return self._state.commits.get(self._state.frame.tick, b"")
 
     def _set_rate(self) -> None:
-        """Show frames as often as the most eager lease wants, and as their size allows."""
+        """Publish frames at the highest rate of the leases that their size allows."""
         hz = max((lease.hz for lease in self._leases.values()), default=0.0)
         self.is_shown = hz > 0.0
         if self.is_shown:
@@ -184,11 +181,11 @@ class Viewing:
             self._unseen = b""
 
     def _answer(self, request: Request, result: dict[str, Any]) -> Answer:
-        return Answer(request.sender, request.id, True, self._core.frame.tick, "", encode_json(result))
+        return Answer(request.sender, request.id, True, self._state.frame.tick, "", encode_json(result))
 
 
 def _rate(value: object) -> float:
-    """Return frames per second as they are asked for; 0 is none."""
+    """Return the requested frames per second; 0 is none."""
     if value is None:
         return 0.0
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= HZ_MAX:
@@ -197,7 +194,7 @@ def _rate(value: object) -> float:
 
 
 def _watched_by(leases: Iterable[_Lease]) -> Watched:
-    """Return what some leases want to see together. Raises Refused when it is too much."""
+    """Return the links and readings of some leases together. Raises Refused when these are too many."""
     links: set[Pair] = set()
     readings: set[Pair] = set()
     for lease in leases:
@@ -210,7 +207,7 @@ def _watched_by(leases: Iterable[_Lease]) -> Watched:
 
 
 def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[Pair]:
-    """Return pairs of names as they are asked for. Raises Refused, as `check` does."""
+    """Return requested pairs of names. Raises Refused, as `check` does."""
     pairs = [] if value is None else value
     if not isinstance(pairs, list) or len(pairs) > limits.WATCHED_MAX:
         raise Refused(f"{what}: a list of at most {limits.WATCHED_MAX} pairs of names is needed")
@@ -221,3 +218,12 @@ def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[
         check(*pair)
         found.append((pair[0], pair[1]))
     return found
+
+
+def chosen(what: str, name: str, choices: Sequence[str]) -> str:
+    """Return the name; raises Refused, with the choices, when it is none of them."""
+    if name in choices:
+        return name
+    nearest = nearest_name(name, choices)
+    hint = f", nearest is {nearest}" if nearest else ""
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")

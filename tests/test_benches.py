@@ -17,8 +17,11 @@ def test_the_vhub_is_killed_by_simulated_time() -> None:
 
 def test_the_table_of_hot_modules_says_what_is_left_to_the_interpreter() -> None:
     listed = hot.compiled()
-    assert {"vhub/state", "node/core"} <= listed
-    shares = {"one": {"vhub/state": 60.0, "capture/rows": 39.9, "vhub/seldom": 0.1}, "two": {"capture/rows": 100.0}}
+    assert {"vhub/state/hub_state", "node/core"} <= listed
+    shares = {
+        "one": {"vhub/state/hub_state": 60.0, "capture/rows": 39.9, "vhub/seldom": 0.1},
+        "two": {"capture/rows": 100.0},
+    }
     _, *rows, left = (line.split() for line in hot.lines(shares, 0.3, listed))
-    assert rows == [["capture/rows", "39.90", "100.00"], ["*", "vhub/state", "60.00", "0.00"]]
+    assert rows == [["capture/rows", "39.90", "100.00"], ["*", "vhub/state/hub_state", "60.00", "0.00"]]
     assert left[-2:] == ["40.00", "100.00"]

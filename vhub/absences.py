@@ -1,7 +1,7 @@
-"""Players that were away and came back, or left the run: what the vHub tells the supervisor for its account.
+"""Players that were away and returned, or left the run: the vHub's part of the run's account.
 
-It is told in every heartbeat, with a number each, since heartbeats may be lost, and is in the journal before that:
-a vHub that is started again tells it once more.
+Entries are numbered and repeated in every heartbeat, since heartbeats may be lost. They are in the journal before that,
+so that a restarted vHub reports them again.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any, Final
 
-from foosim.vhub.records import AbsencesRecord
+from foosim.vhub.state.records import AbsencesRecord
 
 TOLD_MAX: Final = 64
 """How many of the last ones are told."""

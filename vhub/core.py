@@ -1,15 +1,22 @@
-"""The core of the vHub: takes messages and the time, and closes ticks in two phases.
+"""The core of the vHub: takes messages and the time, and closes ticks.
 
-It sees committed frames only. Closing tick k waits for Commit(k) and the samples of every robot (world phase), then for
-the Dones of the lockstep clients that are due (clients phase); the record is written before the deliveries are spoken.
-`Go` alone may be spoken before: it is a function of what is already written, commit and samples.
+It reads committed frames only. The closing of tick k waits for Commit(k) and the samples of every robot (world phase),
+then for the Dones of the lockstep clients that are due (clients phase). The tick's record is written before its
+deliveries are sent. Only `Go` messages may be sent before: they are a function of the commit and the samples, which
+other processes have.
+
+What nodes wait for leaves first, so a closing has steps: between them the shell performs the actions
+(`HubCore.step`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
+
+from msgspec.structs import replace
 
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused
@@ -19,8 +26,9 @@ from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.handshake import Member
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import (
+    CAPTURE,
     DONE_OF,
     JOIN_OF,
     SAMPLES_OF,
@@ -46,25 +54,36 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
+from foosim.runtime.standstill import TOLD_NS, told
 from foosim.runtime.supervisor_timeout import Orphan
-from foosim.vhub.commits import Commits
-from foosim.vhub.footing import Footing
-from foosim.vhub.head import head_of
-from foosim.vhub.join import Door
+from foosim.vhub.clients import Clients, lost
 from foosim.vhub.network.packet import Flight, received
 from foosim.vhub.paced_release import Releases
-from foosim.vhub.recording.queue import Keep, KeepEpoch, Keeping, last_closings
-from foosim.vhub.records import Closing, closing_of, missing_robots, tick_record, world_packets
-from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
-from foosim.vhub.state import HubState
-from foosim.vhub.status import HubStatistics, LinksTold, report, statistics
-from foosim.vhub.wait_times import Waits
+from foosim.vhub.state.capture_queue import CaptureQueue, RecordClosing, RecordEpoch, last_closings
+from foosim.vhub.state.commits import Commits
+from foosim.vhub.state.downlinks import retag
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
+from foosim.vhub.state.resume import Past
+from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, report_before, statistics
+from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import Watching
 from foosim.world.frame import Frame
-from foosim.world.initial_state import first_chain
+from foosim.world.initial_state import added_to, first_chain
 
-HubAction = Action | Keep | KeepEpoch
+HubAction = Action | RecordClosing | RecordEpoch
+
+
+class _Step(Enum):
+    """How far the closing of a tick is behind its world phase."""
+
+    OPEN = 0
+    """It waits for Dones."""
+    WRITTEN = 1
+    """The tick's record and its deliveries are among the actions."""
+    RELEASED = 2
+    """So is what is released to free-running clients."""
 
 
 @dataclass(slots=True)
@@ -75,41 +94,76 @@ class _World:
     closing: Closing
     commit: bytes
     free: dict[str, list[Flight]]
+    """What is released to clients outside of lockstep."""
+    step: _Step = _Step.OPEN
+    sent_ns: int = 0
+    """When its deliveries had left."""
+
+
+class ResumeHandshake:
+    """Whether a vHub that resumes from a journal has the supervisor's grant, and what it sends once it has.
+
+    The journal's end may be lost with the machine. So the vHub reports its resume position; until the grant it closes
+    no tick, takes no commit and admits no client. `machine` is the present boot of its machine, empty where that has no
+    name.
+    """
+
+    def __init__(self, machine: str) -> None:
+        self.waits = False
+        self.lost_machine = False
+        """Whether the journal was written before the last boot of the machine."""
+        self.published: list[bytes] = []
+        """The last deliveries of the vHub before, which may have been written and not sent."""
+        self.owing: list[str] = []
+        """Clients that left at its last tick without their Done: the packets of their Go may not have been sent."""
+        self.granted_from = limits.COUNTER_MAX
+        """The first epoch of the grant."""
+        self._machine = self._written_on = machine
+
+    @property
+    def machine(self) -> str:
+        """The machine's boot that the journal names: the one before, until its end is known to be complete."""
+        return self._written_on if self.waits else self._machine
+
+    def begin(self, machine: str, published: bytes, owing: list[str]) -> None:
+        """Wait for the grant: the journal names this boot of a machine, and these deliveries as the last."""
+        self.waits, self._written_on, self.owing = True, machine, owing
+        self.published = [published] if published else []
+        self.lost_machine = "" != machine != self._machine != ""
 
 
 class HubCore:
     """The vHub's state machine. `actions` is what the shell performs next."""
 
     def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "", machine: str = "") -> None:
-        """`machine` names the present start of the machine, where that has a name."""
+        """`machine` names the present boot of the machine, where that has a name."""
         self.actions: list[HubAction] = []
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing, self.orphan = Door(self), Footing(self, machine), Orphan()
+        self.waits = WaitTimes()
+        hooks = self.send_heartbeat, self.give_up
+        self.clients = Clients(self.sessions, self.actions, self.waits, *hooks)  # type: ignore[arg-type]
+        self.handshake, self.orphan = ResumeHandshake(machine), Orphan()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
-        self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
-        self.recording: dict[str, Any] = {}
+        self.lost = self.failure = self.capture_file = ""
+        self.shell = ShellStatus()
         self.links_told, self.watching = LinksTold(), Watching()
-        self.speak: Callable[[int], int] = lambda now_ns: now_ns
-        """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
-        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = self.disk_progress = 0
+        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
         self.epoch_payload = b""
         self._owners: dict[str, str] = {}
-        self.waits = Waits()
-        self._keeping = Keeping()
+        self._keeping = CaptureQueue()
         self.commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
-        self.waited: list[str] = []
-        """Clients whose Dones that tick lacks."""
         self._patience = Patience(now_ns)
+        clients = self.clients
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
@@ -118,24 +172,24 @@ class HubCore:
             Recall: self._on_recall,
             Build: self._on_build,
             Piece: self._on_build,
-            Tempo: self.door.tempo,
+            Tempo: clients.on_tempo,
             Watched: self.watching.take,
             End: self._on_end,
-            Proceed: self.footing.proceed,
-            ClientHello: self.door.hello,
-            Join: self.door.join,
-            Up: self.door.up,
-            Done: self.door.done,
-            Failure: self.door.failure,
+            ResumeGrant: self._on_proceed,
+            ClientHello: self._on_hello,
+            Join: self._on_join,
+            Up: clients.on_up,
+            Done: clients.on_done,
+            Failure: clients.on_failure,
         }
 
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; what does not fit is counted and dropped."""
+        """Take one message; a malformed or misplaced one is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self.repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
+                self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
             message = self.refusals.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
@@ -150,19 +204,35 @@ class HubCore:
 
     def advance(self, now_ns: int) -> None:
         """Close ticks as far as the inputs allow."""
+        while self.step(now_ns, now_ns):
+            pass
+
+    def step(self, now_ns: int, sent_ns: int) -> bool:
+        """Close ticks up to the next point at which something has to leave before the rest is computed.
+
+        Return True there: the shell performs `actions` and steps again; `sent_ns` is the time when they had left.
+        Return False when the inputs allow no more. `now_ns` is the time of the messages that were received last.
+        """
         while self.state is not None and self.epoch > 0 and not self.finished:
+            world = self._world
+            if world is not None and world.step is _Step.WRITTEN:
+                self._release_closed(world, sent_ns)
+                return True
+            if world is not None and world.step is _Step.RELEASED:
+                self._close_rest(world)
+                continue
             if self.ended is not None and self.state.closed + 1 >= self.ended.tick:
                 self._finish(now_ns)
-                return
-            if self.footing.waits or (self._world is None and not self._close_world(now_ns)):
-                return
-            if not self._close_clients(now_ns):
-                return
+                return False
+            if self.handshake.waits or (world is None and not self._close_world(now_ns)):
+                return False
+            return self._close_clients(now_ns)
+        return False
 
     def wake(self, now_ns: int) -> None:
-        """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
+        """Do what is due by time: hello, heartbeat, repeated requests, releases, deadlines, the end."""
         self.member.wake(now_ns, self.heartbeat)
-        self.door.wake(now_ns)
+        self.clients.wake(now_ns, holds=self.orphan.is_alone or self.handshake.waits)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
         if self._patience.is_over(now_ns) and self.epoch > 0 and not self.finished:
@@ -178,14 +248,27 @@ class HubCore:
             deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
-        if self.waited:
-            deadline = min(deadline, self.sessions.again_ns(self.waited))
+        if self.clients.waited:
+            deadline = min(deadline, self.sessions.again_ns(self.clients.waited))
         late_ns = self.sessions.late_ns
         return deadline if late_ns is None else min(deadline, late_ns)
 
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The vHub's own loop stood still for so long: that counts neither against clients nor the supervisor."""
+        self.orphan.rest(stood_ns, now_ns)
+        if stood_ns >= TOLD_NS:
+            self.actions.append(Say("warning", told(stood_ns)))
+        self.clients.rest(stood_ns, now_ns)
+
     def client_gone(self, name: str, now_ns: int) -> None:
-        """A client's presence has ended."""
-        self.door.gone(name, now_ns)
+        """A client has disconnected."""
+        if self.ended is None:
+            self.clients.on_gone(name, now_ns)
+
+    @property
+    def repeated(self) -> int:
+        """Messages that came twice or too late."""
+        return self._repeated + self.clients.repeated
 
     def statistics(self) -> HubStatistics:
         return statistics(self.state, self._malformed, self.repeated)
@@ -196,24 +279,24 @@ class HubCore:
         Where deliveries are final nobody waits for a closing: those ticks are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
-        if self.epoch == 0 or self.waited:
-            return channels.UP, max(1, len(self.waited))
+        if self.epoch == 0 or self.clients.waited:
+            return channels.UP, max(1, len(self.clients.waited))
         if self._world is None and self.state.closed + 1 in self.commits:
             return channels.SAMPLES, 1
         return channels.COMMIT, max(1, self.state.final - self.commits.next_tick)
 
     @property
     def waiting_for(self) -> str:
-        """What the closing of the current tick lacks, for people and for the supervisor."""
+        """What the closing of the current tick waits for, for people and for the supervisor."""
         if self.state is None:
             return "start"
-        if self.footing.waits:
+        if self.handshake.waits:
             return "to proceed"
         if self.epoch == 0:
             missing = self.sessions.missing(self.state.deployment, self.state)
             return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
-            return DONE_OF + ", ".join(self.waited) if self.waited else ""
+            return DONE_OF + ", ".join(self.clients.waited) if self.clients.waited else ""
         tick = self.state.closed + 1
         committed = self.commits.get(tick)
         if committed is None:
@@ -226,14 +309,10 @@ class HubCore:
     def is_between_ticks(self) -> bool:
         return self._world is None
 
-    def waits_for(self, client: str) -> bool:
-        """Whether a tick waits for this client's Done."""
-        return client in self.waited
-
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
     def _close_world(self, now_ns: int) -> bool:
-        """Phase one, when commit and all samples are there: judge what robots sent, say Go."""
+        """Phase one, when commit and all samples have come: judge what robots sent, send Go."""
         state = self.state
         assert state is not None
         tick = state.closed + 1
@@ -245,7 +324,7 @@ class HubCore:
         if packets is None or commit.last:
             return False
         self.waits.close_world(now_ns)
-        joins, leaves = self.door.come_and_go(tick)
+        joins, leaves = self.clients.come_and_go(tick)
         for name in leaves:
             state.leave(name)
         for joining in joins:
@@ -256,20 +335,20 @@ class HubCore:
             self.watching.sensed(tick, packets)
         due = state.due_members(tick)
         for name in due:
-            self.door.go(name, tick, released.pop(name, []), now_ns)
+            self.clients.go(name, tick, released.pop(name, []), now_ns)
         self._world = _World(frame, closing, raw, released)
-        self.waited = [name for name in due if name in self.sessions.by_name]
+        self.clients.waited = [name for name in due if name in self.sessions.by_name]
         return True
 
     def _close_clients(self, now_ns: int) -> bool:
-        """Phase two, when all Dones are there: judge what clients sent, write, speak; what robots get comes first."""
-        if self.waited:
+        """Phase two, when all Dones are there: judge what clients sent to robots; write, then send the deliveries."""
+        if self.clients.waited:
             return False
-        world, state, releases = self._world, self.state, self.releases
-        assert world is not None and state is not None and releases is not None
+        world, state = self._world, self.state
+        assert world is not None and state is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
-        self.door.leave_owing(state, world.closing)
+        self.clients.leave_owing(state, world.closing)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
         deliveries = state.close_robots(world.frame, admitted)
@@ -278,25 +357,36 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
-        self.door.say_owed(world.closing, now_ns)
-        self.door.tell()
+        self.clients.send_owed(world.closing, now_ns)
+        self.clients.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
             self._sent[tick + 1] = payload
             for following in range(tick + 2, state.final + 1):
                 self._sent[following] = encode(Deliveries(following, [], branch=state.branch))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
-        now_ns = self.speak(now_ns)
+        world.step = _Step.WRITTEN
+        return True
+
+    def _release_closed(self, world: _World, sent_ns: int) -> None:
+        """Behind the deliveries, release to free-running clients what is due by now."""
+        state, releases = self.state, self.releases
+        assert state is not None and releases is not None
         for name, flights in world.free.items():
-            releases.add(name, state.members[name].downlink, tick, flights, now_ns)
-        self._release(now_ns)
-        self.speak(now_ns)
+            releases.add(name, state.members[name].downlink, world.frame.tick, flights, sent_ns)
+        self._release(sent_ns)
+        world.step, world.sent_ns = _Step.RELEASED, sent_ns
+
+    def _close_rest(self, world: _World) -> None:
+        """Judge what clients sent to clients, which nobody waits for, and hand the closing to the capture."""
+        state, releases, tick = self.state, self.releases, world.frame.tick
+        assert state is not None and releases is not None
         world.closing.fates += state.close_rest()
         if state.fabric.faults:
             self.lose("the network", state.fabric.faults[0])
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
-                flight.released_wall_ns = now_ns
+                flight.released_wall_ns = world.sent_ns
         if self.watching.links:
             self.watching.judged(world.closing.fates)
         world.closing.ages = state.aged
@@ -306,11 +396,10 @@ class HubCore:
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))
         self.commits.forget(tick - limits.KEPT_TICKS)
-        self._patience.progress(state.tick_ns, now_ns)
-        return True
+        self._patience.progress(state.tick_ns, world.sent_ns)
 
     def _tell_of_waits(self, now_ns: int) -> None:
-        """Before late deliveries, tell the supervisor whom they waited for."""
+        """Before late deliveries, report to the supervisor what they waited for."""
         assert self.releases is not None and self.state is not None
         factor = self.releases.factor
         text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
@@ -320,10 +409,28 @@ class HubCore:
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
-        return head_of(self)
+        assert self.state is not None and self.member.build is not None
+        closed = self.state.closed
+        commit, _, frame = self.commits.get(closed) or (b"", None, None)
+        layout = self.commits.layout if frame is None else frame.layout
+        assert layout is not None
+        added = [(entity.name, entity.model) for entity in added_to(self.state.deployment, layout)]
+        return encode(
+            HeadRecord(
+                self.member.build.run,
+                self.state.snapshot(),
+                added,
+                commit,
+                self.epoch_payload,
+                self.capture_file,
+                self.commits.chain_at(closed),
+                self.handshake.machine,
+                self.clients.absences.record(),
+            )
+        )
 
     def _release(self, now_ns: int) -> None:
-        """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
+        """Send what is released to free-running clients by now; closings of which nothing waits go to the capture."""
         if self.releases is None or self.state is None:
             return
         for release in self.releases.take(now_ns, everything=self.finished):
@@ -332,14 +439,14 @@ class HubCore:
             member = self.state.members[release.client]
             packets, branch = received(release.flights), self.state.branch
             down = Down(release.number, release.tick, member.sequence, packets, False, branch)
-            self.sessions.say_down(release.client, down, now_ns)
+            self.sessions.send_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self.repeated += not self.member.is_fetching
+            self._repeated += not self.member.is_fetching
             return
         self.deployment = self.member.deployment
         if self.state is not None:  # of a supervisor that has recalled us
@@ -347,7 +454,7 @@ class HubCore:
             self.ready_if_complete()
 
     def begin(self, past: Past | None, now_ns: int) -> None:
-        """Take part, once there is a build: from the start, or from where the vHub before ended, as its journal says.
+        """Take part, once there is a build: from the start, or from the end of the journal of the vHub before.
 
         The shell calls it, since only the shell can read the journal.
         """
@@ -355,9 +462,10 @@ class HubCore:
         assert deployment is not None and build is not None and self.state is None, "begin once, after the build"
         self.releases = Releases(deployment.tick_ns)
         self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
-        self.member.standing = self.footing.standing
+        self.member.standing = self._resume_state
         if past is None:
             self.state = HubState(deployment, self.member.first_tick)
+            self.clients.begin(deployment, self.state, self.releases)
             self.commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
             self._go_on(past, now_ns)
@@ -365,21 +473,22 @@ class HubCore:
         self.ready_if_complete()
 
     def _go_on(self, past: Past, now_ns: int) -> None:
-        """Be the vHub that was there before: say its last deliveries again, and ask for what comes after."""
-        assert self.deployment is not None
+        """Resume as the vHub before: restore its state, and wait for the supervisor's grant."""
+        assert self.deployment is not None and self.releases is not None
         state = self.state = past.state
+        self.clients.begin(self.deployment, state, self.releases)
         self.commits.start(past.layout, state.closed + 1, past.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
-        self.door.go_on(past.inputs, past.absences, now_ns)
-        self.actions += past.words()
+        self.clients.go_on(past.inputs, past.absences, now_ns)
+        self.actions += past.actions()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
-            self.footing.stand(past.machine, past.published, past.owing)
+            self.handshake.begin(past.machine, past.published, past.owing)
         self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
-        self.repeated += not self.member.recall(recall)
+        self._repeated += not self.member.recall(recall)
 
     def ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
@@ -391,6 +500,7 @@ class HubCore:
 
     def _take_epoch(self, epoch: Epoch) -> None:
         self.epoch, self._epoch_tick = epoch.epoch, epoch.tick
+        self.clients.has_begun = True
         self.epoch_payload = encode(epoch)
         self._owners = dict(epoch.owners)
 
@@ -398,8 +508,8 @@ class HubCore:
         if self.state is None:
             return
         if epoch.epoch <= self.epoch:
-            self.repeated += 1
-            self.member.repeated(epoch.epoch == self.epoch and not self.footing.waits)
+            self._repeated += 1
+            self.member.repeated(epoch.epoch == self.epoch and not self.handshake.waits)
             return
         self.member.check_epoch(epoch)
         first = self.epoch == 0
@@ -408,10 +518,10 @@ class HubCore:
             return
         branches = self.state.turn_to(epoch)
         self._take_epoch(epoch)
-        self.actions += [Journal(self.epoch_payload), KeepEpoch(epoch)]
+        self.actions += [Journal(self.epoch_payload), RecordEpoch(epoch)]
         if branches:
-            self.footing.branch_off(self._sent)
-        self.footing.entered()
+            self._branch_off(self.state)
+        self._enter()
         if first:
             tick = self.state.closed + 1
             self._sent[tick] = encode(Deliveries(tick, [], branch=epoch.branch))
@@ -419,26 +529,102 @@ class HubCore:
             self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        taken = [] if self.footing.fences(commit, self._epoch_tick) else self.commits.take(commit, payload)
-        self.repeated += not taken
+        taken = [] if self._fences(commit) else self.commits.take(commit, payload)
+        self._repeated += not taken
         if self.releases is not None:
             for tick in taken:
                 self.releases.committed(tick, now_ns)
 
     def _on_samples(self, samples: Samples, payload: bytes, now_ns: int) -> None:
         if self.state is None or not self.state.closed < samples.tick <= self.state.closed + limits.KEPT_TICKS:
-            self.repeated += 1
+            self._repeated += 1
             return
         kept = self._samples.setdefault(samples.tick, [])
         if any(raw == payload for raw, _ in kept):
-            self.repeated += 1
+            self._repeated += 1
         elif len(kept) < limits.NODES_MAX * 4:
             kept.append((payload, samples))
             self.waits.node = samples.node
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
-        if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.footing.waits:
+        if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.handshake.waits:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
+
+    def _on_hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
+        """Admit a client, but not before the grant: it would learn a position from which the run may not resume."""
+        if not self.handshake.waits and self.member.build is not None:
+            self.clients.on_hello(hello, self.member.build)
+
+    def _on_join(self, join: Join, payload: bytes, now_ns: int) -> None:
+        if self.clients.on_join(join, now_ns):
+            self.ready_if_complete()
+
+    # --- resuming ----------------------------------------------------------------------------------------------------
+
+    def _resume_state(self) -> Publish:
+        """Return the report of how far the world has come here, which goes before each ready."""
+        state, build = self.state, self.member.build
+        assert state is not None and build is not None
+        standing = ResumeState(
+            channels.VHUB,
+            self.member.boot,
+            build.supervisor,
+            self.epoch,
+            state.branch,
+            state.branch_tick,
+            *self.commits.last(state.deployment),
+            state.final,
+            self.handshake.waits,
+            self.handshake.lost_machine,
+        )
+        return Publish(channels.RESUME_STATE, channels.VHUB, encode(standing))
+
+    def _on_proceed(self, proceed: ResumeGrant, payload: bytes, now_ns: int) -> None:
+        """Take the supervisor's grant: it knows this vHub's resume position."""
+        if proceed.boot != self.member.boot or not self.handshake.waits:
+            self._repeated += 1
+            return
+        self.handshake.granted_from = proceed.epoch
+        self._enter()
+
+    def _enter(self) -> None:
+        """An epoch has begun, or a grant has come: once both are there, send the last deliveries and ask for the next
+        commits and samples."""
+        handshake, state = self.handshake, self.state
+        if handshake.waits and self.epoch < handshake.granted_from:
+            return
+        self.member.entered()
+        if not handshake.waits or state is None:
+            return
+        handshake.waits = False
+        if handshake.lost_machine:
+            self.actions.append(Journal(self.head()))
+        for payload in handshake.published:
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        for name in handshake.owing:
+            self.sessions.resend(name, state.members[name].downlink)
+        for tick in range(state.closed + 1, state.final + 2):
+            for kind in (channels.COMMIT, channels.SAMPLES):
+                want = encode(Want(channels.VHUB, kind.name, tick, self.epoch, []))
+                self.actions.append(Publish(channels.WANT, channels.VHUB, want))
+
+    def _fences(self, commit: Commit) -> bool:
+        """Whether a commit does not count: it is of an epoch before the present one, or a branch has voided it.
+
+        Up to the epoch's first tick it counts under its old epoch: in a branch, what is committed never changes.
+        """
+        state = self.state
+        is_old = commit.epoch < self.epoch and commit.tick > self._epoch_tick
+        is_void = state is not None and commit.epoch < state.branch and commit.tick > state.branch_tick
+        return is_old or is_void or self.handshake.waits
+
+    def _branch_off(self, state: HubState) -> None:
+        """A branch begins behind the last closed tick: tag with its number the deliveries that others may ask for."""
+        self.actions.append(Say("warning", f"the run goes on as branch {state.branch} from tick {state.branch_tick}"))
+        for tick, payload in self._sent.items():
+            self._sent[tick] = retag(Deliveries, payload, state.branch)
+        self.handshake.published = [payload for tick, payload in sorted(self._sent.items()) if tick >= state.closed]
+        self.sessions.downlinks.turn_to(state.branch)
 
     # --- time --------------------------------------------------------------------------------------------------------
 
@@ -447,30 +633,38 @@ class HubCore:
         tick, kind = self.state.closed + 1, channels.SAMPLES.name
         if self.commits.next_tick <= (tick if self.ended is None else self.ended.tick):
             tick, kind = self.commits.next_tick, channels.COMMIT.name
-        if (self._world is None or kind == channels.COMMIT.name) and not self.footing.waits:
+        if (self._world is None or kind == channels.COMMIT.name) and not self.handshake.waits:
             want = Want(channels.VHUB, kind, tick, self.epoch, [])
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
 
     def lose(self, name: str, why: str) -> None:
-        """What the run cannot do without is lost: a client, the capture, room for the journal."""
-        self.give_up(f"lost {name}: {why}")
+        """End the run, since it has lost what it cannot do without: a client, the capture, space for the journal."""
+        self.give_up(lost(name, why))
 
     def give_up(self, reason: str) -> None:
-        """The run cannot go on: the supervisor ends it for the first reason that it hears."""
+        """Ask the supervisor to end the run; the first reason counts."""
         if not self.lost:
             self.lost = reason
             self.actions.append(Say("error", reason))
-            self.say_heartbeat()
+            self.send_heartbeat()
 
-    def say_heartbeat(self) -> None:
-        """Say at once what the next heartbeat would."""
+    def send_heartbeat(self) -> None:
+        """Send a heartbeat at once."""
         self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
 
     def heartbeat(self) -> Heartbeat:
-        """Return what it says of itself."""
+        """Return the heartbeat of now."""
         tick = 0 if self.state is None else self.state.closed + 1
-        return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
+        return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, self._report())
+
+    def _report(self, *, is_last: bool = False) -> bytes:
+        refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
+        if self.state is None or self.releases is None:
+            return report_before(refused)
+        links = self.links_told.lines(self.state, self.watching.links, anew=is_last)
+        parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
+        return report(self.state, refused, *parts)
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -480,7 +674,7 @@ class HubCore:
             self._end_ns = now_ns + limits.DOWNLINK_KEPT_NS
 
     def _finish(self, now_ns: int) -> None:
-        """Record what is committed and not closed, and what is in flight; tell the clients. The shell says farewell."""
+        """Record what is committed and not closed, and what is in flight; notify the clients."""
         assert self.state is not None and self.ended is not None
         lacks = self.ended.tick not in self.commits
         if lacks and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
@@ -488,12 +682,34 @@ class HubCore:
         self.finished = True
         self._release(now_ns)
         half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
-        self.actions += map(Keep, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
+        self.actions += map(RecordClosing, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
-            self.sessions.say_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
+            self.sessions.send_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
-        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, report(self, is_last=True))))
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report(is_last=True))))
+
+
+class ClosingCore:
+    """Sends the heartbeat of a vHub that closes its capture. `actions` is what the shell performs next."""
+
+    def __init__(self, core: HubCore) -> None:
+        self.actions: list[Any] = core.actions
+        self._core = core
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Drop a message: the run has ended."""
+
+    def wake(self, now_ns: int) -> None:
+        """Send the heartbeat when it is due; its report has the state of the capture."""
+        self._core.member.wake(now_ns, self._heartbeat)
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next."""
+        return self._core.member.deadline_ns
+
+    def _heartbeat(self) -> Heartbeat:
+        return replace(self._core.heartbeat(), waiting_for=CAPTURE)

@@ -58,16 +58,15 @@ from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
-from foosim.vhub.closing import ClosingCore
-from foosim.vhub.core import HubCore
-from foosim.vhub.links.summary import meanings
+from foosim.vhub.core import ClosingCore, HubCore
+from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 from foosim.vhub.network.custom_models import check_link_models
 from foosim.vhub.recording.disk_watch import RoomWatch
-from foosim.vhub.recording.queue import Keep, KeepEpoch
 from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.records import Closing, first_head
-from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.state.records import Closing, first_head
+from foosim.vhub.state.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
 
 CONNECT_S = 60.0
 SWITCH_S = 0.0001
@@ -126,10 +125,9 @@ class HubProcess:
         self._loop.show_progress(options.progress)
         self._loop.notify = Notify()
         self._loop.turn = self._turn
-        self._loop.took, self._loop.stood = self.core.waits.took, self.core.door.rest
+        self._loop.took, self._loop.stood = self.core.waits.took, self.core.rest
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
-        self.core.speak = self._speak
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
         self._loop.on_unwritten = self._on_unwritten
@@ -211,7 +209,10 @@ class HubProcess:
             self._begin(core.member.build, now_ns)
         if core.orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._why_abandoned:
             self._why_abandoned = "lost the supervisor, and it has not come back"
-        core.advance(now_ns)
+        sent_ns = now_ns
+        while core.step(now_ns, sent_ns):
+            self._loop.perform()
+            sent_ns = time.monotonic_ns()
         reminder = "" if self._exposure is None else self._exposure.due(now_ns)
         if reminder:
             core.actions.append(Say("warning", reminder))
@@ -226,16 +227,11 @@ class HubProcess:
                 self._loop.journal = None
                 self._on_unwritten(error)
 
-    def _speak(self, now_ns: int) -> int:
-        """Perform what the core has to say amid a closing; return the time."""
-        self._loop.perform()
-        return time.monotonic_ns()
-
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
         """Say what gets little, and end the run while what is left to be written still fits."""
         core = self.core
         core.actions += [Say(level, text) for level, text in room.look(now_ns)]
-        core.recording, core.disk_progress = room.recording, room.disk_progress(now_ns)
+        core.shell.recording, core.shell.disk_progress = room.recording, room.disk_progress(now_ns)
         if room.ends is not None and not core.lost and not core.finished:
             core.lose(*room.ends)
 
@@ -243,7 +239,7 @@ class HubProcess:
         """Say that the vHub lives, and what it waits for, while the capture's full queue holds up the loop."""
         core = self.core
         if self._room is not None:
-            core.recording = self._room.recording
+            core.shell.recording = self._room.recording
         self._wire.put(channels.HEARTBEAT, VHUB, encode(replace(core.heartbeat(), waiting_for=CAPTURE)))
 
     def _on_unwritten(self, error: JournalError) -> None:
@@ -293,12 +289,12 @@ class HubProcess:
             raise self._refusal(build, records, damaged)
         captured = self._open_capture(build, deployment, records)
         self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
-        core.recording = self._room.recording
+        core.shell.recording = self._room.recording
         past = recall(deployment, build.run, records, captured, deployment.deadlines.client_back_ns)
         if self._capture is not None and past is not None and past.known is not None:
             self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
         core.begin(past, now_ns)
-        for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
+        for line in start_lines(summaries(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
 
     def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
@@ -317,7 +313,7 @@ class HubProcess:
             return None
         path = Path(before) if before else options.capture
         path = path or Path("captures") / f"{deployment.world}-{wall_clock.now_stamp()}.mcap"
-        self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
+        self.core.shell.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # who is killed before the capture is there finds here that what is found is its own
             check_new(path, is_split=deployment.capture.is_split)
             assert self._journal is not None
@@ -337,7 +333,7 @@ class HubProcess:
     def _listen(self, deployment: Deployment) -> None:
         """Open the radio plane to the clients that the deployment declares."""
         session = self._open_radio(deployment)
-        self.core.radio_address = session.locator
+        self.core.shell.radio_address = session.locator
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
         self._loop.connect(radio)
@@ -357,9 +353,9 @@ class HubProcess:
             kept = min(kept, self._capture.synced_tick)
         journal.forget_before(kept)
 
-    def _keep(self, action: Keep | KeepEpoch) -> None:
+    def _keep(self, action: RecordClosing | RecordEpoch) -> None:
         if self._capture is not None:
-            self._capture.keep(action.closing if isinstance(action, Keep) else action.epoch)
+            self._capture.keep(action.closing if isinstance(action, RecordClosing) else action.epoch)
 
     def _on_say(self, say: Say) -> None:
         if self._capture is not None and not self._is_closing:
@@ -386,9 +382,9 @@ class HubProcess:
         assert self.core.ended is not None
         if self._capture is not None:
             self._capture.finish()
-            self.core.capture = str(first_there(Path(self.core.capture)))
+            self.core.shell.capture = str(first_there(Path(self.core.shell.capture)))
         if self._room is not None:
-            self.core.recording = self._room.recording
+            self.core.shell.recording = self._room.recording
         if self._journal is not None:
             try:
                 self._journal.close()

@@ -1,7 +1,7 @@
-"""When what is due leaves for a free-running client: in realtime at anchor + due, in fast in tick order, at once.
+"""Paces what is released to free-running clients: in realtime at anchor + due, in fast at once and in tick order.
 
-The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the hub's own clock: the best estimate
-of wall time 0 that late commits do not spoil. How much later than that packets leave is counted.
+The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the vHub's own clock: the best estimate
+of the wall time of simulated time 0 that late commits do not distort. How late packets leave is counted.
 """
 
 from __future__ import annotations

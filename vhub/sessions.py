@@ -1,12 +1,12 @@
-"""The clients' side of the hub: who is let in, what was said to each and is kept until answered.
+"""Sessions of clients: which process has a client's name, and what was sent to it and is kept until it answers.
 
 A lockstep client gets `Go(k)` and answers `Done(k)`, stop and wait; a free-running one gets numbered `Down`s. What is
-said to a client is numbered and kept, so that it can go on after it was away. Sessions are about processes; what the
+sent to a client is numbered and kept, so that it can resume after an absence. Sessions are about processes; what the
 world must remember of a client is in `state`.
 
-A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: it was
-away, or its news came first. Where that can be, a reservation keeps nobody out: all are welcomed, and the first that
-joins has the name.
+A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: because
+the vHub was away, or because news of the end overtook the hello. Where that can be, a reservation excludes nobody: all
+are welcomed, and the first that joins has the name.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from foosim.protocol.messages import (
     Sent,
 )
 from foosim.runtime.closed import CLOSED, closed
-from foosim.vhub.downlinks import Downlinks
-from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.network.memory import Joining
-from foosim.vhub.state import HubState
+from foosim.vhub.state.downlinks import Downlinks
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.members import may_lockstep, may_restart
 
 T = TypeVar("T")
 BOOTS_KEPT: Final = 32
@@ -54,27 +54,27 @@ class Claim(NamedTuple):
 
 @dataclass(slots=True)
 class Session:
-    """One client's process: its boot, the Go that waits for its Done, what it sent between closings."""
+    """The process of one client: its boot, the Go without a Done, and the packets that it sent between closings."""
 
     name: str
     boot: str
     """Empty while the client that the state knows has not come to this vHub yet."""
     is_present: bool = False
-    """Whether it has joined since its last hello: only then it is told anything."""
+    """Whether it has joined since its last hello: only then anything is sent to it."""
     received: int = 0
-    """The last downlink up to which it had all at its hello."""
+    """The downlink up to which it had received all at its hello."""
     is_behind: bool = True
-    """Whether it is to be told what it had not received then."""
+    """Whether what it had not received then is still to be sent."""
     is_gone: bool = False
-    """Whether its process has gone, and has not come back, nor another one."""
+    """Whether its process has disconnected, and neither it nor another one has come since."""
     why_gone: str = CLOSED
-    """What was known of that."""
+    """The cause, as far as it is known."""
     returns: int = 0
     """How often its process had lost the vHub when it said hello."""
     before: dict[str, None] = field(default_factory=dict)
-    """Boots of the last processes that are gone for good: what comes late of them is of nobody."""
+    """Boots of the last processes that are gone for good: their late messages are dropped."""
     is_missed: bool = False
-    """Whether its hello has told that the process before it was lost while the vHub was away."""
+    """Whether its hello has shown that the process before it was lost while the vHub was away."""
     claims: dict[str, Claim] = field(default_factory=dict)
     """The last processes that were welcomed to the name and are not known to be gone, by boot."""
     away_ns: int = -1
@@ -85,14 +85,14 @@ class Session:
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
-    """What it was told to be recorded."""
+    """The sequence number that was acknowledged to it."""
     heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
-    """By when it is to answer; 0 while no answer is waited for."""
+    """By when it has to answer; 0 while no answer is due."""
     allowed_ns: int = 0
     deadline: str = ""
     """Which one of the deployment's that is."""
@@ -179,7 +179,7 @@ class Session:
 
 
 class Sessions:
-    """All clients of the hub. What it says goes to `actions`."""
+    """The sessions of all clients. What is to be sent is appended to `actions`."""
 
     def __init__(self, hub_boot: str, actions: list[Action]) -> None:
         self.by_name: dict[str, Session] = {}
@@ -198,9 +198,9 @@ class Sessions:
     def hello(
         self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState, said: int | None = None
     ) -> None:
-        """Let a client in, or say why not. A repeat gets the same answer.
+        """Admit a client, or refuse it with the reason. A repeated hello gets the same answer.
 
-        `said` is the last downlink that was said to its name, None when that is the last one of all.
+        `said` is the last downlink that was sent to its name, None when that is the last one of all.
         """
         reason = self._reason_against(hello, deployment)
         if reason:
@@ -229,9 +229,9 @@ class Sessions:
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 
     def take_over(self, join: Join, deployment: Deployment, state: HubState, said: int | None) -> bool:
-        """Let a process join that was welcomed while another one had its name; False where it comes too late.
+        """Give the name to a process that was welcomed while another one had it; False where it is too late for that.
 
-        It does where another one has joined and is here, or has sent something since this one was told its numbers.
+        It is where another one has joined and is present, or has sent something since this one was told its numbers.
         """
         session = self.by_name[join.name]
         claim = session.claims[join.boot]
@@ -331,7 +331,7 @@ class Sessions:
         return [self.joins.pop(name) for name in due]
 
     def leave(self, name: str) -> None:
-        """Forget a client's process; what it sent stays."""
+        """Remove a client's session; what it sent stays."""
         session = self.by_name.pop(name)
         self.joins.pop(name, None)
         self._left_behind.setdefault(name, []).extend(session.inbox)
@@ -365,30 +365,30 @@ class Sessions:
         self._waiting_bytes = sum(session.inbox_bytes for session in self.by_name.values())
         return taken
 
-    def say_go(self, session: Session, go: Go) -> None:
-        """Give a lockstep client its tick; to one that is away it is said when it is back."""
+    def send_go(self, session: Session, go: Go) -> None:
+        """Send a lockstep client its tick; one that is away gets it when it has returned."""
         session.go = encode(go)
         session.go_tick = go.tick
         session.done = None
         if session.is_present:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
 
-    def say_owed(self, name: str, now_ns: int) -> None:
-        """Say what the Go has whose Done is owed, and keep it: it counts as delivered, and nobody is to answer it.
+    def send_owed(self, name: str, now_ns: int) -> None:
+        """Send the packets of the Go whose Done is owed as a Down, and keep it: they count as delivered.
 
-        Whether any process has heard that Go, and whether the one that joins next has, is not known.
+        It is not known whether any process, or the one that joins next, has received that Go.
         """
         go = decode(Go, self.by_name[name].go)
         payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
         self.downlinks.keep(name, go.number, payload, now_ns)
         self._actions.append(Publish(channels.DOWN, name, payload))
 
-    def say_again(self, name: str, number: int) -> None:
-        """Say a client's downlinks from a number on, which the vHub before may have written and not said."""
+    def resend(self, name: str, number: int) -> None:
+        """Send a client's downlinks from a number on, which the vHub before may have written and not sent."""
         self._actions += [Publish(channels.DOWN, name, said) for said in self.downlinks.behind(name, number - 1)]
 
-    def say_down(self, name: str, down: Down, now_ns: int) -> None:
-        """Give a client what is released to it outside of lockstep, or the news of the end; and keep it."""
+    def send_down(self, name: str, down: Down, now_ns: int) -> None:
+        """Send a client what is released to it outside of lockstep, or the end of the run; and keep it."""
         payload = encode(down)
         self.downlinks.keep(name, down.number, payload, now_ns)
         session = self.by_name.get(name)
@@ -397,7 +397,7 @@ class Sessions:
             self._actions.append(Publish(channels.DOWN, name, payload))
 
     def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
-        """A client has joined (again): say what it had not received; `waits` is whether a tick waits for its Done."""
+        """A client has joined (again): send what it has not received; `waits` is whether a tick waits for its Done."""
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
@@ -407,7 +407,7 @@ class Sessions:
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
 
     def acknowledge(self, state: HubState, now_ns: int) -> None:
-        """Tell free-running clients what is recorded of what they sent, ten times a second at most."""
+        """Acknowledge to free-running clients what is recorded of their packets, ten times a second at most."""
         for name, session in self.by_name.items():
             member = state.members.get(name)
             if member is None or member.period or not session.is_present or member.sequence <= session.heard:
@@ -422,16 +422,16 @@ class Sessions:
             session.rest(for_ns, now_ns)
 
     def overdue(self, now_ns: int) -> list[Session]:
-        """Return those who are here and have not answered in time, in name order."""
+        """Return the clients that are connected and have not answered in time, in name order."""
         waited = [session for _, session in sorted(self.by_name.items()) if session.deadline_ns]
         return [session for session in waited if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
-        """When the next Go is said again."""
+        """When the next Go is repeated."""
         return min(self.by_name[name].again_ns for name in waited)
 
     def repeat(self, waited: Sequence[str], now_ns: int) -> None:
-        """Say a Go again to those who have not answered for long, the wait doubling."""
+        """Repeat a Go to clients that have not answered it, with exponential back-off."""
         for name in waited:
             session = self.by_name[name]
             if now_ns >= session.again_ns:

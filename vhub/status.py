@@ -1,25 +1,32 @@
-"""What the vHub reports of itself in heartbeats and its farewell, as JSON: totals, refusals, a line per link."""
+"""The vHub's account of itself in heartbeats and in its farewell, as JSON: totals, refusals, a line per link."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 import msgspec
 
+from foosim.common.histogram import Lags
 from foosim.common.json_text import encode_json
 from foosim.vhub.links.fabric import LinkKey, name_of
 from foosim.vhub.network.ages import quantile
-from foosim.vhub.state import HubState
-
-if TYPE_CHECKING:
-    from foosim.vhub.core import HubCore
-
+from foosim.vhub.state.hub_state import HubState
 
 LINKS_TOLD_MAX: Final = 200
 LINKS_TOLD_EVERY: Final = 5
 """Heartbeats, which are half a second."""
+
+
+@dataclass(slots=True)
+class ShellStatus:
+    """What the shell adds to the report: path and state of the capture, progress of the disk, the radio address."""
+
+    capture: str = ""
+    recording: dict[str, Any] = field(default_factory=dict)
+    disk_progress: int = 0
+    radio_address: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +67,21 @@ class LinksTold:
         return self._lines
 
 
-def report(core: HubCore, *, is_last: bool = False) -> bytes:
-    """Return the account so far, where the radio plane and the capture are, and how the capture does.
+def report_before(refused: Mapping[str, Any]) -> bytes:
+    """Return the account of a vHub that takes no part yet."""
+    return encode_json({"refused": refused})
 
-    Only the last report has everything as it is at this moment.
+
+def report(
+    state: HubState,
+    refused: Mapping[str, Any],
+    links: msgspec.Raw,
+    watched: Mapping[str, Any],
+    absences: Mapping[str, Any],
+    lateness: Lags,
+    shell: ShellStatus,
+) -> bytes:
+    """Return the account so far, the addresses of the radio plane and the capture, and the state of the recording.
 
     `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
     delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
@@ -71,11 +89,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
     messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
     null if none did. What somebody looks at is under `watched` (`Watching.report`).
     """
-    state, refused = core.state, core.refusals.by_sender()
-    if state is None:
-        return encode_json({"refused": refused})
     packets = state.packets
-    lateness = None if core.releases is None else core.releases.lateness
     return encode_json(
         {
             "packets": {
@@ -87,16 +101,16 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             },
             "refused": refused,
             "refusals": state.refusals,
-            "links": core.links_told.lines(state, core.watching.links, anew=is_last),
+            "links": links,
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
-            **core.watching.report(state),
-            "absences": {"boot": core.member.boot, **core.door.absences.report()},
-            "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
-            "capture": core.capture,
-            "recording": core.recording,
-            "disk_progress": core.disk_progress,
-            "radio_address": core.radio_address,
+            **watched,
+            "absences": absences,
+            "lateness_ms": lateness.as_json() if lateness.count else None,
+            "capture": shell.capture,
+            "recording": shell.recording,
+            "disk_progress": shell.disk_progress,
+            "radio_address": shell.radio_address,
         }
     )
 

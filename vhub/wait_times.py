@@ -1,7 +1,7 @@
-"""Whom the closing of a tick waited for, and for how long: what makes a late tick's culprit known.
+"""Accounts for the time that a closing waits for others, so that a late tick is attributed to who caused it.
 
-A closing waits for the nodes' samples once its commit is there, and for the clients' Dones once their Go is said. Time
-in which the hub itself was busy counts for nobody else.
+A closing waits for the nodes' samples once its commit has come, and for the clients' Dones once their Go has been sent.
+Time in which the vHub itself was busy counts for nobody else.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from foosim.protocol.messages import DONE_OF, SAMPLES_OF
 
 
-class Waits:
-    """The waits of the closing at hand. `node` and `client` are those whose samples and Done came last."""
+class WaitTimes:
+    """Wait times of the present closing. `node` and `client` are those whose samples and Done came last."""
 
     def __init__(self) -> None:
         self.node = self.client = ""
@@ -19,20 +19,20 @@ class Waits:
         self._world_ns = 0
 
     def took(self, begun_ns: int, ended_ns: int) -> None:
-        """A turn of the hub took this long."""
+        """Count a turn of the vHub's loop as busy time."""
         self._busy_ns += max(0, ended_ns - begun_ns)
 
     def begin(self, now_ns: int) -> None:
-        """The commit of the tick is there; only the first call counts."""
+        """The commit of the tick has come; only the first call counts."""
         if self._begun_ns < 0:
             self._begun_ns = now_ns - self._busy_ns
 
     def close_world(self, now_ns: int) -> None:
-        """All samples are there."""
+        """All samples have come."""
         self._world_ns = now_ns - self._busy_ns
 
     def close(self, now_ns: int, least_ns: int) -> str:
-        """All Dones are there: return what was waited for longest, as heartbeats say it; '' if less than `least_ns`."""
+        """All Dones have come: return the longest wait's cause as heartbeats name it; empty if below `least_ns`."""
         samples_ns = self._world_ns - self._begun_ns
         dones_ns = now_ns - self._busy_ns - self._world_ns
         self._begun_ns = -1

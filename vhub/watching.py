@@ -1,7 +1,7 @@
-"""What the vHub keeps for people of links and readings that they look at: the last drops, the last readings.
+"""Keeps the last drops of links and the last readings of channels that a viewer looks at.
 
-Nothing is kept of what nobody looks at, and nothing of it is in the state, the journal or the capture: a run is the
-same whoever looks.
+Nothing is kept of what nobody looks at, and none of it is in the state, the journal or the capture: viewers do not
+change a run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from foosim.common.json_text import encode_json
 from foosim.protocol.messages import Watched
 from foosim.vhub.network.packet import IN_FLIGHT, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from foosim.world.robot_packets import RobotPacket
 
 DROPS_KEPT: Final = 8

@@ -20,6 +20,7 @@ from typing import Any, Final, Self, TypeVar
 import numpy as np
 
 from foosim.capture.reader import open_capture
+from foosim.client.control import Control, NoAnswer
 from foosim.common.units import parse_pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.launcher.processes import Child, Launcher
@@ -27,7 +28,6 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from foosim.runtime.run_folder import RunFolder, open_run, run_exists
-from foosim.supervisor.control import Control, NoAnswer
 from tests.wire.proxy import Proxy, Weather
 
 TABLE: Final = Path(__file__).resolve().parents[2] / "deploy" / "table.yaml"

@@ -15,10 +15,10 @@ from typing import Final
 
 from bench.faults.cluster import LIMIT_S, POLL_S, TABLE, FaultError
 from bench.faults.kinds import CALM_S, Figures
+from foosim.client import control
 from foosim.common.errors import Refused
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.children import script
-from foosim.supervisor import control
 
 END_MS: Final = 5000.0
 GONE_MS: Final = 1000.0

@@ -9,9 +9,10 @@ from msgspec.structs import replace
 from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
-from foosim.supervisor.branches import Branches
-from foosim.supervisor.requests import Requests
-from foosim.vhub.footing import Footing
+from foosim.protocol.hub_messages import ResumeGrant
+from foosim.supervisor.failover import Rollback
+from foosim.supervisor.state import RunState
+from foosim.vhub.core import HubCore
 
 register = Register()
 
@@ -37,23 +38,24 @@ def _takes(planting: Planting) -> None:
 
 @register("supervisor begins no branch", "what the vHub has lost with its machine is void", 3)
 def _none(planting: Planting) -> None:
-    planting.swap(Branches, "is_behind", lambda self, standing: False)
+    planting.swap(Rollback, "is_behind", lambda self, standing: False)
 
 
 @register("a branch forgets what was asked for", "requests keep their ticks in a branch", 3)
 def _forgets(planting: Planting) -> None:
-    planting.swap(Requests, "set_back", lambda self, tick: self._edits.clear())
+    planting.swap(RunState, "reorder_from", lambda self, tick: self.coming_edits.clear())
 
 
 @register("vHub does not wait", "a vHub that goes on from a journal closes nothing until it may", 3)
 def _does_not_wait(planting: Planting) -> None:
-    def stand(self: Any, machine: str, published: bytes, owing: list[str]) -> None:
-        before(self, machine, published, owing)
-        self.proceed = lambda proceed, payload, now_ns: None
-        self._from = 0
-        self.entered()
+    def go_on(self: Any, past: Any, now_ns: int) -> None:
+        before(self, past, now_ns)
+        if self.handshake.waits:
+            self._readers[ResumeGrant] = lambda proceed, payload, now_ns: None
+            self.handshake.granted_from = 0
+            self._enter()
 
-    before: Any = planting.swap(Footing, "stand", stand)
+    before: Any = planting.swap(HubCore, "_go_on", go_on)
 
 
 @register("client is not set back", "a client goes on from the branch's tick", 3)

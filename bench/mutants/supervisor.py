@@ -8,14 +8,15 @@ from bench.mutants.planting import Mutant, Planting, Register
 from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
-from foosim.supervisor import core, failover, records
-from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor import core, records
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.failover import Failover
 from foosim.supervisor.handshake import Handshake
-from foosim.supervisor.node_loss import Recovery
+from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
+from foosim.supervisor.state import InputBuffer, RunState
 
 register = Register()
 
@@ -37,7 +38,8 @@ class _AnyBasis(bytes):
 @register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 24)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
-        self.arrivals.take_part(part, self.frame.tick, self.members)
+        state = self.state
+        state.inputs.take_part(part, state.frame.tick, state.members)
 
     planting.swap(SupervisorCore, "_on_part", on_part)
 
@@ -57,7 +59,7 @@ def _counted(planting: Planting) -> None:
         self.parts.setdefault(part.tick, []).append(part)
         return True
 
-    planting.swap(Arrivals, "take_part", take_part)
+    planting.swap(InputBuffer, "take_part", take_part)
 
 
 @register("supervisor does not ask again", "who has had no progress asks again (supervisor)", 2)
@@ -79,12 +81,12 @@ def _spoken_first(actions: list[Any], first: int) -> None:
 
 @register("commit is said before it is written", "the supervisor journals commits before it publishes", 1)
 def _hasty_commit(planting: Planting) -> None:
-    def say_commit(self: Any, *given: Any) -> None:
+    def publish_commit(self: Any, *given: Any) -> None:
         first = len(self.actions)
         before(self, *given)
         _spoken_first(self.actions, first)
 
-    before: Any = planting.swap(SupervisorCore, "_say_commit", say_commit)
+    before: Any = planting.swap(SupervisorCore, "_publish_commit", publish_commit)
 
 
 @register("epoch is said before it is written", "the supervisor journals epochs before it publishes", 1)
@@ -100,7 +102,7 @@ def _hasty_epoch(planting: Planting) -> None:
 @register("requests are not journalled", "a request is journalled when its tick is chosen, then answered", 1)
 def _unwritten(planting: Planting) -> None:
     def accept(self: Any, *given: Any, **named: Any) -> Any:
-        actions = self._core.actions
+        actions = self._state.actions
         first = len(actions)
         answer = before(self, *given, **named)
         actions[first:] = [action for action in actions[first:] if not isinstance(action, Journal)]
@@ -112,7 +114,7 @@ def _unwritten(planting: Planting) -> None:
 @register("refusals are not journalled", "the same id gets the same answer over restarts", 1)
 def _unwritten_refusal(planting: Planting) -> None:
     def write(self: Any, verb: str, answer: Any, *added: Any) -> Any:
-        actions = self._core.actions
+        actions = self._state.actions
         first = len(actions)
         before(self, verb, answer, *added)
         if not answer.accepted:
@@ -124,23 +126,23 @@ def _unwritten_refusal(planting: Planting) -> None:
 
 @register("requests are done each time they come", "the same id gets the same answer", 1)
 def _each_time(planting: Planting) -> None:
-    def take(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
-        self._answers.pop((request.sender, request.id), None)
+    def on_request(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
+        self._state.answers.pop((request.sender, request.id), None)
         before(self, request, payload, now_ns)
 
-    before: Any = planting.swap(Requests, "take", take)
+    before: Any = planting.swap(Requests, "on_request", on_request)
 
 
 @register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 5)
 def _forgotten(planting: Planting) -> None:
-    planting.swap(Requests, "resume", lambda self, *journalled: None)
+    planting.swap(RunState, "restore_requests", lambda self, history: None)
 
 
 @register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 25)
 def _other_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
-        for tick in range(self.frame.tick, self.released):
-            self.orders[tick] = []
+        for tick in range(self.state.frame.tick, self.state.released):
+            self.state.orders[tick] = []
         before(self, *given)
 
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
@@ -149,9 +151,10 @@ def _other_orders(planting: Planting) -> None:
 @register("orders are not issued again", "orders from c on are issued again", 1)
 def _no_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
-        said, self.released = self.released, self.frame.tick
+        state = self.state
+        said, state.released = state.released, state.frame.tick
         before(self, *given)
-        self.released = said
+        state.released = said
 
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
     planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
@@ -167,7 +170,7 @@ def _run_ahead(planting: Planting) -> None:
 @register("epoch does not grow", "epochs only grow", 1)
 def _same_epoch(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
-        self.epoch = max(0, self.epoch - (self.epoch % 3 == 2))
+        self.state.epoch = max(0, self.state.epoch - (self.state.epoch % 3 == 2))
         before(self, *given)
 
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
@@ -175,12 +178,12 @@ def _same_epoch(planting: Planting) -> None:
 
 @register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 60)
 def _volatile(planting: Planting) -> None:
-    def stand_on(core: Any, history: Any) -> None:
-        before(core, history)
-        core.epoch = 0
+    def restore(self: Any, history: Any) -> None:
+        before(self, history)
+        self.epoch = 0
 
-    before: Any = planting.swap(failover, "stand_on", stand_on)
-    planting.swap(failover.TakeOver, "standing", _standing_without_epoch)
+    before: Any = planting.swap(RunState, "restore", restore)
+    planting.swap(Failover, "on_standing", _standing_without_epoch)
 
 
 def _standing_without_epoch(self: Any, standing: Any, now_ns: int) -> bool:
@@ -190,22 +193,22 @@ def _standing_without_epoch(self: Any, standing: Any, now_ns: int) -> bool:
 
 @register("robots are not adopted", "a lost node's robots are adopted", 1)
 def _orphans(planting: Planting) -> None:
-    planting.swap(Recovery, "adopted", lambda self, lost, members: dict(self._core.owners))
+    planting.swap(NodeLoss, "adopted", lambda self, lost, members: dict(self._state.owners))
 
 
 @register("robots do not go back", "adopted robots go back to the node that returns", 1)
 def _kept_robots(planting: Planting) -> None:
     def join(self: Any, process: Any, now_ns: int) -> None:
-        if self._core.members:
-            self.returns.clear()
+        if self._state.members:
+            self._state.returns.clear()
         before(self, process, now_ns)
 
-    before: Any = planting.swap(Recovery, "join", join)
+    before: Any = planting.swap(NodeLoss, "join", join)
 
 
 @register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 1)
 def _unmoved(planting: Planting) -> None:
-    planting.swap(Recovery, "moved", lambda self, robot: None)
+    planting.swap(NodeLoss, "moved", lambda self, robot: None)
 
 
 @register("a lost node stays on the list", "a lost node may come back by the handshake", 1)
@@ -215,19 +218,16 @@ def _never_lost(planting: Planting) -> None:
 
 @register("a stopped node comes back", "who was stopped is not let in until it is started", 21)
 def _unstopped(planting: Planting) -> None:
-    def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
-        self._core.roster.stopped.discard(hello.name)
+    def on_hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
+        self._state.roster.stopped.discard(hello.name)
         before(self, hello, payload, now_ns)
 
-    before: Any = planting.swap(Handshake, "hello", hello)
+    before: Any = planting.swap(Handshake, "on_hello", on_hello)
 
 
 @register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
 def _untold(planting: Planting) -> None:
-    def say_epoch(self: Any) -> None:
-        self.count_repeat()
-
-    planting.swap(SupervisorCore, "say_epoch", say_epoch)
+    planting.swap(RunState, "publish_epoch", lambda self: None)
 
 
 @register("edits are folded for ever", "a fold gives what is not committed yet", 1)
@@ -244,8 +244,8 @@ def _stale_edits(planting: Planting) -> None:
 def _short_roster(planting: Planting) -> None:
     def open_epoch(self: Any, owners: Any, now_ns: int, members: Any = None) -> None:
         before(self, owners, now_ns, members)
-        owning = {*owners.values()}
-        self.members = tuple(name for name in self.members if name in owning)[: max(1, len(owning) - 1)]
+        state, owning = self.state, {*owners.values()}
+        state.members = tuple(name for name in state.members if name in owning)[: max(1, len(owning) - 1)]
 
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
@@ -261,7 +261,9 @@ def _lost_commit(planting: Planting) -> None:
 
 @register("a loss is told twice", "a commit tells of what is over by it, once", 1)
 def _told_twice(planting: Planting) -> None:
-    before: Any = planting.swap(Recovery, "committed", lambda self, *when: before(self, *when) and self.recovered[-2:])
+    before: Any = planting.swap(
+        core, "close_outages", lambda recovered, *when: before(recovered, *when) and recovered[-2:]
+    )
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

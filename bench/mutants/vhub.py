@@ -11,12 +11,13 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries
-from foosim.vhub import core, records, state
-from foosim.vhub.commits import Commits
+from foosim.vhub import core
+from foosim.vhub.clients import Clients
 from foosim.vhub.core import HubCore
-from foosim.vhub.join import Door
 from foosim.vhub.sessions import Sessions
-from foosim.vhub.state import HubState
+from foosim.vhub.state import hub_state, records
+from foosim.vhub.state.commits import Commits
+from foosim.vhub.state.hub_state import HubState
 
 register = Register()
 
@@ -88,7 +89,7 @@ def _stay(planting: Planting) -> None:
 
 @register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 1)
 def _disorder(planting: Planting) -> None:
-    planting.swap(state, "order_of", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
+    planting.swap(hub_state, "order_of", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
 
 
 @register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 1)
@@ -104,7 +105,7 @@ def _early(planting: Planting) -> None:
 
 @register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 1)
 def _numbers(planting: Planting) -> None:
-    planting.swap(state, "OUTBOX_SHIFT", 0)
+    planting.swap(hub_state, "OUTBOX_SHIFT", 0)
 
 
 @register("final too far ahead", "deliveries of ticks ahead are final only where nothing can reach robots", 1)
@@ -126,19 +127,19 @@ def _go_once(planting: Planting) -> None:
 def _any_done(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
         session = self._session(done)
-        if session is not None and self._core.waits_for(done.name):
+        if session is not None and self.waits_for(done.name):
             self.take_done(done.name)
             session.done = done
 
-    planting.swap(Door, "done", done)
+    planting.swap(Clients, "on_done", done)
 
 
 @register("downlinks are not numbered", "each downlink has the next number", 1)
 def _same_number(planting: Planting) -> None:
-    def say_go(self: Any, session: Any, go: Any) -> None:
+    def send_go(self: Any, session: Any, go: Any) -> None:
         before(self, session, replace(go, number=go.number - go.number % 2))
 
-    before: Any = planting.swap(Sessions, "say_go", say_go)
+    before: Any = planting.swap(Sessions, "send_go", send_go)
 
 
 @register("fold forgets downlinks", "a fold of the journal gives the state again", 1)
@@ -176,9 +177,9 @@ def _left_out(planting: Planting) -> None:
 @register("Dones lose packets", "nothing that a client answered is lost", 1)
 def _cut_dones(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
-        before(self, replace(done, packets=[]) if self._core.repeated else done, payload, now_ns)
+        before(self, replace(done, packets=[]) if self.repeated else done, payload, now_ns)
 
-    before: Any = planting.swap(Door, "done", done)
+    before: Any = planting.swap(Clients, "on_done", done)
 
 
 @register("who leaves is not written", "leaving is an input of the tick whose Done is owed", 71)
@@ -187,12 +188,12 @@ def _unwritten_leave(planting: Planting) -> None:
         before(self, state, closing)
         closing.owing = []
 
-    before: Any = planting.swap(Door, "leave_owing", leave_owing)
+    before: Any = planting.swap(Clients, "leave_owing", leave_owing)
 
 
 @register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
 def _unsaid(planting: Planting) -> None:
-    planting.swap(Sessions, "say_owed", lambda self, name, now_ns: None)
+    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
 
 
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)

@@ -17,13 +17,13 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Final, TypeVar
 
+from foosim.client.control import Control, NoAnswer, RequestRefused
 from foosim.common.errors import BadValue, Refused
 from foosim.console.live.following import Following, World
 from foosim.console.live.presence import HERE, away
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.runtime.transport.inbox import Inbox, Item
-from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
     *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "network"),

@@ -23,10 +23,10 @@ from foosim.console.report.map import Map, MapMaker
 from foosim.console.report.tallies import BinTally, LinkTally, RuleTally, SenderTally
 from foosim.console.shown.asked import edit_text, moves
 from foosim.console.shown.timeline import WorldEvents
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import event_of
 from foosim.vhub.links.summary import delay_of, residual_of
-from foosim.vhub.network.link_settings import Profiles
 from foosim.vhub.network.timeline import Timeline
 from foosim.world.frame import Frame, chain_next
 
@@ -298,9 +298,8 @@ class _Gathered:
         return self._channels[name]
 
     def _profile(self, row: PacketRow) -> Radio:
-        return (
-            Profiles(self._deployment, self._deployment.network).find(row.source, row.destination, row.channel).settings
-        )
+        profiles = Profiles(self._deployment.network, self._deployment.carriers())
+        return profiles.find(row.source, row.destination, row.channel).settings
 
     def take_tick(self, row: TickMark) -> None:
         for edit in row.edits:
@@ -365,12 +364,10 @@ class _Gathered:
         )
 
     def _radios(self) -> Iterator[RadioText]:
-        network, carriers = self._deployment.network, self._deployment.carriers()
-        carried = Counter(
-            radio
-            for endpoint in self._deployment.endpoints()
-            for radio in network.radios_of(endpoint, carriers.get(endpoint, ""))
-        )
+        network = self._deployment.network
+        profiles = Profiles(network, self._deployment.carriers())
+        ends = self._deployment.endpoints()
+        carried = Counter(radio for endpoint in ends for radio in profiles.radios_of(endpoint))
         for name, radio in network.radios.items():
             yield RadioText(name, radio.preset, carried[name], radio_text(radio))
 

@@ -15,10 +15,10 @@ from itertools import islice
 from math import dist
 from typing import Any, Final
 
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.links.fabric import name_of
-from foosim.vhub.network.link_settings import Profiles
 from foosim.world.frame import Frame
 from foosim.world.scene import ORIGIN, Scene, Vector
 
@@ -109,7 +109,7 @@ class Links:
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._world = World(deployment, deployment.network)
-        self._profiles = Profiles(deployment, deployment.network)
+        self._profiles = Profiles(deployment.network, deployment.carriers())
         self._windows = Windows()
         self._on_air: dict[Key, bool] = {}
         self._ends: dict[str, int | None] = {}
@@ -199,7 +199,7 @@ class Links:
         found = self._on_air.get(key)
         if found is None:
             source, destination, name = key
-            rules = self._deployment.network.rules_for(source, destination)
+            rules = self._profiles.rules_for(source, destination)
             profiles = (self._profiles.of_rule(rule, source, destination) for rule in rules)
             found = any(profile.settings.is_on_air for profile in profiles if name_of(profile) == name)
             self._on_air[key] = found

@@ -11,11 +11,11 @@ from pydantic import ValidationError
 
 from foosim.analysis.settings_text import impairments_text, radio_text, rule_ends
 from foosim.common.errors import Refused
+from foosim.deployment.network.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles, over
 from foosim.deployment.network.rules import LinkRule, event_of
 from foosim.deployment.schema import Deployment
-from foosim.vhub.links.summary import Use, meaning_of
-from foosim.vhub.links.summary_text import meaning_line
-from foosim.vhub.network.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles, over
+from foosim.vhub.links.summary import SharedSettings, summary_of
+from foosim.vhub.links.summary_text import summary_line
 from foosim.vhub.network.timeline import FOREVER_NS, Cut, Hold, Settings, Timeline
 
 TEXTS_KEPT: Final = 256
@@ -27,7 +27,7 @@ class RuleTexts:
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._endpoints = deployment.endpoints()
-        self._profiles = Profiles(deployment, deployment.network)
+        self._profiles = Profiles(deployment.network, deployment.carriers())
         self._asked: tuple[tuple[int, str], ...] = ()
         self._timeline = self._timeline_of(())
         self._texts: dict[tuple[object, ...], str] = {}
@@ -53,7 +53,7 @@ class RuleTexts:
             self._asked, self._timeline = events, self._timeline_of(events)
         cut = [*self._cuts(source, destination, at_ns)]
         lines: list[str] = []
-        for rule in self._deployment.network.rules_for(source, destination):
+        for rule in self._profiles.rules_for(source, destination):
             profile = self._profiles.of_rule(rule, source, destination)
             changes = self._timeline.changes_of(profile.rule, source, destination)
             in_force = [change for change in changes if change.start_ns <= at_ns < change.end_ns]
@@ -127,5 +127,5 @@ def _lines(
     for change, text in zip(in_force, said, strict=True):
         settings = over(settings, change.changes)
         yield f"changed: {text}"
-    meaning = meaning_of(Use(profile.rule, profile.radio, settings), deployment.asset_files)
-    yield f"which is {meaning_line(meaning)}"
+    summary = summary_of(SharedSettings(profile.rule, profile.radio, settings), deployment.asset_files)
+    yield f"which is {summary_line(summary)}"

@@ -6,7 +6,7 @@ or from the first one that both ends carry. Without rule and radio a link is as 
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Annotated, Final, Literal
@@ -180,48 +180,6 @@ class Network(SpecBase):
     links: list[LinkRule] = Field(default=[], max_length=LINK_RULES_MAX)
     events: list[Event] = Field(default=[], max_length=EVENTS_MAX)
 
-    def rule_for(self, source: str, destination: str, channel: str | None = None) -> LinkRule | None:
-        """The first rule that matches the directed pair, or None."""
-        return next((rule for rule in self.links if rule.matches(source, destination, channel)), None)
-
-    def rules_for(self, source: str, destination: str) -> Iterator[LinkRule | None]:
-        """Yield each rule that packets on some channel meet between the directed pair; None where they meet none."""
-        for rule in self.links:
-            if rule.matches(source, destination):
-                yield rule
-                if rule.channels is None:
-                    return
-        yield None
-
-    def way(self, rule: LinkRule | None, source: str, destination: str, carriers: Mapping[str, str]) -> str | None:
-        """The radio by which packets that meet a rule go; empty for that of the defaults, None where there is no way.
-
-        `carriers` are the robots that endpoints are on board of. A rule's `via` puts who carries nothing on that radio;
-        who carries others needs one with the same air.
-        """
-        bodies = carriers.get(source, source), carriers.get(destination, destination)
-        mine, theirs = self.radios_of(source, bodies[0]), self.radios_of(destination, bodies[1])
-        if rule is not None and rule.via is not None:
-            air = self.air_of(rule.via)
-            hears = all(not carried or air in map(self.air_of, carried) for carried in (mine, theirs))
-            return rule.via if hears else None
-        if bodies[0] == bodies[1] or not mine or not theirs:
-            return ""
-        nothing = None if rule is None else ""
-        return next((radio for radio in mine if radio in theirs), nothing)
-
     def place_of(self, endpoint: str) -> Site | None:
         """The place that is written for an endpoint."""
         return next((place for glob, place in self.places.items() if fnmatchcase(endpoint, glob)), None)
-
-    def air_of(self, radio: str) -> str:
-        """The channel of a radio: others with the same share it."""
-        return self.radios[radio].air or radio
-
-    def radios_of(self, endpoint: str, carrier: str = "") -> list[str]:
-        """The radios that an endpoint has: its own, or those of the robot that it is on."""
-        for name in (endpoint, carrier):
-            for glob, radios in self.robots.items() if name else ():
-                if fnmatchcase(name, glob):
-                    return radios
-        return []

@@ -265,7 +265,7 @@ class Flight:
         """Run to the end; raise Broken for a law that does not hold, or what a core asserts."""
         try:
             self.system.run()
-            end = self.system.supervisor.end
+            end = self.system.supervisor.state.end
             if end is None or end.reason != "done":
                 raise Broken(f"the run ended: {'not at all' if end is None else end.reason}")
             self.laws.end(self.system, self.plan.nodes)
@@ -315,7 +315,7 @@ def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
     """Return the chain of a world in which nothing happens."""
     flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
     flight.run()
-    return flight.system.supervisor.chain
+    return flight.system.supervisor.state.chain
 
 
 def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
@@ -329,12 +329,12 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks
     try:
         flight.run()
         if not CHANGES_THE_WORLD & {*plan.kinds}:
-            same = flight.system.supervisor.chain == undisturbed(text, name, seed % WORLDS, ticks)
+            same = flight.system.supervisor.state.chain == undisturbed(text, name, seed % WORLDS, ticks)
             hold(same, "the world is not the one that would have been")
     except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
         flown.broken = f"{type(error).__name__}: {error}"  # what a core raises would have ended its process
-    system, told = flight.system, flight.system.supervisor.recovery.recovered
-    flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.chain.hex(), flight.seen
+    system, told = flight.system, flight.system.supervisor.state.recovered
+    flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.state.chain.hex(), flight.seen
     flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9
     flown.losses = sum(entry.what == "node" for entry in told)
     flown.joins = sum(entry.what == "join" for entry in told)

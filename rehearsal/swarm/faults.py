@@ -91,7 +91,7 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
 
     def do(system: System) -> None:
         _end(system, name, names)
-        system.at_tick(system.supervisor.frame.tick + back, partial(revive, system, name))
+        system.at_tick(system.supervisor.state.frame.tick + back, partial(revive, system, name))
 
     return Fault(_tick(dice), "kill", f"kill {name}", _here(name, do))
 
@@ -105,14 +105,14 @@ def _end(system: System, name: str, names: Sequence[str]) -> None:
 
 def _is_none_left(system: System, names: Sequence[str]) -> bool:
     """Whether no node is there that may take part."""
-    stopped = system.supervisor.roster.stopped
+    stopped = system.supervisor.state.roster.stopped
     return not any(name in system.processes and name not in stopped for name in names)
 
 
 def _leave_one(system: System, names: Sequence[str]) -> None:
     """Start a node if none is left: those that are to come back wait for ticks that nobody would compute."""
     if _is_none_left(system, names):
-        stopped = system.supervisor.roster.stopped
+        stopped = system.supervisor.state.roster.stopped
         name = next((name for name in names if name not in stopped), names[0])
         ask(system, "start", node=name)
         revive(system, name)
@@ -130,7 +130,7 @@ def _stop(dice: Dice, names: Sequence[str]) -> Fault:
     def do(system: System) -> None:
         asked = [ask(system, "stop", node=node)]
         when_answered(system, asked, partial(_leave_one, names=names))
-        tick = system.supervisor.frame.tick
+        tick = system.supervisor.state.frame.tick
         system.at_tick(tick + 10, partial(_here(node, lambda found: _end(found, node, names)), system))
         system.at_tick(tick + 15, partial(ask, system, "start", node=node))
         system.at_tick(tick + 20, partial(revive, system, node))
@@ -144,7 +144,7 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
 
     def do(system: System) -> None:
         core = system.processes[name].core
-        if len(system.supervisor.members) > 1 and isinstance(core, NodeCore) and core.frame is not None:
+        if len(system.supervisor.state.members) > 1 and isinstance(core, NodeCore) and core.frame is not None:
             frame = core.frame
             values = frame.values.copy()
             values[int(place * len(values))] += 1.0
@@ -232,7 +232,7 @@ def _move(dice: Dice, names: Sequence[str]) -> Fault:
     robot, node = dice.one_of(OF_TABLE), dice.one_of(names)
 
     def do(system: System) -> None:
-        others = sorted(system.supervisor.owners)  # of a hall, the robots in the same places of the list
+        others = sorted(system.supervisor.state.owners)  # of a hall, the robots in the same places of the list
         chosen = robot if robot in others else others[OF_TABLE.index(robot) % len(others)]
         ask(system, "move", robot=chosen, node=node)
 

@@ -23,11 +23,11 @@ from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws, hold
 from foosim.rehearsal.swarm.world_bounds import strays
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import CommitRecord, HeadRecord, OrderedRecord, RecoveredRecord, RequestRecord
+from foosim.supervisor.records import Checkpoint, CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
-from foosim.vhub.records import Closing, HubRecord, TickRecord
-from foosim.vhub.records import fold as fold_hub
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from foosim.vhub.state.records import fold as fold_hub
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
 from foosim.world.initial_state import initial_frame
@@ -109,7 +109,7 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
-        elif isinstance(record, HeadRecord) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
+        elif isinstance(record, Checkpoint) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
             self._branches(*record.branch)
             self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
         elif isinstance(record, OrderedRecord):
@@ -304,10 +304,10 @@ class Laws:
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""
         supervisor = system.supervisor
-        hold(supervisor.chain == self._chains[self.committed], "the chain is not that of the committed frames")
+        hold(supervisor.state.chain == self._chains[self.committed], "the chain is not that of the committed frames")
         members = [f"n{number}" for number in range(1, nodes + 1)]
-        hold(list(supervisor.members) == members, f"healed, only {', '.join(supervisor.members)} take part")
-        strayed = {robot: owner for robot, owner in supervisor.owners.items() if owner != self._chosen[robot]}
+        hold(list(supervisor.state.members) == members, f"healed, only {', '.join(supervisor.state.members)} take part")
+        strayed = {robot: owner for robot, owner in supervisor.state.owners.items() if owner != self._chosen[robot]}
         hold(not strayed, f"healed, {strayed} are not where they belong")
         asked = [identity for identity in system.people.asked if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
@@ -315,11 +315,11 @@ class Laws:
         hold(not untold, f"what ticks {sorted(untold)} tell is not in the capture")
         history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
         hold(
-            history.chain == self._chains[self.committed] and history.frame.digest == supervisor.frame.digest,
+            history.chain == self._chains[self.committed] and history.frame.digest == supervisor.state.frame.digest,
             "another chain is folded",
         )
-        hold(history.epoch is not None and history.epoch.epoch == supervisor.epoch, "another epoch is folded")
-        hold(history.owners == supervisor.owners and not history.edits, "other owners or edits are folded")
+        hold(history.epoch is not None and history.epoch.epoch == supervisor.state.epoch, "another epoch is folded")
+        hold(history.owners == supervisor.state.owners and not history.edits, "other owners or edits are folded")
         state = system.hub.state
         assert state is not None
         for folded, _ in fold_hub(self._deployment, self._journals[channels.VHUB]):

@@ -16,7 +16,7 @@ import msgspec
 from foosim.common import limits
 from foosim.deployment.network.rules import EVENTS_MAX
 from foosim.deployment.schema import Deployment
-from foosim.supervisor.requests import ANSWERS_KEPT
+from foosim.supervisor.records import ANSWERS_KEPT
 from foosim.vhub.line_of_sight.occlusion import PAIRS_KEPT, Sight
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
 from foosim.vhub.radio.propagation import LOSS_MAX_DB
@@ -27,9 +27,9 @@ from foosim.world.layout import Layout
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
     "Held._messages": limits.HELD_MESSAGES_MAX,
-    "Requests._answers": ANSWERS_KEPT,
-    "Issued.by_tick": limits.EDITED_TICKS_KEPT,
-    "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
+    "RunState.answers": ANSWERS_KEPT,
+    "EditLog.by_tick": limits.EDITED_TICKS_KEPT,
+    "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
     "_Memory._newer": PAIRS_KEPT,

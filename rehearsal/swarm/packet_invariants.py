@@ -15,10 +15,10 @@ from foosim.protocol.messages import Commit, Deliveries, Done, Down, Go, Samples
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.system import System
-from foosim.vhub.naming import in_branch
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
-from foosim.vhub.records import Closing, HubRecord, TickRecord, fold, world_packets
-from foosim.vhub.state import HubState
+from foosim.vhub.state.downlinks import retag
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord, fold, world_packets
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
 from foosim.world.sampling import Sampling
@@ -229,7 +229,7 @@ class PacketLaws:
 
     def _name(self, branch: int) -> None:
         for known in (self.said, self._written):
-            known.update({tick: in_branch(Deliveries, raw, branch) for tick, raw in known.items()})
+            known.update({tick: retag(Deliveries, raw, branch) for tick, raw in known.items()})
         for downlinks in self._downlinks.values():
             named = {number: decode_any(Go | Down, raw) for number, raw in downlinks.items()}
             downlinks.update({number: encode(replace(down, branch=branch)) for number, down in named.items()})

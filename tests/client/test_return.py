@@ -14,11 +14,11 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.messages import Build, ClientWelcome, Deliveries, Down, Epoch, Sent, Up
 from foosim.vhub.core import HubCore
-from foosim.vhub.records import HubRecord, TickRecord
-from foosim.vhub.resume import recall
+from foosim.vhub.state.records import HubRecord, TickRecord
+from foosim.vhub.state.resume import recall
 from tests.client.test_core import DEPLOYMENT, NAME, TEXT, Air, published
 
 MS: Final = 1_000_000
@@ -63,7 +63,7 @@ class Storm(Air):
             owners, at = [(robot, "n1") for robot in DEPLOYMENT.robots], self.closed()
             epoch = Epoch(self.epoch, at, bytes(32), ["n1"], owners, [], b"", self.epoch, at)
             self.tell(channels.EPOCH, channels.SUPERVISOR, encode(epoch))
-        self.tell(channels.PROCEED, "vhub", encode(Proceed("vhub", "boot-2", self.epoch if branches else 0)))
+        self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", "boot-2", self.epoch if branches else 0)))
         self.tick = self.closed()
 
     def settle(self, *clients: ClientCore) -> None:

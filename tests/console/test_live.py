@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from foosim.client.control import Control
 from foosim.common.errors import BadValue
 from foosim.console.live import live_source
 from foosim.console.live.live_source import LiveSource
@@ -19,7 +20,6 @@ from foosim.launcher.run_options import RunOptions, launch_of
 from foosim.protocol.messages import Answer
 from foosim.runtime.run_folder import NoRun, create_run
 from foosim.runtime.transport.inbox import Inbox
-from foosim.supervisor.control import Control
 from tests.console.test_following import described, frame_of, status
 from tests.replay.conftest import TABLE
 
@@ -131,7 +131,7 @@ def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
     )
 
 
-class Standing(Control):
+class ResumeState(Control):
     """A run that is not moved by anybody, without a wire: it remembers what it was asked for."""
 
     def __init__(self) -> None:
@@ -157,7 +157,7 @@ class Standing(Control):
 
 def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_source, "UNSEEN_S", 0.0)
-    control = Standing()
+    control = ResumeState()
 
     async def scene() -> None:
         source = LiveSource("mine", lambda give_up: control, None)

@@ -320,7 +320,7 @@ class Running:
         """Whether this process has no more to do: the run has ended, or it was refused."""
         core = self.core(name)
         if name == SUPERVISOR:
-            return core.end is not None
+            return core.state.end is not None
         return bool(core.ended or getattr(core, "refusal", "") or (name not in PLAYERS and core.member.refusal))
 
     def _watch(self, traced: Traced) -> None:

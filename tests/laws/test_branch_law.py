@@ -15,7 +15,7 @@ from foosim.common import limits
 from foosim.node.inputs import Inputs
 from foosim.protocol import channels
 from foosim.protocol.codec import decode_any
-from foosim.protocol.hub_messages import Standing
+from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import ClientWelcome, Epoch
 from foosim.rehearsal.bus import CALM, Weather
 from foosim.rehearsal.failures import Broken
@@ -25,10 +25,10 @@ from foosim.rehearsal.swarm.campaign import Flight, Plan
 from foosim.rehearsal.swarm.faults import TICKS, Fault, ask
 from foosim.rehearsal.swarm.invariants import Laws
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import HeadRecord, Record, fold
-from foosim.supervisor.requests import Requests
-from foosim.vhub.records import Closing
-from foosim.vhub.state import HubState
+from foosim.supervisor.records import Checkpoint, Record, fold
+from foosim.supervisor.state import RunState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing
 from foosim.world.edits import Add, Push
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -63,7 +63,7 @@ class Flown(Flight):
     @property
     def branches(self) -> list[tuple[int, int]]:
         """The tick and the lost ticks of each branch, as the account has it."""
-        told = [entry for entry in self.system.supervisor.recovery.recovered if entry.what == "vhub"]
+        told = [entry for entry in self.system.supervisor.state.recovered if entry.what == "vhub"]
         found = [(re.fullmatch(BRANCH, entry.reason), entry.tick) for entry in told]
         assert all(match is None or int(match[1]) == tick for match, tick in found)
         return [(tick, int(match[2])) for match, tick in found if match is not None]
@@ -144,7 +144,7 @@ def test_edits_that_are_not_known_any_more_are_told(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Laws, "close", lambda self, closing: None)
     monkeypatch.setattr(Laws, "lose_hub", lambda self, records, captured: None)
     flown = Flown([(90, push), (100, push), (130, lose(70))])
-    (entry,) = [entry for entry in flown.system.supervisor.recovery.recovered if "branch" in entry.reason]
+    (entry,) = [entry for entry in flown.system.supervisor.state.recovered if "branch" in entry.reason]
     assert re.fullmatch(BRANCH + r", and what requests changed up to tick 9\d", entry.reason)
 
 
@@ -162,7 +162,7 @@ def test_both_journals_have_lost_their_ends(hub: int, supervisor: int, nodes_too
         system.later(40 * MS, partial(system.start, channels.SUPERVISOR))
 
     flown = Flown([(3, lambda system: ask(system, "move", robot="camera", node="n2")), (130, cut_power)])
-    (entry,) = [entry for entry in flown.system.supervisor.recovery.recovered if entry.reason.startswith("branch")]
+    (entry,) = [entry for entry in flown.system.supervisor.state.recovered if entry.reason.startswith("branch")]
     assert entry.tick <= 130 - min(hub, 120) + 1
     assert {tick: flown.frames[tick] for tick in range(entry.tick + 1)}.items() <= undisturbed().frames.items()
 
@@ -177,14 +177,14 @@ def test_a_supervisor_that_has_lost_the_branch_learns_of_it_from_the_vhub() -> N
 
     def lose_branch(system: System) -> None:
         heads = [decode_any(Record, raw) for raw in system.journal]
-        at = next(at for at, head in enumerate(heads) if isinstance(head, HeadRecord) and head.branch[0])
+        at = next(at for at, head in enumerate(heads) if isinstance(head, Checkpoint) and head.branch[0])
         lose_supervisor(system, len(system.journal) - at)
-        ends.extend([fold(system.supervisor.deployment, system.journal).frame.tick, state(system).closed])
+        ends.extend([fold(system.supervisor.state.deployment, system.journal).frame.tick, state(system).closed])
         system.later(30 * MS, partial(system.start, channels.SUPERVISOR))
 
     flown = Flown([(110, lose(60)), (110, lambda system: system.later(310 * MS, partial(lose_branch, system)))])
     assert 0 < ends[1] < ends[0] - 1, "the vHub lives before the journal's end"
-    assert flown.system.supervisor.branches.number == state(flown.system).branch > 0
+    assert flown.system.supervisor.state.branch == state(flown.system).branch > 0
 
 
 @pytest.mark.parametrize("more", [0, 30])
@@ -194,24 +194,24 @@ def test_a_supervisor_that_ends_before_the_branchs_first_epoch_goes_on_with_it(
     """The branch is told once; where the vHub's machine is lost once more meanwhile, another one begins before it."""
 
     def cut_power(system: System) -> None:
-        begin = system.supervisor.branches.begin
+        begin = system.supervisor.rollback.begin
 
-        def end_behind(standing: Standing, now_ns: int) -> None:
+        def end_behind(standing: ResumeState, now_ns: int) -> None:
             begin(standing, now_ns)
             system.end_amid(channels.SUPERVISOR, len(system.supervisor.actions))
             system.later(100 * MS, partial(system.start, channels.SUPERVISOR))
             if more:
                 system.later(10 * MS, partial(lose_hub, system, more, 50 * MS))
 
-        monkeypatch.setattr(system.supervisor.branches, "begin", end_behind)
+        monkeypatch.setattr(system.supervisor.rollback, "begin", end_behind)
         lose_hub(system, 40)
 
     flown = Flown([(110, cut_power)])
-    told = [entry.what for entry in flown.system.supervisor.recovery.recovered]
+    told = [entry.what for entry in flown.system.supervisor.state.recovered]
     assert told == ["vhub", *["vhub"] * (more > 0), "supervisor"]
     (first, *second) = flown.branches
     assert sum(first) >= 110 and all(tick < first[0] == tick + lost for tick, lost in second)
-    assert flown.system.supervisor.branches.number == 2, "that of the epoch that nobody had heard of"
+    assert flown.system.supervisor.state.branch == 2, "that of the epoch that nobody had heard of"
 
 
 def test_a_vhub_that_ends_before_the_branchs_first_epoch_goes_on_with_it() -> None:
@@ -239,15 +239,15 @@ def test_a_branch_is_named_behind_epochs_that_only_nodes_know(supervisor: int) -
         ask(system, "move", robot="camera", node="n2")
 
     def cut_power(system: System) -> None:
-        epochs.append(system.supervisor.epoch)
+        epochs.append(system.supervisor.state.epoch)
         lose_supervisor(system, supervisor)
-        left = fold(system.supervisor.deployment, system.journal).epoch
+        left = fold(system.supervisor.state.deployment, system.journal).epoch
         epochs.append(0 if left is None else left.epoch)
         lose_hub(system, 60, 50 * MS)
         system.later(40 * MS, partial(system.start, channels.SUPERVISOR))
 
     flown = Flown([(110, move), (130, cut_power), (160, move)])
-    assert epochs == [2, 1] and flown.system.supervisor.branches.number == 3
+    assert epochs == [2, 1] and flown.system.supervisor.state.branch == 3
 
 
 def _keeps_deliveries(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,7 +269,7 @@ def _goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _forgets_requests(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Requests, "set_back", lambda self, tick: self._edits.clear())
+    monkeypatch.setattr(RunState, "reorder_from", lambda self, tick: self.coming_edits.clear())
 
 
 @pytest.mark.parametrize("plant", [_keeps_deliveries, _goes_on, _forgets_requests])

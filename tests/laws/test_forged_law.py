@@ -134,7 +134,7 @@ def test_strangers_on_the_radio_plane_change_nothing(disturbed: Disturbed, seed:
     def speak() -> None:
         channel = talk.rng.choice((channels.UP, channels.CLIENT_HELLO))
         name = talk.rng.choice((*PLAYERS, "n1", "camera", NOBODY))
-        message = talk.about(channel, disturbed.system.supervisor.frame.tick)
+        message = talk.about(channel, disturbed.system.supervisor.state.frame.tick)
         disturbed.put(channel, name, replace(message, name=name, boot=talk.rng.choice(("other", "b", "x" * 32))))
 
     for _ in range(200):
@@ -151,9 +151,9 @@ def test_whatever_well_formed_messages_come_the_run_ends_in_order(disturbed: Dis
         supervisor = disturbed.system.supervisor
         of_runs = [channel for channel in CHANNELS if channel.plane is not Plane.REPLAY]
         channel = talk.rng.choice([channel for channel in of_runs if channel is not channels.END])
-        message = talk.about(channel, supervisor.frame.tick)
+        message = talk.about(channel, supervisor.state.frame.tick)
         name = talk.rng.choice((*disturbed.system.processes, "operator", NOBODY))
-        truths = {"sender": name, "node": name, "name": name, "epoch": supervisor.epoch}
+        truths = {"sender": name, "node": name, "name": name, "epoch": supervisor.state.epoch}
         for field, truth in truths.items():
             if field in message.__struct_fields__ and talk.rng.random() < 0.8:
                 message = replace(message, **{field: truth})
@@ -162,6 +162,6 @@ def test_whatever_well_formed_messages_come_the_run_ends_in_order(disturbed: Dis
     for _ in range(40):
         disturbed.at(talk.rng.randrange(disturbed.ticks - 20), speak)
     result = disturbed.go()
-    assert disturbed.system.supervisor.finished and result.json["reason"]
+    assert disturbed.system.supervisor.state.finished and result.json["reason"]
     ticks = [frame.tick for frame in disturbed.frames]
     assert all(later == earlier + 1 for earlier, later in pairwise(ticks)), "history is written once"

@@ -30,7 +30,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.runtime.journal import Journal, read_records
 from foosim.runtime.run_folder import RunFolder, RunInfo
-from foosim.vhub.records import fold
+from foosim.vhub.state.records import fold
 from foosim.world.mesh import AssetError, read_mesh
 from foosim.world.robot_packets import Delivered
 
@@ -290,7 +290,7 @@ def test_spoiled_requests_are_answered_or_refused(fuzz: Fuzz, disturbed: Disturb
     def bring(rng: random.Random, count: int) -> Iterator[bytes]:
         process = None
         for number in range(count):
-            if process is None or process.core.end is not None or number % 500 == 0:
+            if process is None or process.core.state.end is not None or number % 500 == 0:
                 process = running().system.processes[channels.SUPERVISOR]
             verb = rng.choice(sorted(VERBS))
             arguments = msgspec.json.encode(VERBS[verb])

@@ -23,10 +23,9 @@ from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.journals import ENDINGS, Ending
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.status import status
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
@@ -56,7 +55,7 @@ class Seen:
 
     def watch(self, traced: Traced) -> None:
         if traced.process == channels.SUPERVISOR and traced.channel in HUB_HEARD and traced.name == channels.VHUB:
-            said = status(self.systems[0].supervisor, traced.now_ns)
+            said = self.systems[0].supervisor.status(traced.now_ns)
             counts = said["packets"]["offered"], said["links_in_all"], len(said["clients"])
             self.shown.append((said["vhub_away"], *counts))
             self.lost.append(said["vhub_lost"])
@@ -197,8 +196,8 @@ def test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused() -> N
 
     def forge(system: System) -> None:
         cores.append(system.hub)
-        epochs.append(system.supervisor.epoch)
-        owners = [(robot, "n2") for robot in system.supervisor.owners]
+        epochs.append(system.supervisor.state.epoch)
+        owners = [(robot, "n2") for robot in system.supervisor.state.owners]
         old = Epoch(1, 0, bytes(32), ["n1", "n2"], owners, [], b"")
         system.bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, encode(old), system.bus.now_ns)
 
@@ -272,7 +271,7 @@ def test_a_vhub_that_dies_before_the_run_begins_is_waited_for() -> None:
     early: list[bool] = []
 
     def kill(system: System) -> None:
-        early.append(not system.supervisor.is_open)
+        early.append(not system.supervisor.state.is_open)
         system.kill_hub("now", 40 * MS)
 
     def prepare(system: System) -> None:
@@ -293,7 +292,7 @@ def test_a_vhub_dies_that_a_supervisor_has_just_recalled(what: str) -> None:
     def watch(traced: Traced) -> None:
         who = channels.VHUB if what == "publish" else channels.SUPERVISOR
         is_hello = (traced.process, traced.what, traced.channel, traced.name) == (who, what, "hello", channels.VHUB)
-        if is_hello and systems and systems[0].supervisor.take_over is not None and not kills:
+        if is_hello and systems and systems[0].supervisor.state.is_resuming and not kills:
             kills.append(traced.now_ns)
             systems[0].later(what == "receive", partial(systems[0].kill_hub, "now", 40 * MS))
 
@@ -317,9 +316,9 @@ def test_an_epoch_of_before_is_no_answer_to_a_supervisor_that_was_started_again(
 
     def watch(traced: Traced) -> None:
         is_standing = (traced.process, traced.what, traced.channel) == (channels.VHUB, "publish", "standing")
-        if is_standing and systems and systems[0].supervisor.take_over is not None and not losses:
+        if is_standing and systems and systems[0].supervisor.state.is_resuming and not losses:
             losses.append(traced.now_ns)
-            bus, epoch = systems[0].bus, systems[0].supervisor.epoch_payload
+            bus, epoch = systems[0].bus, systems[0].supervisor.state.epoch_payload
             bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, epoch, bus.now_ns)
             bus.cut_off(channels.VHUB, bus.now_ns + MS, hears=False)
 

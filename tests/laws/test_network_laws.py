@@ -19,8 +19,8 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.records import Closing
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_frame
 from foosim.world.robot_packets import RobotPacket

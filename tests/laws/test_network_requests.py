@@ -19,7 +19,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -96,7 +96,7 @@ def ordering(ticks: Sequence[int]) -> Callable[[System], None]:
 
     def order(system: System) -> None:
         for tick, (_, event) in zip(ticks, EVENTS, strict=True):
-            system.supervisor.requests.order(tick - 1, [Disrupt(encode_json(event).decode())])
+            system.supervisor.state.order(tick - 1, [Disrupt(encode_json(event).decode())])
 
     return lambda system: system.at_tick(1, lambda: order(system))
 

@@ -25,7 +25,7 @@ from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -129,10 +129,10 @@ def test_a_flood_is_refused_to_the_last_message(disturbed: Disturbed) -> None:
 
 def lies_to_nodes(system: System) -> list[Lie]:
     core = system.supervisor
-    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    tick, epoch, frame = core.state.frame.tick, core.state.epoch, core.state.frame
     part = Part(epoch, tick + 1, "n2", bytes(32), [], b"", b"", [])
     push: list[Edit] = [Push("ball", (1.0, 0.0, 0.0))]
-    owners = sorted(core.owners.items())
+    owners = sorted(core.state.owners.items())
     new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [], b"")
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.PART, "n2", replace(part, node="n1")),
@@ -167,10 +167,10 @@ def lies_to_nodes(system: System) -> list[Lie]:
 
 def lies_to_the_hub(system: System) -> list[Lie]:
     core = system.supervisor
-    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    tick, epoch, frame = core.state.frame.tick, core.state.epoch, core.state.frame
     commit = Commit(epoch, FAR, frame.digest, frame.values.tobytes(), [], [], True)
     sample = RobotPacket("camera", 0, "", "ball", b"lie")
-    samples = Samples(tick + 1, bytes(32), "n1", list(core.owners), [sample])
+    samples = Samples(tick + 1, bytes(32), "n1", list(core.state.owners), [sample])
     command = Sent(10**9, "red.goal", "position", 0, COMMAND)
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.COMMIT, VHUB, commit),
@@ -179,7 +179,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.SAMPLES, "n1", replace(samples, node="n2")),
         (channels.SAMPLES, "n1", samples),
         (channels.SAMPLES, "n1", replace(samples, tick=FAR)),
-        (channels.PROCEED, VHUB, Proceed(VHUB, "other", FAR)),
+        (channels.RESUME_GRANT, VHUB, ResumeGrant(VHUB, "other", FAR)),
         (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
         (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
@@ -200,7 +200,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
 
 
 def lies_to_the_supervisor(system: System) -> list[Lie]:
-    tick, epoch = system.supervisor.frame.tick, system.supervisor.epoch
+    tick, epoch = system.supervisor.state.frame.tick, system.supervisor.state.epoch
     part = Part(epoch, tick + 1, "n1", bytes(32), [], b"", b"", [])
     hello = Hello("node", "n1", "other", limits.PROTOCOL_VERSION, "", bytes(32))
     beat = Heartbeat("n1", FAR, FAR, "", "player-red", float("nan"), b"{}")
@@ -221,7 +221,11 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
         (channels.FETCH, "n1", Fetch("n1", "boot-1", bytes(32), 0)),
         (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
-        (channels.STANDING, VHUB, Standing(VHUB, "other", "boot", FAR, FAR, 0, b"", bytes(32), [], 0, True, True)),
+        (
+            channels.RESUME_STATE,
+            VHUB,
+            ResumeState(VHUB, "other", "boot", FAR, FAR, 0, b"", bytes(32), [], 0, True, True),
+        ),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
         (channels.HEARTBEAT, "n1", beat),
         (channels.HEARTBEAT, NOBODY, replace(beat, sender=NOBODY)),

@@ -41,7 +41,7 @@ class Contacts:
 
 def shuffle(system: System, seed: int, moves: int = MOVES, rebuilds: int = REBUILDS) -> None:
     """Move random robots to random nodes and rebuild random engines, at ticks drawn by the seed."""
-    robots = sorted(system.supervisor.owners)
+    robots = sorted(system.supervisor.state.owners)
     nodes = sorted(system.solvers)
     key = draw_key(seed, "moves")
     for number in range(moves):
@@ -49,7 +49,7 @@ def shuffle(system: System, seed: int, moves: int = MOVES, rebuilds: int = REBUI
         robot = robots[words[0] % len(robots)]
 
         def move(robot: str = robot, word: int = words[1]) -> None:
-            others = [node for node in nodes if node != system.supervisor.owners[robot]]
+            others = [node for node in nodes if node != system.supervisor.state.owners[robot]]
             if others:
                 system.request("move", robot=robot, node=others[word % len(others)])
 

@@ -24,7 +24,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
 from foosim.vhub.core import HubCore
-from foosim.vhub.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.state.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -102,12 +102,12 @@ class LateNews(HubCore):
 
     away, left = b"", -1
 
-    def say_heartbeat(self) -> None:
+    def send_heartbeat(self) -> None:
         assert self.state is not None
-        if self.door.absences.report()["over"]:
+        if self.clients.absences.report()["over"]:
             self.left = self.left if self.left >= 0 else self.state.closed
         else:
-            super().say_heartbeat()
+            super().send_heartbeat()
             self.away = encode(self.heartbeat())
 
     def advance(self, now_ns: int) -> None:

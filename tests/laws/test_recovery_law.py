@@ -20,8 +20,8 @@ from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import OPERATOR, Settings, System
-from foosim.supervisor.node_loss import Recovery
-from foosim.vhub.records import Closing
+from foosim.supervisor.node_loss import NodeLoss
+from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
@@ -88,7 +88,9 @@ def test_robots_go_back_to_the_node_that_they_were_adopted_from() -> None:
     owned: list[dict[str, list[str]]] = []
 
     def look(system: System) -> None:
-        owned.append({name: sorted(r for r, o in system.supervisor.owners.items() if o == name) for name in NODES})
+        owned.append(
+            {name: sorted(r for r, o in system.supervisor.state.owners.items() if o == name) for name in NODES}
+        )
 
     run = disturbed([(20, look), (30, kill("n2")), (60, look), (70, start("n2")), (120, look)])
     before, without, after = owned
@@ -110,7 +112,7 @@ def test_the_last_node_is_lost_and_the_world_waits_for_one() -> None:
     stands: list[int] = []
 
     def soon(system: System) -> None:
-        stands.append(system.supervisor.frame.tick)
+        stands.append(system.supervisor.state.frame.tick)
         system.start("n3")
 
     def fault(system: System) -> None:
@@ -217,16 +219,18 @@ def test_robots_go_back_also_when_the_supervisor_ends_amid_an_epoch(
     calls: list[int] = []
     systems: list[System] = []
 
-    def opens(self: Recovery, *arguments: Any) -> None:
+    def opens(self: NodeLoss, *arguments: Any) -> None:
         calls.append(amid)
         if len(calls) == call:
             restart(0, amid)(systems[0])
         before(self, *arguments)
 
-    before = Recovery.open
-    monkeypatch.setattr(Recovery, "open", opens)
+    before = NodeLoss.open
+    monkeypatch.setattr(NodeLoss, "open", opens)
     owners: list[dict[str, str]] = []
-    looks: list[Fault] = [(tick, lambda system: owners.append(dict(system.supervisor.owners))) for tick in (1, TICKS)]
+    looks: list[Fault] = [
+        (tick, lambda system: owners.append(dict(system.supervisor.state.owners))) for tick in (1, TICKS)
+    ]
     run = disturbed([(1, systems.append), *looks, (40, kill("n2")), (80, start("n2"))], keeps_journals=True)
     assert len(calls) > call and run.digests == undisturbed().digests
     first, last = owners
@@ -278,7 +282,7 @@ def test_what_was_asked_is_kept_by_the_next_supervisor(amid: int) -> None:
         system.at_tick(150, lambda: system.later(1_000 * MS, partial(go_on, system)))
 
     def go_on(system: System) -> None:
-        assert system.supervisor.pacer.paused and system.supervisor.owners["camera"] == "n3"
+        assert system.supervisor.state.pacer.paused and system.supervisor.state.owners["camera"] == "n3"
         answers = {verb: [answer for answer in told if answer.id == asked[verb]] for verb in asked}
         for verb, same in answers.items():
             assert same and all(answer == same[0] and answer.accepted for answer in same), verb
@@ -303,7 +307,7 @@ def test_with_freeze_the_robots_of_a_lost_node_are_down_until_it_is_back() -> No
     down: list[list[str]] = []
 
     def look(system: System) -> None:
-        frame = system.supervisor.frame
+        frame = system.supervisor.state.frame
         down.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
 
     sets = (*PURE, "on_node_loss=freeze")

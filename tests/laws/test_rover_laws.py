@@ -84,10 +84,10 @@ def alone(text: str) -> Rehearsed:
 
 def shuffle(system: System) -> None:
     """Move random robots to random nodes, and rebuild random engines, at ticks that are drawn."""
-    robots, nodes = sorted(system.supervisor.owners), sorted(system.solvers)
+    robots, nodes = sorted(system.supervisor.state.owners), sorted(system.solvers)
 
     def move(robot: str, word: int) -> None:
-        others = [node for node in nodes if node != system.supervisor.owners[robot]]
+        others = [node for node in nodes if node != system.supervisor.state.owners[robot]]
         system.request("move", robot=robot, node=others[word % len(others)])
 
     for number in range(MOVES):

@@ -32,9 +32,9 @@ from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.supervisor_timeout import Orphan
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
+from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.main import SupervisorProcess
-from foosim.supervisor.progress import Watch
-from foosim.vhub.join import Door
+from foosim.vhub.core import HubCore
 from foosim.vhub.main import HubOptions, HubProcess
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -236,12 +236,20 @@ def supervisor_of(session: Session, inbox: Inbox, folder: Path) -> object:
         return SupervisorProcess(plan.settings(folder.name), None, RunFolder(folder), session, inbox, journal, None)
 
 
-SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type]]] = {
-    "supervisor": (supervisor_of, Watch),
-    "vhub": (lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()), Door),
-    "node": (lambda session, inbox, _: NodeProcess("n1", session, inbox), Orphan),
-    "players": (lambda session, inbox, _: PlayerProcess(PLAYERS, session, inbox), ClientCore),
-    "client": (lambda session, _, __: Link(ClientCore("ear", "boot", time.monotonic_ns()), session), ClientCore),
+SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type, str]]] = {
+    "supervisor": (supervisor_of, SupervisorCore, "on_standstill"),
+    "vhub": (
+        lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()),
+        HubCore,
+        "rest",
+    ),
+    "node": (lambda session, inbox, _: NodeProcess("n1", session, inbox), Orphan, "rest"),
+    "players": (lambda session, inbox, _: PlayerProcess(PLAYERS, session, inbox), ClientCore, "rest"),
+    "client": (
+        lambda session, _, __: Link(ClientCore("ear", "boot", time.monotonic_ns()), session),
+        ClientCore,
+        "rest",
+    ),
 }
 
 
@@ -249,9 +257,9 @@ SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type]]] = {
 def test_each_process_counts_for_how_long_its_own_loop_stood_still(
     shell: str, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    make, has_deadlines = SHELLS[shell]
+    make, has_deadlines, method = SHELLS[shell]
     told: list[tuple[int, int]] = []
-    monkeypatch.setattr(has_deadlines, "rest", lambda self, *what: told.append(what[-2:]))
+    monkeypatch.setattr(has_deadlines, method, lambda self, *what: told.append(what[-2:]))
     clock = [time.monotonic_ns()]  # cores are made by the same one
     monkeypatch.setattr(loops, "time", SimpleNamespace(monotonic_ns=lambda: clock[0]))
     inbox = Inbox(1000)

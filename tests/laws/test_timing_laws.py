@@ -142,7 +142,7 @@ def disturb(system: System) -> None:
         (60, {"partition": [["camera"], ["player-red"]], "for": "34 ms"}),
         (85, {"clog": {"from": "*", "to": "player-*"}, "for": "16 ms"}),
     ):
-        system.supervisor.requests.order(tick, [Disrupt(encode_json(event).decode())])
+        system.supervisor.state.order(tick, [Disrupt(encode_json(event).decode())])
 
 
 @cache

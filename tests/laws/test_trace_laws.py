@@ -22,8 +22,8 @@ from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import CommitRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.core import HubCore
-from foosim.vhub.records import HubRecord, TickRecord
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import HubRecord, TickRecord
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 

@@ -21,7 +21,7 @@ from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_frame

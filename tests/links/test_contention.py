@@ -33,7 +33,7 @@ from foosim.vhub.radio.contention import (
     wifi_access,
 )
 from foosim.vhub.radio.timings import CATEGORIES, LRWPAN, WIFI_5, with_category
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from tests.links import dcf
 from tests.links.offered import Hub, deployment_of
 from tests.links.proof import Proof

@@ -17,7 +17,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, Hub, deployment_of, rule

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from foosim.deployment.network.radios import Radio
 from foosim.vhub.links.fabric import Fabric
-from foosim.vhub.links.summary import SMALL_BYTES, Use, meaning_of
+from foosim.vhub.links.summary import SMALL_BYTES, SharedSettings, summary_of
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns
 from foosim.vhub.stages.duty import GRAINS, RUNS_MAX
@@ -123,7 +123,8 @@ def test_many_short_ones_are_remembered_together_and_the_rule_holds(proof: Proof
 @pytest.mark.parametrize("window", ["1 h", "2 min"])
 def test_the_packets_that_lint_allows_get_through(window: str) -> None:
     """Evenly, or all at once, as many an hour as it says, on and on; a window lets no more through."""
-    found = meaning_of(Use("r", "", Radio.model_validate({"preset": "lora_eu868", "duty_window": window})), {})
+    settings = Radio.model_validate({"preset": "lora_eu868", "duty_window": window})
+    found = summary_of(SharedSettings("r", "", settings), {})
     packets_h = found.duty_packets_h
     assert packets_h is not None
     if window == "1 h":

@@ -19,17 +19,17 @@ from foosim.cli.net import linted
 from foosim.common.errors import DeploymentError
 from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.link_settings import Profiles
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.what_if import what_if
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.custom_models import ModelError, Passage, check_link_models, differing_models, model_versions
-from foosim.vhub.network.link_settings import Profiles
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.records import Closing
 from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing
 from foosim.world.scene import Vector
 from tests.links.offered import MS, TABLE, Hub, deployment_of, every, fates, rule
 from tests.links.packages import ALL, install
@@ -193,7 +193,8 @@ def test_fates_do_not_know_nodes_or_a_vhub_that_was_killed(tmp_path: Path) -> No
     assert rows_of_run(2, kill=True)[0] == rows
     capture = open_capture(tmp_path / "run.mcap")
     assert capture.about.versions["link model fog"] == "foggy 1.2"
-    assert Profiles(capture.deployment, capture.deployment.network).on_radio, "fates depend on where endpoints are"
+    profiles = Profiles(capture.deployment.network, capture.deployment.carriers())
+    assert profiles.on_radio, "fates depend on where endpoints are"
     found = what_if(capture)
     assert (found.packets, found.changed, found.inputs_changed) == (len(rows), 0, 0)
     assert 100 < found.causes[MODEL] < result["packets"]["offered"] / 2

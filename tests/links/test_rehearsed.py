@@ -14,7 +14,7 @@ from foosim.common.units import Pace
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from tests.links.offered import TABLE
 from tests.links.proof import Proof
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from foosim.protocol.messages import Sent
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, state_of
-from foosim.vhub.send_order import Sendings
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.send_order import SendOrder
 from foosim.world.frame import Frame
 from tests.links.offered import ENDS, Hub, deployment_of
 
@@ -100,11 +100,15 @@ def test_drops_stand_in_the_order_of_sending() -> None:
     def flight(number: int) -> Flight:
         return Flight("a", "b", "data", number, 0, 0, b"")
 
-    sendings = Sendings(lambda flights, dropped: dropped.extend(flights))
+    sendings = SendOrder()
     for number, now in enumerate((True, False, True, True, False)):
-        sendings.send([flight(number)], now=now)
+        if now:
+            sendings.dropped.append(flight(number))
+        else:
+            sendings.defer([flight(number)])
     sendings.arrived.append(flight(9))
     with pytest.raises(AssertionError, match="not judged"):
         sendings.fates()
-    sendings.judge_rest()
+    for flights, dropped in sendings.take_waiting():
+        dropped.extend(flights)
     assert [found.sequence for found in sendings.fates()] == [0, 1, 2, 3, 4, 9]

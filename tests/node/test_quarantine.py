@@ -21,7 +21,7 @@ from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_numbers, place_ball
 from foosim.world.layout import Entity, Layout, build_layout

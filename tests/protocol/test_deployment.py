@@ -15,6 +15,7 @@ from foosim.common.names import LINE_NAMES, TEAMS
 from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.impairments import GammaJitter
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment, deployment_schema_text
 from foosim.deployment.yaml import locate_in, plain, read_tree
 from foosim.world.robots.foosball_rod import RodRobot
@@ -29,6 +30,11 @@ REGENERATE = "python docs/reference.py"
 def table() -> Deployment:
     """The deployment of deploy/table.yaml."""
     return load_deployment(TABLE_TEXT, "table.yaml")
+
+
+def links_of(deployment: Deployment) -> Profiles:
+    """What the links of a deployment are made from."""
+    return Profiles(deployment.network, deployment.carriers())
 
 
 def data_of(text: str) -> Any:
@@ -70,7 +76,7 @@ def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) 
     assert (camera.sensors["ball"].rate_hz, camera.sensors["ball"].noise) == (Fraction(100), 0.0015)
     encoder = rod.sensors["encoder"]
     assert (encoder.position_noise, encoder.angle_noise) == (0.0002, math.radians(0.5))
-    rule = table.network.rule_for("player-red", "red.goal")
+    rule = links_of(table).rule_for("player-red", "red.goal")
     assert rule is not None
     assert isinstance(rule.jitter, GammaJitter)
     assert (rule.delay_ns, rule.jitter.mean_ns, rule.jitter.sd_ns) == (1_000_000, 300_000, 300_000)
@@ -93,7 +99,7 @@ def test_what_is_left_out_has_its_default(table: Deployment) -> None:
     assert bare.players == {}
     assert bare.clients == {}
     assert bare.mixed_cpu is False
-    assert bare.network.rule_for("red.goal", "camera") is None
+    assert links_of(bare).rule_for("red.goal", "camera") is None
 
 
 def test_a_jitters_mean_is_its_spread_unless_said_otherwise() -> None:
@@ -105,9 +111,9 @@ def test_a_jitters_mean_is_its_spread_unless_said_otherwise() -> None:
 
 def test_the_first_rule_that_matches_wins_and_links_are_directed() -> None:
     rules = "[{id: a, from: player-red, to: [camera, red.*]}, {id: b, from: '*', to: 'red.goa?'}]"
-    network = load_deployment(apply_sets(TABLE_TEXT, "f", [f"network.links={rules}"]), "f").network
+    links = links_of(load_deployment(apply_sets(TABLE_TEXT, "f", [f"network.links={rules}"]), "f"))
     matched = {
-        (source, destination): rule.id if (rule := network.rule_for(source, destination)) else None
+        (source, destination): rule.id if (rule := links.rule_for(source, destination)) else None
         for source in ("player-red", "player-blue", "red.goal")
         for destination in ("red.goal", "red.attack", "player-red")
     }

@@ -47,14 +47,14 @@ LONG: Final = f"deadlines={{lockstep_fast: {LONG_S} s, start: {LONG_S} s}}"
 def looks_on() -> tuple[Onlooker, SupervisorCore]:
     run = RunSettings("run", TABLE.name, TABLE.read_text(), Pace("fast"), 10_000)
     core = SupervisorCore(run, bytes(32), 0)
-    return Onlooker(core, 0.0), core
+    return Onlooker(core.state, 0.0), core
 
 
 def test_a_line_each_second_tells_time_speed_score_and_who_is_waited_for() -> None:
     onlooker, core = looks_on()
     lines = []
     for look in range(1, 101):  # five seconds
-        core.frame.tick = 10 * look
+        core.state.frame.tick = 10 * look
         name = "n1" if look % 4 else "player-red"
         lines.append(onlooker.look(look * LOOK_S, AtWork(name, turns=look)))
     assert [at for at, line in enumerate(lines, 1) if line] == [20, 40, 60, 80, 100]

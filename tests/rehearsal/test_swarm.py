@@ -32,7 +32,7 @@ from foosim.rehearsal.swarm.faults import (
 )
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws
 from foosim.rehearsal.system import Settings
-from foosim.vhub.records import TickRecord
+from foosim.vhub.state.records import TickRecord
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS: Final = 30_000
@@ -104,7 +104,7 @@ def test_clocks_decide_nothing() -> None:
         clocks = tuple((name, Clock(offset_ns * place)) for place, (name, _) in enumerate(plan.clocks))
         flight = Flight(TABLE.read_text(), TABLE.name, replace(plan, clocks=clocks), Settings())
         flight.run()
-        chains.append((flight.system.supervisor.chain, flight.seen, flight.system.bus.now_ns))
+        chains.append((flight.system.supervisor.state.chain, flight.seen, flight.system.bus.now_ns))
     assert chains[0] == chains[1]
 
 
@@ -126,7 +126,7 @@ def test_faults_leave_a_node_that_may_take_part() -> None:
     faults = tuple(FAULT_OF[kind](_Loaded(*picks), names) for kind, *picks in kinds)
     flight = Flight(TABLE.read_text(), TABLE.name, Plan(0, 3, CALM, faults, ()), Settings())
     flight.run()
-    assert flight.system.supervisor.chain == undisturbed(TABLE.read_text(), TABLE.name, 0, TICKS)
+    assert flight.system.supervisor.state.chain == undisturbed(TABLE.read_text(), TABLE.name, 0, TICKS)
     assert all(answer.accepted for answer in flight.system.answers.values())
 
 
@@ -151,7 +151,7 @@ def test_a_minute_under_faults_is_the_minute_that_would_have_been(seed: int) -> 
     flight = Flight(TABLE.read_text(), TABLE.name, same, Settings())
     flight.run()
     expected = undisturbed(TABLE.read_text(), TABLE.name, seed % WORLDS, MINUTE_TICKS)
-    assert flight.system.supervisor.chain == expected and flight.laws.ticks == MINUTE_TICKS
+    assert flight.system.supervisor.state.chain == expected and flight.laws.ticks == MINUTE_TICKS
 
 
 def test_without_the_swarm_the_command_needs_an_end() -> None:

@@ -20,7 +20,7 @@ from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.supervisor import records
-from foosim.vhub.records import fold
+from foosim.vhub.state.records import fold
 from foosim.world.frame import Frame
 from foosim.world.initial_state import AddedEntity, Start, first_frame, start_with
 

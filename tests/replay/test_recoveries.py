@@ -20,8 +20,15 @@ from foosim.protocol.messages import Commit
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
-from foosim.supervisor.account import Recovered, close_outages, tell_again
-from foosim.supervisor.records import CommitRecord, Record, RecoveredRecord, fold
+from foosim.supervisor.records import (
+    CommitRecord,
+    Record,
+    Recovered,
+    RecoveredRecord,
+    close_outages,
+    fold,
+    reopen_outages,
+)
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
@@ -44,7 +51,7 @@ def lose_and_restart(system: System) -> None:
 def lose_what_was_committed(system: System) -> None:
     """A node is lost; then the machine of the supervisor is, with all commits that were journalled behind the loss."""
     system.kill("n1")
-    system.at_tick(system.supervisor.frame.tick + 3, partial(cut_behind_the_loss, system))
+    system.at_tick(system.supervisor.state.frame.tick + 3, partial(cut_behind_the_loss, system))
 
 
 def cut_behind_the_loss(system: System) -> None:
@@ -112,7 +119,7 @@ def test_a_fold_takes_outages_as_they_were_told(tmp_path: Path) -> None:
     captured(tmp_path / "run.mcap", (40, lose))
     journal = systems[0].journal
     changed = [with_outage(decode_any(Record, raw), 12_345) for raw in journal]
-    history = fold(systems[0].supervisor.deployment, changed)
+    history = fold(systems[0].supervisor.state.deployment, changed)
     assert [entry.outage_ns for entry in history.recovered] == [12_345]
 
 
@@ -133,6 +140,6 @@ def test_what_a_commit_cannot_tell_the_next_ones_do(more: int) -> None:
     assert first + second == recovered and len(first) == limits.RECOVERIES_PER_COMMIT_MAX
     assert [entry.outage_ns for entry in recovered] == [20] * len(first) + [5] * more
     assert close_outages(recovered, 35, 40, 9) == []
-    tell_again(recovered, 7)
+    reopen_outages(recovered, 7)
     assert [entry.outage_ns for entry in recovered] == [20] * len(first) + [-1] * more, "the second commit is void"
     assert close_outages(recovered, 40, 41, 8) == second

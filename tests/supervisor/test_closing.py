@@ -13,7 +13,6 @@ from foosim.common.units import Pace
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.status import result, status
 from foosim.vhub.core import HubCore
 from foosim.world.frame import Frame
 
@@ -40,11 +39,11 @@ class Slow:
             self.ended_ns = self.system.bus.now_ns
             for at_s, do in self.at.items():
                 self.system.later(int(at_s * S), partial(do, self.system))
-        hub.capture = self.capture
-        hub.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
-        hub.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
+        hub.shell.capture = self.capture
+        hub.shell.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
+        hub.shell.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
         self.waited |= {hub.waiting_for}
-        told = status(self.system.supervisor, 0)
+        told = self.system.supervisor.status(0)
         self.seen.append({"written": told["recording"]["written"], "waits": told["processes"][VHUB]["waiting_for"]})
         return passed_ns >= self.takes_ns
 
@@ -55,7 +54,7 @@ class Slow:
         settings = Settings(closing=self, on_commit=self.committed)
         rehearse(TABLE.read_text(), TABLE.name, ticks, 1, ["engine=pure"], settings, pace=pace, prepare=prepare)
         self.took_s = (self.system.bus.now_ns - self.ended_ns) / S
-        return result(self.system.supervisor)
+        return self.system.supervisor.result()
 
 
 def test_as_long_as_there_is_progress_it_is_waited_for_and_shown() -> None:

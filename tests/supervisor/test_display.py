@@ -20,7 +20,7 @@ from foosim.launcher.display import (
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import NO_PACKETS, status
+from foosim.supervisor.status import NO_PACKETS
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 HERE = {"host": "", "lost": False, "stopped": False}
@@ -164,7 +164,7 @@ def test_fast_has_no_lag_and_a_pause_says_so(running: dict[str, Any]) -> None:
 
 def test_before_the_first_tick_it_says_who_is_waited_for() -> None:
     settings = RunSettings("run", "table.yaml", TABLE.read_text(), parse_pace("realtime"))
-    content = status(SupervisorCore(settings, library_fingerprint(), 0), 0)
+    content = SupervisorCore(settings, library_fingerprint(), 0).status(0)
     assert plain_line(content) == "starting, waiting for blue, red, vhub"
     assert "waiting for blue, red, vhub" in render_text(content)
     assert "not here yet" in row_of(render_text(content), "blue.attack")

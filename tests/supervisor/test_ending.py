@@ -11,7 +11,7 @@ import pytest
 from foosim.launcher import memory, processes
 from foosim.launcher.memory import OomKills, oom_kills
 from foosim.launcher.processes import Child
-from foosim.supervisor.ending import Ending
+from foosim.launcher.restarts import Ending
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 

@@ -33,7 +33,7 @@ from foosim.runtime.transport.session import Session
 from foosim.supervisor.main import SupervisorProcess
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.records import Record, fold
-from foosim.supervisor.status import UNFINISHED, status
+from foosim.supervisor.status import UNFINISHED
 from tests.supervisor.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -66,7 +66,7 @@ def test_a_result_without_a_supervisor_has_the_keys_of_any_other(run: Run) -> No
     blank = result_without_supervisor({"run": "mine", **plan_facts(plan.deployment)}, "lost supervisor: it is gone")
     assert blank.keys() == run.result.keys()
     assert (blank["world"], blank["ticks"], blank["failed"]) == ("table", None, True)
-    seen = result_without_supervisor(status(run.system.supervisor, 0), "lost supervisor: it is gone")
+    seen = result_without_supervisor(run.system.supervisor.status(0), "lost supervisor: it is gone")
     assert seen.keys() == blank.keys() and seen["ticks"] == TICKS and seen["digest"] == run.result["digest"]
     assert (seen["reason"], seen["failed"]) == ("lost supervisor: it is gone", True)
 
@@ -259,7 +259,7 @@ def test_a_capture_that_has_its_end_is_not_cut_off_whatever_was_heard_of_its_vhu
         inbox = Inbox(1000)
         process = SupervisorProcess(plan.settings(left.folder.name), None, left.folder, session, inbox, written, None)
         process.core.finish("stopped", failed=False)
-        process.core.finished, process.core.closing.cut_off = True, "the capture is cut off: nobody said how"
+        process.core.state.finished, process.core.state.cut_off = True, "the capture is cut off: nobody said how"
         assert process.run() == (DONE if is_closed else FAILED)
     gc.set_threshold(*thresholds)
     gc.unfreeze()
@@ -282,7 +282,7 @@ def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> N
         settings, inbox = plan.settings(left.folder.name), Inbox(1000)
         process = SupervisorProcess(settings, None, left.folder, session, inbox, written, history)
         process.core.finish("lost vhub", failed=True)
-        assert process.run() == REFUSED and process.core.beginning.abandoned == "lost vhub"
+        assert process.run() == REFUSED and process.core.state.abandoned == "lost vhub"
     gc.set_threshold(*thresholds)
     gc.unfreeze()
     assert left.folder.result() is None

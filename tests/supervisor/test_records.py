@@ -43,7 +43,7 @@ class Watched(System):
     def _perform(self, process: Any) -> None:
         super()._perform(process)
         if process.core is self.supervisor and self.records:
-            self.heads[len(self.records)] = self.supervisor.head()
+            self.heads[len(self.records)] = self.supervisor.state.checkpoint()
 
 
 def ask(system: System, verb: str, arguments: dict[str, Any]) -> None:
@@ -84,13 +84,13 @@ def content(history: History) -> tuple[object, ...]:
 
 def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: Watched) -> None:
     history = fold(DEPLOYMENT, watched.records)
-    assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.frame.digest)
+    assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.state.frame.digest)
     assert history.epoch is not None
     assert (history.epoch.epoch, set(dict(history.epoch.owners).values())) == (3, {"blue"})
     assert history.answers == {(answer.sender, name): answer for name, answer in watched.answers.items()}
     assert history.run.deployment == TEXT
     again = SupervisorCore(watched.settings_of_run, library_fingerprint(), 0, "another", history=history)
-    assert again.control() == watched.supervisor.control() == history.control
+    assert again.state.control() == watched.supervisor.state.control() == history.control
     assert (history.control.stopped, history.control.starts) == (["red"], {"red": 1})
 
 

@@ -23,7 +23,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -140,8 +140,8 @@ def test_an_add_waits_for_the_engines_of_all_nodes_and_the_world_does_not() -> N
     build, held = slow.build_wanted, []
 
     def build_late() -> None:
-        if len(slow._core.layouts_wanted) > 1 and run.system.supervisor.frame.tick < 70:
-            held.append(run.system.supervisor.frame.tick)
+        if len(slow._core.layouts_wanted) > 1 and run.system.supervisor.state.frame.tick < 70:
+            held.append(run.system.supervisor.state.frame.tick)
             return
         build()
 
@@ -211,7 +211,7 @@ def test_a_move_is_an_epoch_at_the_commit_that_its_answer_names_and_changes_noth
     last = max(epochs, key=lambda epoch: epoch.epoch)
     assert (last.epoch, last.tick, dict(last.owners)["red.goal"]) == (2, answer.tick, "n2")
     assert last.digest == run.frames[answer.tick - 1].digest and answer.tick >= 50
-    assert run.digests == undisturbed().digests and run.system.supervisor.account.moves == 1
+    assert run.digests == undisturbed().digests and run.system.supervisor.state.account.moves == 1
 
 
 def test_a_node_is_stopped_and_started_again_and_nothing_changes() -> None:
@@ -224,9 +224,9 @@ def test_a_node_is_stopped_and_started_again_and_nothing_changes() -> None:
     assert started.accepted and started.text.startswith("n2 may take part from tick ") and again.accepted
     assert run.digests == undisturbed().digests
     supervisor = run.system.supervisor
-    assert supervisor.members == ("n1", "n2", "n3") and supervisor.epoch == 3
-    assert set(supervisor.owners.values()) == {"n1", "n2", "n3"}, "its robots came back with it"
-    assert supervisor.roster.starts == {"n2": 2}, "which its launcher sees, also of one that is just not here"
+    assert supervisor.state.members == ("n1", "n2", "n3") and supervisor.state.epoch == 3
+    assert set(supervisor.state.owners.values()) == {"n1", "n2", "n3"}, "its robots came back with it"
+    assert supervisor.state.roster.starts == {"n2": 2}, "which its launcher sees, also of one that is just not here"
 
 
 def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:
@@ -234,7 +234,7 @@ def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:
     run.system.at_tick(40, lambda: run.system.kill("n2"))
     run.system.at_tick(50, lambda: run.system.start("n2"))
     run.go()
-    assert run.digests == undisturbed().digests and run.system.supervisor.members == ("n1",)
+    assert run.digests == undisturbed().digests and run.system.supervisor.state.members == ("n1",)
     node = run.system.processes["n2"].core
     assert node.member.refusal == "n2 is stopped; `foosim-supervisor start n2` lets it take part again"
 
@@ -256,7 +256,7 @@ def test_a_move_to_where_it_is_is_no_epoch() -> None:
     run = Run(nodes=2).ask_at(50, "move", robot="red.goal", node="n1").go()
     (answer,) = run.answers
     assert answer.accepted and answer.text == f"red.goal is on n1 already, at tick {answer.tick}"
-    assert run.system.supervisor.epoch == 1 and run.system.supervisor.account.moves == 0
+    assert run.system.supervisor.state.epoch == 1 and run.system.supervisor.state.account.moves == 0
 
 
 # --- pace ------------------------------------------------------------------------------------------------------------
@@ -273,7 +273,7 @@ def test_a_pause_holds_the_world_before_the_tick_that_its_answer_names(pace: Pac
     assert before[-1] - before[39] < 20 * MS and after[0] - before[39] == 900 * MS
     assert max(_gaps(run.times_ns, paused.tick)) < 10 * MS
     assert run.digests == undisturbed().digests
-    assert run.system.supervisor.pacer.lags.max_ns == 0, "a pause is no lag"
+    assert run.system.supervisor.state.pacer.lags.max_ns == 0, "a pause is no lag"
 
 
 def _gaps(times_ns: list[int], but: int) -> list[int]:
@@ -320,15 +320,15 @@ def test_down_ends_the_run_after_the_tick_that_its_answer_names(pace: Pace, paus
     run.ask_after(40, 300 * MS if paused else 0, "down").go()
     down = run.answers[-1]
     assert down.accepted and down.text == f"the run ends at tick {down.tick}"
-    assert run.frames[-1].tick == down.tick == run.system.supervisor.frame.tick
-    assert run.system.supervisor.end is not None and not run.system.supervisor.end.failed
+    assert run.frames[-1].tick == down.tick == run.system.supervisor.state.frame.tick
+    assert run.system.supervisor.state.end is not None and not run.system.supervisor.state.end.failed
     assert [closing.frame.tick for closing in run.closings] == list(range(down.tick + 1)), "each frame once"
     assert run.digests == undisturbed().digests[: down.tick]
 
 
 def test_status_is_of_the_tick_that_its_answer_names() -> None:
     run = Run(nodes=2)
-    run.system.supervisor.busy = 0.4321
+    run.system.supervisor.state.busy = 0.4321
     (answer,) = run.ask_at(40, "status").go().answers
     status = decode_json(answer.result)
     assert status["ticks"] == answer.tick and status["digest"]["frame"] == run.frames[answer.tick - 1].digest.hex()
@@ -371,7 +371,7 @@ def test_the_same_id_gets_the_same_answer_and_is_done_once(verb: str) -> None:
     assert len(set(answers)) == 1
     edits = [edit for channel, said in run.said if channel == channels.ORDER.name for edit in decode(Order, said).edits]
     assert len(edits) == (1 if verb in ("push", "add") else 0)
-    assert run.system.supervisor.epoch == (2 if verb == "move" else 1)
+    assert run.system.supervisor.state.epoch == (2 if verb == "move" else 1)
 
 
 def test_a_refusal_is_the_same_too() -> None:

@@ -14,7 +14,7 @@ from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.protocol.messages import Answer
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 LINK: Final = "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms}]"
@@ -120,7 +120,7 @@ def test_there_are_so_many_events_and_no_more() -> None:
 
     def prepare(system: System) -> None:
         def ask() -> None:
-            system.supervisor.requests.disruptions = EVENTS_MAX
+            system.supervisor.state.disruptions = EVENTS_MAX
             refused.append(system.request("network", event={"heal": "all"}))
 
         system.at_tick(10, ask)

@@ -202,13 +202,13 @@ def test_who_is_let_in_gets_all_it_needs_and_the_run_starts_when_all_are_ready()
         assert (said.channel, said.name, build.name, build.deployment) == (channels.BUILD, name, name, TEXT)
         give(process, [said], name)
     hub.begin(None, 0)
-    assert table.core.watch.waiting_for(table.core) == ["blue", "red", "vhub"]
+    assert table.core.progress.waiting_for() == ["blue", "red", "vhub"]
     assert hub.member.is_ready, "without lockstep clients there is nobody to wait for"
     assert not [action for action in table.hear(hub) if action.channel is channels.EPOCH]
     for name, process in nodes.items():
         Solver(process).build_wanted()
         said_last = table.hear(process)
-        assert table.core.epoch == (1 if name == "blue" else 0)
+        assert table.core.state.epoch == (1 if name == "blue" else 0)
     epoch = decode(Epoch, next(action.payload for action in said_last if action.channel is channels.EPOCH))
     assert (epoch.epoch, epoch.tick, epoch.roster) == (1, 0, ["blue", "red"])
     assert dict(epoch.owners) == DEPLOYMENT.owners()
@@ -252,21 +252,21 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
 def test_the_last_node_that_was_lost_goes_on_when_it_is_heard_of_again(case: str) -> None:
     """But none whose arithmetic was never compared, and nobody once the run is over."""
     core = SupervisorCore(RunSettings("run", TABLE.name, TEXT, Pace("fast")), PRINT, 0)
-    process = core.roster.take(HELLO, 0)
+    process = core.state.roster.take(HELLO, 0)
     if case != "not built":
-        core.roster.note_ready(process, Ready("red", HELLO.boot, core.frame.layout.digest, PRINT))
-    core.roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
-    core.open_epoch(core.owners, 0, ["blue", "red"])
-    core.recovery.lose("red", "silent", 0)
+        core.state.roster.note_ready(process, Ready("red", HELLO.boot, core.state.frame.layout.digest, PRINT))
+    core.state.roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    core.open_epoch(core.state.owners, 0, ["blue", "red"])
+    core.node_loss.lose("red", "silent", 0)
     if case == "stopped":
-        core.roster.stopped.add("red")
+        core.state.roster.stopped.add("red")
     if case != "others are here":
-        core.recovery.lose("blue", "silent", 0)
+        core.node_loss.lose("blue", "silent", 0)
     if case == "the run has ended":
         core.finish("enough", failed=False)
-    epoch = core.epoch
+    epoch = core.state.epoch
     heartbeat = Heartbeat("red", 0, 1, "", "", 0.0, b"{}")
     core.receive(channels.HEARTBEAT, "red", encode(heartbeat), 0)
     taken = case == "built"
-    assert (core.members == ("red",), process.lost, core.epoch - epoch) == (taken, not taken, int(taken))
-    assert not taken or set(core.owners.values()) == {"red"}
+    assert (core.state.members == ("red",), process.lost, core.state.epoch - epoch) == (taken, not taken, int(taken))
+    assert not taken or set(core.state.owners.values()) == {"red"}

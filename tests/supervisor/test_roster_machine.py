@@ -50,7 +50,7 @@ class Membership(RuleBasedStateMachine):
         self.boots = dict.fromkeys(NODES, 0)
         self.built = dict.fromkeys(NODES, False)
         self.stopped: set[str] = set()
-        self.owner = self.core.deployment.owners()
+        self.owner = self.core.state.deployment.owners()
         self.home = dict(self.owner)
         self.opened = 0
 
@@ -108,7 +108,7 @@ class Membership(RuleBasedStateMachine):
     @initialize(everybody=st.sampled_from((True, True, False)))
     def the_hub_is_here(self, everybody: bool) -> None:
         self.tell(channels.HELLO, VHUB, Hello("vhub", VHUB, "b0", limits.PROTOCOL_VERSION, "", PRINT))
-        self.tell(channels.READY, VHUB, Ready(VHUB, "b0", self.core.frame.layout.digest, PRINT))
+        self.tell(channels.READY, VHUB, Ready(VHUB, "b0", self.core.state.frame.layout.digest, PRINT))
         for node in NODES if everybody else ():
             self.come(node)
 
@@ -130,7 +130,7 @@ class Membership(RuleBasedStateMachine):
     @rule(node=st.sampled_from(NODES), of_another=st.booleans())
     def ready(self, node: str, of_another: bool) -> None:
         boot = "other" if of_another else f"b{self.boots[node]}"
-        self.tell(channels.READY, node, Ready(node, boot, self.core.frame.layout.digest, PRINT))
+        self.tell(channels.READY, node, Ready(node, boot, self.core.state.frame.layout.digest, PRINT))
         if of_another or self.state[node] not in (KNOWN, MEMBER):
             return
         self.built[node] = True
@@ -149,7 +149,7 @@ class Membership(RuleBasedStateMachine):
     @rule(node=st.sampled_from(NODES))
     def heartbeat(self, node: str) -> None:
         """The last that was lost goes on by itself; others have to say hello."""
-        self.tell(channels.HEARTBEAT, node, Heartbeat(node, 0, self.core.epoch, "", "", 0.0, b"{}"))
+        self.tell(channels.HEARTBEAT, node, Heartbeat(node, 0, self.core.state.epoch, "", "", 0.0, b"{}"))
         is_alone = self.opened > 0 and self.state[node] == LOST and not self.members
         if is_alone and self.built[node] and node not in self.stopped:
             self.enter(node)
@@ -184,34 +184,38 @@ class Membership(RuleBasedStateMachine):
         """A zombie's work is not taken, whatever epoch it names."""
         if node in self.members and behind == 0:
             return
-        before = self.core.missing_nodes
-        self.tell(channels.PART, node, Part(max(0, self.core.epoch - behind), 1, node, bytes(32), [], b"", b"", []))
-        assert self.core.missing_nodes == before
+        before = self.core.state.missing_nodes
+        self.tell(
+            channels.PART, node, Part(max(0, self.core.state.epoch - behind), 1, node, bytes(32), [], b"", b"", [])
+        )
+        assert self.core.state.missing_nodes == before
         self.refused = self.core.statistics().refused
 
     # --- what always holds -------------------------------------------------------------------------------------------
 
     @invariant()
     def the_epoch_says_what_the_model_says(self) -> None:
-        assert self.core.epoch == self.opened and [epoch.epoch for epoch in self.epochs] == [*range(1, self.opened + 1)]
-        assert self.core.end is None
+        assert self.core.state.epoch == self.opened and [epoch.epoch for epoch in self.epochs] == [
+            *range(1, self.opened + 1)
+        ]
+        assert self.core.state.end is None
         if self.opened:
-            assert sorted(self.core.members) == self.members
-            assert self.core.owners == self.owner
+            assert sorted(self.core.state.members) == self.members
+            assert self.core.state.owners == self.owner
         if self.members:
             epoch = self.epochs[-1]
             assert sorted(epoch.roster) == self.members and dict(epoch.owners) == self.owner
             assert set(self.owner.values()) <= set(self.members), "every robot has one owner, who takes part"
-            assert (epoch.tick, epoch.digest) == (self.core.frame.tick, self.core.frame.digest)
+            assert (epoch.tick, epoch.digest) == (self.core.state.frame.tick, self.core.state.frame.digest)
 
     @invariant()
     def one_name_is_one_process(self) -> None:
         for node in NODES:
-            process = self.core.roster.by_name.get(node)
+            process = self.core.state.roster.by_name.get(node)
             assert (process is None) == (self.state[node] == ABSENT)
             if process is not None:
                 assert process.lost == (self.state[node] == LOST) and process.boot == f"b{self.boots[node]}"
-        assert self.core.statistics().refused == self.refused and SUPERVISOR not in self.core.roster.by_name
+        assert self.core.statistics().refused == self.refused and SUPERVISOR not in self.core.state.roster.by_name
 
 
 TestMembership = Membership.TestCase

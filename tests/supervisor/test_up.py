@@ -12,6 +12,7 @@ from typing import Final
 import msgspec
 import pytest
 
+from foosim.client import control
 from foosim.launcher.display import Display
 from foosim.launcher.liveness import UNANSWERED_MAX
 from foosim.launcher.outcome import capture_lines
@@ -24,7 +25,6 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import REFUSED
 from foosim.runtime.run_folder import RESULT_FILE, RunInfo
 from foosim.runtime.transport.session import ConnectError
-from foosim.supervisor import control
 from foosim.supervisor.status import NOT_RECORDED
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

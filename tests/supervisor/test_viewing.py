@@ -67,7 +67,7 @@ def test_the_most_eager_lease_sets_the_rate_and_whoever_is_gone_does_not() -> No
 
 def test_a_large_world_is_shown_less_often() -> None:
     core = begun()
-    core.commits[core.frame.tick] = bytes(180_000)
+    core.state.commits[core.state.frame.tick] = bytes(180_000)
     got = result(ask(core, 0, "watch", hz=50))["hz"]
     assert got == pytest.approx(BYTES_PER_S_MAX / 180_000, rel=1e-6) and 25 < got < 30
 
@@ -120,7 +120,7 @@ def test_looking_is_not_journalled_nor_kept_and_not_even_a_refusal_is() -> None:
     run.ask_at(20, "pause").ask_after(24, 100 * MS, "resume").go()
     assert [answer.accepted for answer in run.answers] == [True, True, False, True, True]
     assert run.answers[2].text == "hz: a number from 0 to 100 is needed, not 1000"
-    assert [answer.id for answer in run.system.supervisor.requests.journalled()[1]] == [run.asked[3], "later-4"]
+    assert [answer.id for answer in run.system.supervisor.state.answers.values()] == [run.asked[3], "later-4"]
 
 
 @pytest.mark.parametrize("hz", [-1, 100.5, True, "50", [50]])
@@ -143,7 +143,7 @@ def test_who_only_looks_may_ask_for_what_changes_nothing_and_no_more() -> None:
     assert verbs["pause"].text == "'pause' is for operators: who only looks may ask for status, describe, watch"
     core.actions.clear()
     core.receive(channels.INQUIRY, "desk.1", encode(Request("desk.1", "id", "down", b"{}")), 0)
-    assert core.statistics().refused == 1 and core.end is None, "a request on the key of an inquiry is none"
+    assert core.statistics().refused == 1 and core.state.end is None, "a request on the key of an inquiry is none"
 
 
 def test_so_many_may_look_and_no_more() -> None:
@@ -165,7 +165,7 @@ def test_a_status_has_what_was_asked_for_last_also_after_a_loss_of_the_superviso
     heads: list[bytes] = []
     for n in range(40):
         system.at_tick(10, lambda n=n: system.request("rate", pace="fast" if n else "quick"))  # type: ignore[misc]
-    system.at_tick(20, lambda: heads.append(system.supervisor.head()))
+    system.at_tick(20, lambda: heads.append(system.supervisor.state.checkpoint()))
     system.at_tick(30, lambda: system.request("status"))
     system.run()
     system.close()
@@ -177,8 +177,8 @@ def test_a_status_has_what_was_asked_for_last_also_after_a_loss_of_the_superviso
         "who": OPERATOR,
         "accepted": True,
     }
-    deployment = system.supervisor.deployment
-    kept = list(system.supervisor.requests.asked)
+    deployment = system.supervisor.state.deployment
+    kept = list(system.supervisor.state.asked)
     assert fold(deployment, system.journal).asked == kept == fold(deployment, heads).asked
 
 

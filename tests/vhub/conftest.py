@@ -42,9 +42,9 @@ from foosim.protocol.messages import (
 )
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.queue import Keep, KeepEpoch
 from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.records import Closing, HubRecord, TickRecord
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
 from foosim.world.initial_state import AddedEntity, initial_numbers
@@ -126,9 +126,9 @@ class Driver:
                 self.run.journal.append(action.record)
                 if not self.run.records or isinstance(decode_any(HubRecord, action.record), TickRecord):
                     self.run.records.append(action.record)
-            elif isinstance(action, Keep):
+            elif isinstance(action, RecordClosing):
                 self.run.closings.append(action.closing)
-            elif isinstance(action, KeepEpoch):
+            elif isinstance(action, RecordEpoch):
                 self.run.epochs.append(action.epoch)
             elif isinstance(action, Publish) and action.channel is channels.DELIVERIES:
                 deliveries = decode(Deliveries, action.payload)

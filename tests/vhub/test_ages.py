@@ -16,13 +16,13 @@ from foosim.common.json_text import decode_json
 from foosim.console.report.collect import gather
 from foosim.console.report.page import page
 from foosim.protocol.codec import decode_any
+from foosim.protocol.messages import Farewell
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.what_if import what_if
 from foosim.vhub.network.ages import Ages, quantile
-from foosim.vhub.records import HubRecord, TickRecord
-from foosim.vhub.state import HubState
-from foosim.vhub.status import report
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import HubRecord, TickRecord
 from tests.laws.test_hub_recovery_law import Fault, Seen, fly
 from tests.turns import BY_PERIOD
 from tests.vhub.conftest import WATCHER, HubRun
@@ -42,7 +42,7 @@ def told(sets: tuple[str, ...]) -> dict[tuple[str, str], tuple[float, float]]:
     """The median and the 99th percentile, in ms, by receiver and channel, as the vHub reports them in the end."""
     systems: list[System] = []
     rehearse(TABLE.read_text(), TABLE.name, 100, 1, sets, Settings(), prepare=systems.append)
-    links = decode_json(report(systems[0].hub, is_last=True))["links"]
+    links = decode_json(decode_any(Farewell, systems[0].hub.farewell().payload).report)["links"]
     return {
         (link[1], f"{link[0]} {channel}"): (p50_ns / MS, p99_ns / MS)
         for link in links
@@ -76,7 +76,7 @@ def test_median_and_99_percent_of_what_differs() -> None:
     systems: list[System] = []
     sets = delayed("1300 us", "players.player-red.rate=250 Hz")
     rehearse(TABLE.read_text(), TABLE.name, 100, 1, sets, Settings(), prepare=systems.append)
-    content = decode_json(report(systems[0].hub, is_last=True))
+    content = decode_json(decode_any(Farewell, systems[0].hub.farewell().payload).report)
     (ball,) = [link[9] for link in content["links"] if link[:2] == ["camera", "player-red"]]
     assert [age[2:] for age in ball] == [[6 * MS, 10 * MS]]
     assert content["links_in_all"] == sum(link[2] > 0 for link in content["links"]) == len(content["links"])

@@ -13,10 +13,10 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
-from foosim.vhub.recording.queue import Keep
 from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.records import Closing, HubRecord, TickRecord
-from foosim.vhub.resume import Captured, end_of, first_tick_of, recall
+from foosim.vhub.state.capture_queue import RecordClosing
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from foosim.vhub.state.resume import Captured, end_of, first_tick_of, recall
 from tests.vhub.conftest import EPOCH_AT, NAME
 from tests.vhub.test_capture_recovery import LAST, cut, first_chunk, read_by_others, rows
 
@@ -42,7 +42,7 @@ def go_on(path: Path, run: HubRun, records: Sequence[bytes]) -> Captured:
     if past.known is not None:
         writer.keep(Closing(past.known, past.known.digest, [], []))
     for item in past.kept:
-        writer.keep(item.closing if isinstance(item, Keep) else item.epoch)
+        writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
     known = 0 if past.epoch is None else past.epoch.epoch
     for epoch in run.epochs:
         if epoch.epoch > known:

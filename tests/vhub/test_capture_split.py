@@ -26,13 +26,13 @@ from foosim.runtime.journal import Journal
 from foosim.vhub.recording import unfinished
 from foosim.vhub.recording import writer as capture_writer
 from foosim.vhub.recording.file import CaptureFile, Described
-from foosim.vhub.recording.queue import Keep
 from foosim.vhub.recording.recovery import recover_capture
 from foosim.vhub.recording.split import Split
 from foosim.vhub.recording.unfinished import Journalled
 from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.records import Closing
-from foosim.vhub.resume import end_of, first_tick_of, recall
+from foosim.vhub.state.capture_queue import RecordClosing
+from foosim.vhub.state.records import Closing
+from foosim.vhub.state.resume import end_of, first_tick_of, recall
 from tests.vhub.conftest import ADDED_AT, LOG_LINES, NAME, REMOVED_AT
 from tests.vhub.test_capture_branch import journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
@@ -332,7 +332,7 @@ def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
         if past.known is not None:
             writer.keep(Closing(past.known, past.known.digest, [], []))
         for item in past.kept:
-            writer.keep(item.closing if isinstance(item, Keep) else item.epoch)
+            writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
         for epoch in hub_run.epochs:
             if past.epoch is None or epoch.epoch > past.epoch.epoch:
                 writer.keep(epoch)

@@ -12,13 +12,13 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording.queue import Keep
-from foosim.vhub.records import HubRecord, TickRecord
-from foosim.vhub.resume import recall
 from foosim.vhub.sessions import BOOTS_KEPT
+from foosim.vhub.state.capture_queue import RecordClosing
+from foosim.vhub.state.records import HubRecord, TickRecord
+from foosim.vhub.state.resume import recall
 from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
 
 PLAYERS: Final = apply_sets(TABLE.read_text(), TABLE.name, ("network.links=[]",))
@@ -49,7 +49,7 @@ def test_a_vhub_that_stood_still_is_no_orphan_by_that() -> None:
     hub = Hub().begin()
     orphan_ns = hub.core.deployment.deadlines.orphan_ns  # type: ignore[union-attr]
     hub.core.orphan.hear(False, 0)
-    hub.core.door.rest(2 * orphan_ns, 2 * orphan_ns)
+    hub.core.rest(2 * orphan_ns, 2 * orphan_ns)
     assert not hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns - 1)
     assert hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns)
 
@@ -64,14 +64,14 @@ def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
     hub.core.client_gone("ear", 0)
     for tick in range(1, 5):
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]]
     for tick in range(5, 15):
         if hub.state.hears_clients:
             hub.enter("ear", boot=f"at {tick}")
             hub.core.client_gone("ear", 0)
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]], "who has left cannot leave"
 
 
@@ -156,7 +156,7 @@ def restarted(hub: Hub, proceeds: bool = True) -> Hub:
     hub.say(channels.BUILD, "vhub", msgspec.structs.replace(BUILD, deployment=PLAYERS, boot="boot-2"))
     hub.core.begin(recall(load_deployment(PLAYERS, TABLE.name), BUILD.run, records, None, 0), 0)
     if proceeds:
-        hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+        hub.say(channels.RESUME_GRANT, "vhub", ResumeGrant("vhub", "boot-2", 0))
     return hub
 
 
@@ -206,7 +206,7 @@ def test_the_account_tells_of_the_process_that_joins(
         if who is not None:
             hello(hub, RED, *who)
     assert join(hub, RED, living[0]) == []
-    report = hub.core.door.absences.report()
+    report = hub.core.clients.absences.report()
     assert (report["away"], len(report["over"])) == ([], entries)
 
 
@@ -217,10 +217,10 @@ def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None
     hello(hub, RED, "one", 1)
     hello(hub, RED, "two", 0)
     hub.done(RED, 5, sent(1))
-    assert RED in hub.core.waited
+    assert RED in hub.core.clients.waited
     join(hub, RED, "two")
     hub.done(RED, 5, sent(1), boot="two")
-    assert RED not in hub.core.waited
+    assert RED not in hub.core.clients.waited
 
 
 def test_of_processes_that_come_and_go_under_one_name_the_last_are_kept() -> None:
@@ -251,7 +251,7 @@ def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(
     hello(hub, BLUE, "one", 1)
     join(hub, BLUE, "one")
     hub.done(BLUE, 5)
-    assert hub.core.waited == [RED] and not hub.said(channels.DOWN)
+    assert hub.core.clients.waited == [RED] and not hub.said(channels.DOWN)
     hub.now_ns = 30_000 * MS
     hub.core.wake(hub.now_ns)
     hub.core.advance(hub.now_ns)
@@ -284,7 +284,7 @@ def left_owing() -> tuple[Hub, Go]:
     hub.say(channels.CLIENT_HELLO, RED, ClientHello(RED, "two", limits.PROTOCOL_VERSION, "", 0))
     hub.now_ns = 30_000 * MS
     hub.core.wake(hub.now_ns)
-    assert hub.core.waited == [BLUE]
+    assert hub.core.clients.waited == [BLUE]
     return hub, go
 
 
@@ -316,7 +316,7 @@ def test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_uns
     assert owed not in told(hub, RED)
     hub = restarted(hub, proceeds=False)
     assert told(hub, RED) == []
-    hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+    hub.say(channels.RESUME_GRANT, "vhub", ResumeGrant("vhub", "boot-2", 0))
     assert told(hub, RED) == [owed]
 
 

@@ -34,7 +34,7 @@ from foosim.vhub.main import HubOptions, HubProcess
 from foosim.vhub.recording import file as capture_file
 from foosim.vhub.recording.file import CaptureFile, Described
 from foosim.vhub.recording.recovery import UNCLEAN, recover_capture
-from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
+from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
 from tests.vhub.conftest import NAME
 from tests.vhub.test_capture_recovery import LAST
 

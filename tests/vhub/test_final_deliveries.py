@@ -9,7 +9,7 @@ from foosim.common import limits
 from foosim.deployment.loader import apply_sets
 from foosim.protocol import channels
 from foosim.protocol.messages import ClientHello, Epoch, Join, Subscription, Want
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from tests.vhub.test_sessions import BUILD, DEPLOYMENT, FRAME, OWNERS, PERIODS, TEXT, Hub, sent
 
 W = limits.RELEASE_AHEAD

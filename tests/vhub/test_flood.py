@@ -12,7 +12,7 @@ from foosim.protocol import channels
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Deliveries, Sent, Up
 from foosim.runtime.journal import Journal
-from foosim.vhub.records import fold
+from foosim.vhub.state.records import fold
 from foosim.world.robot_packets import RobotPacket
 from tests.vhub.conftest import Driver, HubRun
 

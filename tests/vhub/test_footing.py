@@ -10,18 +10,18 @@ from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
-from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor.state import InputBuffer
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording.queue import Keep, KeepEpoch
-from foosim.vhub.records import HeadRecord, HubRecord
-from foosim.vhub.resume import recall
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.state.records import HeadRecord, HubRecord
+from foosim.vhub.state.resume import recall
 from tests.client.test_core import DEPLOYMENT, NAME, TEXT
 from tests.client.test_return import Storm
 
 CLOSED: Final = 7
-Said = list[Action | Keep | KeepEpoch]
+Said = list[Action | RecordClosing | RecordEpoch]
 
 
 class Waiting(Storm):
@@ -51,10 +51,10 @@ class Waiting(Storm):
             self.carry(self.hand)
 
     def waits(self) -> bool:
-        return self.hub.footing.waits
+        return self.hub.handshake.waits
 
     def lost_machine(self) -> bool:
-        return self.hub.footing.lost_machine
+        return self.hub.handshake.lost_machine
 
     def take(self) -> Said:
         taken: Said = [*self.hub.actions]
@@ -68,7 +68,7 @@ class Waiting(Storm):
         self.tell(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
     def proceed(self, epoch: int, boot: str = "boot-2") -> None:
-        self.tell(channels.PROCEED, "vhub", encode(Proceed("vhub", boot, epoch)))
+        self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", boot, epoch)))
 
 
 def published(said: Said, channel: channels.Channel) -> list[bytes]:
@@ -77,7 +77,7 @@ def published(said: Said, channel: channels.Channel) -> list[bytes]:
 
 def test_it_tells_where_it_stands_and_waits() -> None:
     air = Waiting()
-    (told,) = [decode(Standing, payload) for payload in published(air.take(), channels.STANDING)]
+    (told,) = [decode(ResumeState, payload) for payload in published(air.take(), channels.RESUME_STATE)]
     assert (told.boot, told.supervisor, told.epoch) == ("boot-2", "first", 1)
     assert told.waits and not told.lost_machine and told.final >= CLOSED + 1
     air.tick = CLOSED
@@ -89,7 +89,7 @@ def test_it_tells_where_it_stands_and_waits() -> None:
     air.now_ns += limits.WANT_EVERY_NS_MAX
     air.hub.wake(air.now_ns)
     again = air.take()
-    assert published(again, channels.STANDING) and not published(again, channels.WANT), "it asks whether it may"
+    assert published(again, channels.RESUME_STATE) and not published(again, channels.WANT), "it asks whether it may"
     air.proceed(1)
     said = air.take()
     (last,) = [decode(Deliveries, raw) for raw in published(said, channels.DELIVERIES)]
@@ -161,10 +161,10 @@ def test_a_branch_from_before_what_is_closed_is_refused() -> None:
 
 @pytest.mark.parametrize("branch", [0, 3])
 def test_deliveries_count_in_their_branch(branch: int) -> None:
-    arrivals = Arrivals()
-    arrivals.stand_at(5, branch)
+    inputs = InputBuffer()
+    inputs.reset(5, branch)
     other = Deliveries(5, [], 2, 3 - branch)
-    assert not arrivals.take_deliveries(other, encode(other), 5) and arrivals.delivered == 4
+    assert not inputs.take_deliveries(other, encode(other), 5) and inputs.delivered == 4
     own = Deliveries(5, [], 2, branch)
-    assert arrivals.take_deliveries(own, encode(own), 5) and arrivals.delivered == 7
-    assert decode(Deliveries, arrivals.deliveries[7]) == Deliveries(7, [], 0, branch)
+    assert inputs.take_deliveries(own, encode(own), 5) and inputs.delivered == 7
+    assert decode(Deliveries, inputs.deliveries[7]) == Deliveries(7, [], 0, branch)

@@ -13,8 +13,8 @@ from foosim.protocol.messages import Commit, End, Tempo, Up
 from foosim.vhub.main import needs_record
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.paced_release import Release, Releases
-from foosim.vhub.recording.queue import Keep, Keeping
-from foosim.vhub.records import Closing
+from foosim.vhub.state.capture_queue import CaptureQueue, RecordClosing
+from foosim.vhub.state.records import Closing
 from tests.vhub.test_sessions import FRAME, MS, Hub, sent
 
 T: Final = 2 * MS
@@ -25,12 +25,12 @@ def closing(tick: int) -> Closing:
     return Closing(type(FRAME)(tick, FRAME.layout, FRAME.values), b"", [], [])
 
 
-def ticks(kept: list[Keep]) -> list[int]:
+def ticks(kept: list[RecordClosing]) -> list[int]:
     return [keep.closing.frame.tick for keep in kept]
 
 
 def test_closings_wait_for_the_oldest_of_which_something_waits() -> None:
-    keeping = Keeping()
+    keeping = CaptureQueue()
     for tick in range(5, 9):
         keeping.add(closing(tick))
     assert ticks(keeping.take(5)) == []
@@ -81,7 +81,7 @@ class Kept:
 
     def take(self) -> None:
         actions = [*self.hub.core.actions]
-        self.kept += [action.closing for action in actions if isinstance(action, Keep)]
+        self.kept += [action.closing for action in actions if isinstance(action, RecordClosing)]
         self.journaled += sum(isinstance(action, Journal) for action in actions)
         for down in self.hub.said(channels.DOWN):
             self.left += [(packet.sequence, self.hub.now_ns) for packet in down.packets]
@@ -117,13 +117,13 @@ def test_at_the_end_what_waits_leaves_and_all_closings_are_kept() -> None:
 
 def ended_amid(hub: Hub, tick: int) -> list[Closing]:
     """What the capture gets of a run that ends at `tick` while the vHub waits for something before it."""
-    kept = [action.closing for action in hub.core.actions if isinstance(action, Keep)]
+    kept = [action.closing for action in hub.core.actions if isinstance(action, RecordClosing)]
     hub.core.actions.clear()
     hub.say(channels.END, "supervisor", End(tick, "lost the journal", True))
     hub.now_ns += limits.DOWNLINK_KEPT_NS
     hub.core.wake(hub.now_ns)
     assert hub.core.finished
-    return kept + [action.closing for action in hub.core.actions if isinstance(action, Keep)]
+    return kept + [action.closing for action in hub.core.actions if isinstance(action, RecordClosing)]
 
 
 def test_frames_behind_a_tick_that_is_half_closed_are_kept() -> None:

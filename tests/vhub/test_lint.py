@@ -18,17 +18,17 @@ from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
 from foosim.vhub.links.summary import (
-    Use,
+    SharedSettings,
     delay_of,
-    meaning_of,
-    meanings,
     ranges_of,
     reordered_of,
     residual_of,
+    summaries,
+    summary_of,
     uses_alone,
     uses_of,
 )
-from foosim.vhub.links.summary_text import LINES_MAX, meaning_line, start_lines
+from foosim.vhub.links.summary_text import LINES_MAX, start_lines, summary_line
 from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
 from tests.turns import BY_PERIOD
 
@@ -123,7 +123,7 @@ def test_ranges_are_where_the_formulas_say() -> None:
     ],
 )  # fmt: skip
 def test_what_looks_wrong_is_said(settings: Mapping[str, Any], warning: str) -> None:
-    assert warning in meaning_of(Use("one", "", radio(**settings)), {}).warnings
+    assert warning in summary_of(SharedSettings("one", "", radio(**settings)), {}).warnings
 
 
 def test_how_many_packets_overtake() -> None:
@@ -137,8 +137,8 @@ def test_how_many_packets_overtake() -> None:
     free, later = exp(-10 / 15) / 2, 1 - exp(-10 / 15) / 2
     expected = [free, 0.1, 0.9 * free + 0.1 * later, None, None]
     assert shares == [None if of is None else pytest.approx(of, rel=0.01) for of in expected]
-    internet = meaning_of(Use("one", "", radio(preset="internet")), {})
-    assert "25.7 % overtaken at 100 packets/s" in meaning_line(internet)
+    internet = summary_of(SharedSettings("one", "", radio(preset="internet")), {})
+    assert "25.7 % overtaken at 100 packets/s" in summary_line(internet)
 
 
 def test_ranges_are_from_where_the_ends_and_their_antennas_are() -> None:
@@ -177,12 +177,12 @@ def test_every_link_of_a_deployment_is_in_one_line() -> None:
     }
     assert uses["seen", ""].example == ("camera", "player-blue")
     assert uses["wifi", "wifi"].example == ("player-red", "red.goal"), "one that carries packets"
-    assert [meaning.warnings for meaning in meanings(made) if meaning.rule == "idle"] == [("no link uses it",)]
+    assert [summary.warnings for summary in summaries(made) if summary.rule == "idle"] == [("no link uses it",)]
 
 
 def test_who_offers_more_than_is_carried_is_warned_of() -> None:
     made = deployment("{links: [{id: thin, from: '*', to: '*', rate: 64 kbit/s}]}")
-    (thin,) = meanings(made)
+    (thin,) = summaries(made)
     assert thin.warnings == ("one sender offers 100 packets/s by what is declared; of 100 B it carries 80/s",)
 
 
@@ -207,15 +207,15 @@ def test_a_network_alone_is_shown_over_its_radios() -> None:
 
 
 def test_lines_are_for_people() -> None:
-    wifi = meaning_of(Use("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, 1, ("a", "b")), {})
-    assert meaning_line(wifi) == (
+    wifi = summary_of(SharedSettings("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, 1, ("a", "b")), {})
+    assert summary_line(wifi) == (
         "wifi: wifi, 1 of 2 links carry declared packets (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, "
         "sd 301 us, p99 1.68 ms, at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, "
         "29.81 Mbit/s, 10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
     )
     lines = start_lines([wifi] * 40, "some.yaml")
     assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim-net lint some.yaml"
-    assert start_lines([wifi], "some.yaml") == [f"network {meaning_line(wifi)}"]
+    assert start_lines([wifi], "some.yaml") == [f"network {summary_line(wifi)}"]
 
 
 def test_means_of_models_of_loss_and_delay() -> None:
@@ -271,15 +271,15 @@ def test_sensor_and_player_in_step_are_told(delay: str, sets: tuple[str, ...], w
     """What tests/vhub/test_ages.py measures: 10 ms at 1.3 ms and at 7 ms of delay alike."""
     link = f"network.links=[{{id: w, from: '*', to: '*', delay: {delay}}}]"
     text = apply_sets(TABLE.read_text(), TABLE.name, [*BY_PERIOD, link, *sets])
-    (meaning,) = meanings(load_deployment(text, TABLE.name))
-    assert len(meaning.warnings) == bool(what)
+    (summary,) = summaries(load_deployment(text, TABLE.name))
+    assert len(summary.warnings) == bool(what)
     if what:
-        (warning,) = meaning.warnings
+        (warning,) = summary.warnings
         assert warning.startswith("player-red and 1 more see camera ball and 8 more channels ") and what in warning
 
 
 @pytest.mark.parametrize("name", ["table", "cluster", "warehouse"])
 def test_of_what_is_shipped_nothing_is_warned(name: str) -> None:
     path = TABLE.with_stem(name)
-    found = meanings(load_deployment(path.read_text(), path.name))
-    assert found and [warning for meaning in found for warning in meaning.warnings] == []
+    found = summaries(load_deployment(path.read_text(), path.name))
+    assert found and [warning for summary in found for warning in summary.warnings] == []

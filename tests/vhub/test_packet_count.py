@@ -8,7 +8,7 @@ import pytest
 
 from bench.packets import Count, Load, run
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 
 TICKS: Final = 180
 LOAD: Final = Load(packets=8, deaths_every=60)

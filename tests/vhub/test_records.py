@@ -16,11 +16,11 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Down
 from foosim.runtime.journal import Journal, journal_files, read_journal, read_records
 from foosim.runtime.journal_format import FRAMING_BYTES
-from foosim.vhub.recording.queue import Keep, KeepEpoch
 from foosim.vhub.recording.rows_of_closing import Entry, Plan, packet_entry, plan_of, world_rows
-from foosim.vhub.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
-from foosim.vhub.resume import Captured, recall
-from foosim.vhub.state import HubState
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.state.resume import Captured, recall
 from foosim.world.frame import CHAIN_START, Frame, chain_next
 from tests.vhub.conftest import EPOCH_AT
 
@@ -168,13 +168,14 @@ def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: Hu
     live = {(name, down.number, encode(down)) for name, down in hub_run.downs if isinstance(down, Down)}
     again = {(name, number, payload) for name, downs in past.downlinks.items() for number, payload in downs}
     assert again and again <= live | {item for item in again if item[0] != "watcher"}
-    kept = [item.closing.frame.tick for item in past.kept if isinstance(item, Keep)]
+    kept = [item.closing.frame.tick for item in past.kept if isinstance(item, RecordClosing)]
     assert kept == ([] if captured is None else list(range(captured + 1, 64)))
-    epochs = [item.epoch.epoch for item in past.kept if isinstance(item, KeepEpoch)]
+    epochs = [item.epoch.epoch for item in past.kept if isinstance(item, RecordEpoch)]
     assert epochs == ([] if captured is None else [2] if captured >= 0 else [1, 2])
     if captured is not None:
-        second = next(at for at, item in enumerate(past.kept) if isinstance(item, KeepEpoch) and item.epoch.epoch == 2)
-        before = sum(isinstance(item, Keep) for item in past.kept[:second])
+        begun = (at for at, item in enumerate(past.kept) if isinstance(item, RecordEpoch) and item.epoch.epoch == 2)
+        second = next(begun)
+        before = sum(isinstance(item, RecordClosing) for item in past.kept[:second])
         assert before == max(0, EPOCH_AT - captured - 1), "it holds from its tick on"
     assert (past.known is not None and past.known.tick == captured) if captured is not None and captured >= 0 else True
 

@@ -13,7 +13,6 @@ from foosim.protocol import channels
 from foosim.protocol.messages import Tempo
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.paced_release import ANCHOR_WINDOW_NS, Release, Releases
-from foosim.vhub.status import report
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 MS: Final = 1_000_000
@@ -200,7 +199,7 @@ def test_a_report_tells_how_late_packets_left() -> None:
     hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
     hub.begin()
     hub.enter("ear")
-    assert decode_json(report(hub.core))["lateness_ms"] is None
+    assert decode_json(hub.core.heartbeat().report)["lateness_ms"] is None
     hub.commit(0)
     for name in PERIODS:
         hub.done(name, 0, *([sent(1, "ear")] if name == "hand" else []))
@@ -210,4 +209,9 @@ def test_a_report_tells_how_late_packets_left() -> None:
     (down,) = [down for down in hub.said(channels.DOWN) if down.packets]
     late = hub.now_ns - max(packet.due_ns for packet in down.packets)
     assert late >= 7 * MS
-    assert decode_json(report(hub.core))["lateness_ms"] == {"p50": late / MS, "p99": late / MS, "max": late / MS}
+    told = decode_json(hub.core.heartbeat().report)["lateness_ms"]
+    assert told == {
+        "p50": late / MS,
+        "p99": late / MS,
+        "max": late / MS,
+    }

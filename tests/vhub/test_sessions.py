@@ -37,10 +37,10 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.vhub.core import HubCore
-from foosim.vhub.members import may_lockstep
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.sessions import Sessions
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.members import may_lockstep
 from foosim.world.initial_state import initial_frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

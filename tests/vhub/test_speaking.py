@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
+
 from foosim.common.json_text import decode_json
 from foosim.common.limits import HEARTBEAT_NS
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Farewell, Tempo, Up
+from foosim.vhub.core import HubCore
 from foosim.vhub.status import LINKS_TOLD_EVERY
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
@@ -16,13 +19,14 @@ def test_deliveries_may_leave_behind_their_record_and_before_the_rest_of_the_clo
     hub = Hub().begin()
     hub.said()
     spoken: list[list[object]] = []
+    with pytest.MonkeyPatch.context() as patch:
 
-    def speak(now_ns: int) -> int:
-        spoken.append([*hub.core.actions])
-        return now_ns + 7
+        def advance(core: HubCore, now_ns: int) -> None:
+            while core.step(now_ns, now_ns + 7 * len(spoken)):
+                spoken.append([*core.actions])
 
-    hub.core.speak = speak
-    hub.close(0)
+        patch.setattr(HubCore, "advance", advance)
+        hub.close(0)
     actions, _ = spoken
     assert isinstance(actions[-2], Journal)
     assert isinstance(actions[-1], Publish) and actions[-1].channel is channels.DELIVERIES

@@ -13,7 +13,7 @@ from foosim.capture.reader import open_capture
 from foosim.common import limits
 from foosim.protocol.messages import Sent
 from foosim.runtime.journal import Journal, JournalError, read_journal
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from tests.links.offered import Hub, deployment_of
 from tests.vhub.conftest import drive, write_capture
 

@@ -30,7 +30,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub import status
 from foosim.vhub.network.packet import DROPPED, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, Watching
 from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
@@ -114,7 +114,11 @@ def test_a_run_is_the_same_whoever_looks() -> None:
     alone, looked_at = unseen(), seen()
     assert looked_at.system.people.viewed and looked_at.watched["readings"]
     one, other = alone.system, looked_at.system
-    assert one.supervisor.chain == other.supervisor.chain and one.hub.state is not None and other.hub.state is not None
+    assert (
+        one.supervisor.state.chain == other.supervisor.state.chain
+        and one.hub.state is not None
+        and other.hub.state is not None
+    )
     assert one.hub.state.snapshot() == other.hub.state.snapshot()
     rows = [[packet_row(flight) for closing in run.closings for flight in closing.fates] for run in (alone, looked_at)]
     assert len(rows[0]) > 300 and rows[0] == rows[1]
@@ -160,7 +164,7 @@ def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:
 
 
 def evidence(run: Run, frames: Mapping[int, Frame] | None = None) -> Reported:
-    deployment = run.system.supervisor.deployment
+    deployment = run.system.supervisor.state.deployment
     return Reported(deployment, run.watched, lambda tick: None if frames is None else frames.get(tick))
 
 
@@ -170,7 +174,7 @@ class Everything:
     versions: Final[Mapping[str, str]] = {}
 
     def __init__(self, run: Run) -> None:
-        self.deployment: Deployment = run.system.supervisor.deployment
+        self.deployment: Deployment = run.system.supervisor.state.deployment
         self._closings = run.closings
 
     def asked(self, until: int) -> Iterable[tuple[int, str]]:
@@ -206,7 +210,7 @@ def test_an_event_that_was_asked_for_is_known_in_an_explanation() -> None:
     assert {row.cause for row, _ in told} == {"partition"}
     policy = [step.text for _, explained in told for step in explained.steps if step.stage == "policy"]
     assert all("cut by request 1" in text for text in policy)
-    deployment = run.system.supervisor.deployment
+    deployment = run.system.supervisor.state.deployment
     console, (tick, _) = Shown(deployment), run.watched["asked"][-1]
     calm = {**run.watched, "drops": {f"{LINK[0]}>{LINK[1]}": []}}
     (before,) = console.drops(calm, [LINK], (tick - 1) * deployment.tick_ns, {tick: "browser 3"})
@@ -266,7 +270,7 @@ def test_what_cannot_be_looked_at_is_refused(arguments: dict[str, Any], text: st
 
 def test_so_much_is_looked_at_together_and_no_more() -> None:
     run = Run(ticks=30)
-    ends = run.system.supervisor.deployment.endpoints()
+    ends = run.system.supervisor.state.deployment.endpoints()
     pairs = [(a, b) for a in ends for b in ends]
     answers: list[str] = []
     asked = (("one", pairs[:40]), ("other", pairs[20:60]), ("third", pairs[60:90]))
@@ -300,7 +304,7 @@ def test_a_report_of_what_is_looked_at_has_a_size() -> None:
 
 def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> None:
     run = seen()
-    console = Shown(run.system.supervisor.deployment)
+    console = Shown(run.system.supervisor.state.deployment)
     reports = [status["watched"] for status in run.reports if "watched" in status]
     messages = [console.drops(status, [LINK]) for status in reports]
     (last,) = next(told for told in reversed(messages) if told)

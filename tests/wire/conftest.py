@@ -19,9 +19,9 @@ from typing import IO, Any, Final, TypeVar
 
 import pytest
 
+from foosim.client import control
 from foosim.common.errors import Refused
 from foosim.runtime.run_folder import RunFolder, RunInfo, live_runs
-from foosim.supervisor import control
 
 TABLE: Final = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 LONG: Final = (

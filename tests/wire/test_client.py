@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from foosim.client import connect
+from foosim.client import connect, control
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
-from foosim.supervisor import control
 from foosim.world.payloads import RodPosition
 
 if TYPE_CHECKING:

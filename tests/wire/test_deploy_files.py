@@ -13,10 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from foosim.client.control import Control
 from foosim.common.units import parse_pace
 from foosim.deployment.loader import apply_sets
 from foosim.rehearsal.run import rehearse
-from foosim.supervisor.control import Control
 from tests.deploy.processes import Declared, from_compose, from_kubernetes, from_units
 from tests.wire.conftest import LONG
 from tests.wire.test_run import free_port

@@ -12,11 +12,11 @@ import pytest
 from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
 from foosim.client import connect
+from foosim.client.control import Control
 from foosim.client.errors import RunEnded
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
-from foosim.supervisor.control import Control
 from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 from tests.wire.test_same_bytes import PLAYERS, scribes

@@ -32,7 +32,7 @@ LISTEN: Final = "10.77.0.1:7400"
 DESK: Final = """
 import sys
 from foosim.protocol.codec import encode_json
-from foosim.supervisor.control import Control
+from foosim.client.control import Control
 with Control(sys.argv[1]) as control:
     for line in sys.stdin:
         verb = line.strip()

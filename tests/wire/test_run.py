@@ -15,6 +15,8 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import PacketRow
+from foosim.client import control
+from foosim.client.control import Control, RequestRefused
 from foosim.common.names import LINE_NAMES, TEAMS
 from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
@@ -23,8 +25,6 @@ from foosim.protocol.messages import Commit
 from foosim.replay.verify import verify_capture
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.inbox import Inbox
-from foosim.supervisor import control
-from foosim.supervisor.control import Control, RequestRefused
 from foosim.world.frame import frame_from_bytes
 from foosim.world.layout import build_layout
 from tests.wire.conftest import LIMIT_S, LONG

@@ -7,13 +7,13 @@ import signal
 from pathlib import Path
 
 from foosim.capture.reader import open_capture
+from foosim.client import control
 from foosim.client.client import connect
+from foosim.client.control import Control
 from foosim.launcher.pki import certificates as pki
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.certificates import operator_credentials
-from foosim.supervisor import control
-from foosim.supervisor.control import Control
 from tests.wire.conftest import LIMIT_S, House
 from tests.wire.test_run import last_json
 

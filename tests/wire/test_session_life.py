@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 import zenoh
 
+from foosim.client.control import Control
 from foosim.common.errors import BadValue
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, Plane
@@ -19,7 +20,6 @@ from foosim.runtime.loop import Wire
 from foosim.runtime.transport import session as sessions
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import ConnectError, ListenError, Session
-from foosim.supervisor.control import Control
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"

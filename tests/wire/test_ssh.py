@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from foosim.client.control import Control
 from foosim.common.errors import Failed
 from foosim.deployment.hosts import Host
 from foosim.launcher.hosts import ssh as remote_module
@@ -24,7 +25,6 @@ from foosim.launcher.hosts.prepare import fetch_capture
 from foosim.launcher.hosts.ssh import CAPTURE, Remote
 from foosim.launcher.processes import Child, Launcher
 from foosim.runtime.transport.certificates import operator_credentials
-from foosim.supervisor.control import Control
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE, command_path, processes_with, wait_for
 from tests.wire.sshd import Sshd, run

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foosim.capture.reader import open_capture
+from foosim.client.control import Control, answer_to
 from foosim.common.json_text import encode_json
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Request
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.run_folder import open_run
-from foosim.supervisor.control import Control, answer_to
 from foosim.vhub.recording.recovery import recover_capture
 from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
@@ -57,8 +57,8 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
-    assert [entry["what"] for entry in content["recoveries"]] == 3 * ["supervisor"]
-    assert all(entry["outage_ms"] > 0 for entry in content["recoveries"])
+    back = [entry for entry in content["recoveries"] if entry["what"] == "supervisor"]
+    assert len(back) == 3 and all(entry["outage_ms"] > 0 for entry in back)
     assert err.count("the supervisor was started again") == 3
     assert content["reason"] == "stopped" and content["moves"] == 1
     assert open_capture(house.folder / content["capture"]).about.finished

@@ -25,7 +25,7 @@ import sys
 from foosim.protocol import session_settings
 session_settings.LEASE_MS = 900_000
 from foosim.runtime.transport.inbox import Inbox
-from foosim.supervisor.control import Control
+from foosim.client.control import Control
 inbox = Inbox(10_000)
 with Control(sys.argv[1], role="viewer") as control:
     control.view(inbox)

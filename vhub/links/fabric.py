@@ -13,6 +13,7 @@ from typing import Final
 
 from foosim.common.keyed_random import Slot, draw_key, draw_words
 from foosim.deployment.network.impairments import Impairments, TableJitter
+from foosim.deployment.network.link_settings import NO_RADIO, Profile, Profiles, over
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network, event_of
 from foosim.deployment.network.traces import read_opportunities, read_table
@@ -24,7 +25,6 @@ from foosim.vhub.network.good_bad_periods import Times
 from foosim.vhub.network.jitter import quantiles_ns
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.link_settings import NO_RADIO, Profile, Profiles, over
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.timeline import FOREVER_NS, Timeline
@@ -222,7 +222,7 @@ class Fabric:
         self.seed = deployment.seed if self.network.seed is None else self.network.seed
         self.timeline = Timeline(self.network, self.seed, deployment.endpoints())
         self.world = World(deployment, self.network)
-        self.profiles = Profiles(deployment, self.network)
+        self.profiles = Profiles(self.network, deployment.carriers())
         self.states: dict[LinkKey, LinkState] = {}
         """What the links remember that packets were sent on."""
         self.radios: dict[RadioKey, RadioState] = {}
@@ -268,7 +268,7 @@ class Fabric:
         kind = self.profiles.kind(channel)
         link = self._links.get((source, destination, kind))
         if link is None:
-            rule = self.network.rule_for(source, destination, channel)
+            rule = self.profiles.rule_for(source, destination, channel)
             key = source, destination, "" if rule is None else rule.id
             link = self._by_rule.get(key)
             if link is None:

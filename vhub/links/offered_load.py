@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-from foosim.vhub.network.link_settings import Profile, Profiles
 
 DRIVEN: Final = ("rod", "rover")
 """The models of robots that take commands."""

@@ -13,6 +13,7 @@ from math import exp, inf
 from typing import Final
 
 from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
+from foosim.deployment.network.link_settings import NO_RADIO, Profiles, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network.traces import read_opportunities, read_table
@@ -21,7 +22,6 @@ from foosim.deployment.schema import Deployment
 from foosim.vhub.links.offered_load import flows_of, offered_hz, used_links
 from foosim.vhub.links.phase import phase_warnings
 from foosim.vhub.network.jitter import interpolate_ns, moments_ns, quantiles_ns
-from foosim.vhub.network.link_settings import NO_RADIO, Profiles, over, preset_radio
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
     LRWPAN_OVERHEAD_BYTES,
@@ -51,7 +51,7 @@ SPACING_NS: Final = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Use:
+class SharedSettings:
     """Settings that links have: those of a rule over a radio, of a radio alone, or of neither."""
 
     rule: str
@@ -67,7 +67,7 @@ class Use:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class Throughput:
     """How packets of one size go: airtime of one attempt, bit/s that one station and MANY together get across."""
 
     size: int
@@ -78,7 +78,7 @@ class Carried:
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class LinkSummary:
     """What settings mean. Times are in ns, lengths in m; None is where there is no such thing, inf without an end."""
 
     rule: str
@@ -100,7 +100,7 @@ class Meaning:
     reordered: float | None
     """The share of packets that the next one overtakes, when one comes every SPACING_NS; None where none does."""
     rate_bps: int | None
-    carried: tuple[Carried, ...]
+    carried: tuple[Throughput, ...]
     range_los_m: float | None
     """At which 90 % of single frames of SMALL_BYTES arrive, at the lowest rate, in line of sight."""
     range_nlos_m: float | None
@@ -121,15 +121,15 @@ class Meaning:
 # --- which settings there are ----------------------------------------------------------------------------------------
 
 
-def uses_of(deployment: Deployment) -> list[Use]:
+def uses_of(deployment: Deployment) -> list[SharedSettings]:
     """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses; the
     example of each is a link that carries packets, if there is one."""
-    network, profiles = deployment.network, Profiles(deployment, deployment.network)
+    network, profiles = deployment.network, Profiles(deployment.network, deployment.carriers())
     used = used_links(flows_of(deployment, profiles))
-    found: dict[tuple[str, str], Use] = {}
+    found: dict[tuple[str, str], SharedSettings] = {}
     endpoints = deployment.endpoints()
     pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
-    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in network.rules_for(*pair)):
+    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in profiles.rules_for(*pair)):
         profile = profiles.of_rule(rule, source, destination)
         key = profile.rule, profile.radio
         known, carrying = found.get(key), used.get(key, set())
@@ -140,41 +140,41 @@ def uses_of(deployment: Deployment) -> list[Use]:
             continue
         one, other = (HEIGHT_M if place is None else place[2] for place in map(network.place_of, pair))
         count = len(carrying)
-        found[key] = Use(profile.rule, profile.radio, profile.settings, links, count, pair, (one, other))
+        found[key] = SharedSettings(profile.rule, profile.radio, profile.settings, links, count, pair, (one, other))
     order = {rule.id: number for number, rule in enumerate(network.links)}
     uses = sorted(found.values(), key=lambda use: (order.get(use.rule, len(order)), use.rule, use.radio))
     idle = [name for name in network.radios if all(use.radio != name for use in uses)]
-    return [*uses, *(Use(name, name, network.radios[name], 0, 0) for name in idle)]
+    return [*uses, *(SharedSettings(name, name, network.radios[name], 0, 0) for name in idle)]
 
 
-def uses_alone(network: Network) -> list[Use]:
+def uses_alone(network: Network) -> list[SharedSettings]:
     """Return the settings that a network's section has, without endpoints: each radio, each rule over its radio, or
     over each that there is."""
-    uses = [Use(name, name, radio) for name, radio in network.radios.items()]
+    uses = [SharedSettings(name, name, radio) for name, radio in network.radios.items()]
     for rule in network.links:
         via = [rule.via] if rule.via is not None else [*network.radios] or [""]
         for name in via:
             base = network.radios[name] if name else preset_radio(network.defaults.preset)
-            uses.append(Use(rule.id, name, over(base, rule)))
-    return uses or [Use(network.defaults.preset, "", preset_radio(network.defaults.preset))]
+            uses.append(SharedSettings(rule.id, name, over(base, rule)))
+    return uses or [SharedSettings(network.defaults.preset, "", preset_radio(network.defaults.preset))]
 
 
 # --- what they mean --------------------------------------------------------------------------------------------------
 
 
-def meanings(deployment: Deployment) -> list[Meaning]:
+def summaries(deployment: Deployment) -> list[LinkSummary]:
     """Return what the network of a deployment means; the deployment has its files."""
     uses = uses_of(deployment)
-    offered = offered_hz(flows_of(deployment, Profiles(deployment, deployment.network)))
+    offered = offered_hz(flows_of(deployment, Profiles(deployment.network, deployment.carriers())))
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
     for use in uses:
-        meaning = meaning_of(use, files)
-        warnings = [*meaning.warnings, *phased.get((use.rule, use.radio), ())]
+        summary = summary_of(use, files)
+        warnings = [*summary.warnings, *phased.get((use.rule, use.radio), ())]
         if use.links == 0:
             warnings.append("no link uses it")
-        capacity_hz = _capacity_hz(meaning)
+        capacity_hz = _capacity_hz(summary)
         load_hz = offered.get((use.rule, use.radio), 0.0)
         if capacity_hz is not None and load_hz > capacity_hz:
             which = "all together offer" if use.settings.is_on_air else "one sender offers"
@@ -182,11 +182,11 @@ def meanings(deployment: Deployment) -> list[Meaning]:
                 f"{which} {load_hz:.0f} packets/s by what is declared; of {SMALL_BYTES} B it carries "
                 f"{capacity_hz:.3g}/s"
             )
-        found.append(replace(meaning, warnings=tuple(warnings)))
+        found.append(replace(summary, warnings=tuple(warnings)))
     return found
 
 
-def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
+def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
     """Return what settings mean; `files` are those that they name, by path."""
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
@@ -195,7 +195,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
     los_m, nlos_m = ranges_of(settings, use.heights_m)
     duty = settings.duty_cycle
     is_limited = settings.is_on_air and duty < 1.0 and carried
-    meaning = Meaning(
+    summary = LinkSummary(
         use.rule,
         use.radio,
         use.links,
@@ -218,7 +218,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         None if settings.model is None else settings.model.name,
         (),
     )
-    return replace(meaning, warnings=tuple(_warnings(use, meaning)))
+    return replace(summary, warnings=tuple(_warnings(use, summary)))
 
 
 def residual_of(settings: Impairments) -> tuple[float, float | None, int | None]:
@@ -350,7 +350,7 @@ def _wifi_mode(settings: Radio, *, lowest: bool = False) -> str:
     return modes[0] if lowest else modes[-1]
 
 
-def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Carried, ...]:
+def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Throughput, ...]:
     """Return how small and large packets go; nothing where no rate limits them."""
     longest = LARGE_BYTES if settings.payload_max is None else min(LARGE_BYTES, settings.payload_max)
     sizes = sorted({min(SMALL_BYTES, longest), longest})
@@ -358,25 +358,25 @@ def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Carried, ..
     return () if not rate_bps else tuple(_carried(settings, size, rate_bps) for size in sizes if size)
 
 
-def _carried(settings: Radio, size: int, rate_bps: int) -> Carried:
+def _carried(settings: Radio, size: int, rate_bps: int) -> Throughput:
     bits = 8 * size
     if settings.medium == "wifi":
         mode, timing = _wifi_mode(settings), wifi_timing(settings)
         airtime_ns, ack_ns = wifi_airtime_ns(mode, size, timing), wifi_ack_ns(mode, timing)
         one, many = (saturation_rate_hz(n, airtime_ns, ack_ns, timing) for n in (1, MANY))
-        return Carried(size, airtime_ns, int(bits * one), int(bits * many))
+        return Throughput(size, airtime_ns, int(bits * one), int(bits * many))
     if settings.medium == "ieee802154":
         airtime_ns = lrwpan_airtime_ns(size)
         timing_154 = replace(LRWPAN, retries=settings.retries)
         one, many = (sensing(n, airtime_ns, True, timing_154).rate_hz for n in (1, MANY))
-        return Carried(size, airtime_ns, int(bits * one), int(bits * many))
+        return Throughput(size, airtime_ns, int(bits * one), int(bits * many))
     if settings.medium == "lora":
         airtime_ns = lora_airtime_ns(settings.spreading_factor, size, int(settings.bandwidth_hz), settings.coding_rate)
         load = min(0.5, MANY * settings.duty_cycle)  # pure ALOHA: G e^-2G, at most at G = 1/2
         one, many = (share * bits * 1e9 / airtime_ns for share in (settings.duty_cycle, load * exp(-2.0 * load)))
-        return Carried(size, airtime_ns, int(one), int(many))
+        return Throughput(size, airtime_ns, int(one), int(many))
     airtime_ns = serialisation_ns(size + settings.overhead_bytes, rate_bps)
-    return Carried(size, airtime_ns, bits * 1_000_000_000 // airtime_ns, None)
+    return Throughput(size, airtime_ns, bits * 1_000_000_000 // airtime_ns, None)
 
 
 def ranges_of(settings: Radio, ends_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)) -> tuple[float | None, float | None]:
@@ -416,7 +416,7 @@ def _least_dbm(settings: Radio, noise_dbm: float) -> float:
     return -inf
 
 
-def _queue_ns(settings: Radio, carried: Sequence[Carried]) -> int | None:
+def _queue_ns(settings: Radio, carried: Sequence[Throughput]) -> int | None:
     if not carried:
         return None
     last, queue = carried[-1], settings.queue
@@ -425,16 +425,16 @@ def _queue_ns(settings: Radio, carried: Sequence[Carried]) -> int | None:
     return min(queue.wait_ns, int(packets * 8e9 * last.size / max(1.0, last.goodput_bps / share)))
 
 
-def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
+def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
     settings = use.settings
-    if meaning.loss > 0.5:
-        yield f"more than half of all packets is lost: {100.0 * meaning.loss:.1f} %"
-    if settings.ttl_ns is not None and meaning.delay_mean_ns > settings.ttl_ns:
-        yield f"the mean delay of {meaning.delay_mean_ns / 1e6:g} ms is above ttl, {settings.ttl_ns / 1e6:g} ms"
+    if summary.loss > 0.5:
+        yield f"more than half of all packets is lost: {100.0 * summary.loss:.1f} %"
+    if settings.ttl_ns is not None and summary.delay_mean_ns > settings.ttl_ns:
+        yield f"the mean delay of {summary.delay_mean_ns / 1e6:g} ms is above ttl, {settings.ttl_ns / 1e6:g} ms"
     if not settings.allow:
         yield "nothing passes: allow is off"
-    if meaning.range_los_m is not None and meaning.range_los_m < 1.0:
-        yield f"it does not reach 1 m ({meaning.range_los_m:.2f} m)"
+    if summary.range_los_m is not None and summary.range_los_m < 1.0:
+        yield f"it does not reach 1 m ({summary.range_los_m:.2f} m)"
     for low_hz, high_hz, share in LORA_DUTY_CYCLES if settings.medium == "lora" else ():
         at_hz = settings.frequency_hz
         if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
@@ -443,8 +443,8 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
         what = unheeded(key, settings.medium) if value else None
         if what is not None:
             yield f"{key} {what}"
-    if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
-        yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
+    if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
+        yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
@@ -455,9 +455,9 @@ def _has_queue(settings: Radio) -> bool:
     return "queue" in settings.model_fields_set
 
 
-def _capacity_hz(meaning: Meaning) -> float | None:
-    if not meaning.carried:
+def _capacity_hz(summary: LinkSummary) -> float | None:
+    if not summary.carried:
         return None
-    small = meaning.carried[0]
+    small = summary.carried[0]
     bps = small.goodput_bps if small.shared_bps is None else max(small.goodput_bps, small.shared_bps)
     return bps / 8.0 / small.size

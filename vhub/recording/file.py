@@ -45,7 +45,7 @@ from foosim.vhub.recording.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.recording.rows_of_closing import add_packets, epoch_entry, frame_row, plan_of, world_rows
 from foosim.vhub.recording.split import Split
 from foosim.vhub.recording.unfinished import Journalled, Left, Progress, look, run_of
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 
 

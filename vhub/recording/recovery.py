@@ -30,8 +30,8 @@ from foosim.runtime.journal import JournalError, journal_files, lock_journal, re
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.recording.file import CaptureFile, Described, Line
 from foosim.vhub.recording.unfinished import Journalled
-from foosim.vhub.records import Closing, HeadRecord, HubRecord, fold
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, fold
 
 UNCLEAN: Final = "unclean end"
 

@@ -48,12 +48,12 @@ from foosim.vhub.network.ages import quantile
 from foosim.vhub.network.air import DEAF
 from foosim.vhub.network.memory import Age
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
-from foosim.vhub.records import Closing
 from foosim.vhub.stages.capacity import EVICTED
 from foosim.vhub.stages.duty import DUTY_CYCLE
 from foosim.vhub.stages.medium import COLLISION
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_FULL
+from foosim.vhub.state.records import Closing
 from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout

@@ -12,10 +12,10 @@ from pathlib import Path
 from foosim.capture.contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
-from foosim.capture.state_at import InForce
+from foosim.capture.state_at import ActiveState
 from foosim.common.units import format_ns
 from foosim.deployment.schema import Capture
-from foosim.vhub.records import Closing
+from foosim.vhub.state.records import Closing
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Split:
 
     def __init__(self, path: Path, capture: Capture, tick_ns: int) -> None:
         self.number = 0
-        self.in_force = InForce(str(path))
+        self.in_force = ActiveState(str(path))
         self._path = path
         self._tick_ns = tick_ns
         self._every = capture.frames_every

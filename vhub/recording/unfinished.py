@@ -18,7 +18,7 @@ from foosim.capture.rows import EPOCHS, FRAME, PACKETS, TICK
 from foosim.common.errors import Malformed
 from foosim.common.json_text import decode_json
 from foosim.vhub.network.packet import IN_FLIGHT
-from foosim.vhub.resume import Captured
+from foosim.vhub.state.resume import Captured
 
 
 @dataclass(slots=True)

@@ -25,8 +25,8 @@ from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import Level
 from foosim.vhub.recording.file import CaptureFile, Described, Item, Line
 from foosim.vhub.recording.unfinished import Journalled
-from foosim.vhub.records import Closing
-from foosim.vhub.resume import Captured
+from foosim.vhub.state.records import Closing
+from foosim.vhub.state.resume import Captured
 
 GATHER_S: Final = 0.02
 """How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""

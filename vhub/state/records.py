@@ -1,9 +1,9 @@
-"""The vHub's journal: one record per closed tick, holding the inputs of the closing and what it gave.
+"""The vHub's journal: one record per closed tick, with the inputs of the closing and its result.
 
-A fold of the records through the same state gives frames, fates, what is in flight and the next deliveries again, byte
-for byte. The first record of a file holds the whole state, so that older files can go; such a head also stands between
-the ticks now and then, so that a fold need not begin far back. Beside them are the epochs, and who joins and leaves at
-a tick whose Go is said before its record is written; and which players are away.
+A fold of the records through the same state gives frames, fates, packets in flight and the next deliveries again, byte
+for byte. The first record of a file is a checkpoint of the whole state, so that older files can be removed; checkpoints
+also stand between ticks now and then, so that a fold need not begin far back. Further records are the epochs, the joins
+and leaves of a tick (its Go is sent before its record is written), and which players are away.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Build, Commit, Epoch, Recovered, Samples, Sent
 from foosim.vhub.network.memory import Age, Joining
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.state import HubState
+from foosim.vhub.state.hub_state import HubState
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.initial_state import first_chain

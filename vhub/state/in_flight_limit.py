@@ -1,7 +1,7 @@
-"""How much is on its way in the whole run: all of it stands in the state, and the state in one record of the journal.
+"""Bounds the bytes in flight in the whole run: all of them are in the state, and the state is one journal record.
 
-Half of what there may be is for whoever comes; of the other half each sender has an even share. So a clog without end
-fills no journal, and who sends little loses nothing by who sends much.
+Half of the bound is common; of the other half each sender has an even share. So a clog without end cannot fill the
+journal, and a sender of little loses nothing to a sender of much.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from foosim.vhub.network.packet import Flight
 TRANSIT_FULL: Final = "transit_full"
 
 
-class Transit:
-    """What is on its way, in bytes; `senders` is how many endpoints there are."""
+class InFlightLimit:
+    """Counts the bytes in flight; `senders` is the number of endpoints."""
 
     def __init__(self, senders: int) -> None:
         self._common_bytes = limits.TRANSIT_BYTES_MAX // 2
@@ -25,7 +25,7 @@ class Transit:
         self._by_source: dict[str, int] = {}
 
     def takes(self, flight: Flight) -> bool:
-        """Whether there is room for one more, which is on its way then."""
+        """Whether a packet fits; it counts as in flight then."""
         source, by_source = flight.source, self._by_source
         size = _size_of(flight)
         whole, own = self._bytes + size, by_source.get(source, 0) + size
@@ -35,13 +35,13 @@ class Transit:
         return True
 
     def restored(self, flight: Flight) -> None:
-        """One is on its way, as the state says that was written down."""
+        """Count a packet of a restored state."""
         size = _size_of(flight)
         self._bytes += size
         self._by_source[flight.source] = self._by_source.get(flight.source, 0) + size
 
     def arrived(self, flight: Flight) -> None:
-        """One is on its way no more."""
+        """A packet has reached its end."""
         size = _size_of(flight)
         self._bytes -= size
         self._by_source[flight.source] -= size

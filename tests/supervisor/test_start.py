@@ -18,7 +18,6 @@ from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import result, status
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000
@@ -45,7 +44,7 @@ class Run:
 
     def go(self) -> Run:
         self.system.run()
-        self.seen.json = result(self.core)
+        self.seen.json = self.core.result()
         return self
 
     def end_all(self) -> None:
@@ -81,13 +80,13 @@ def test_a_node_that_was_cut_off_while_players_start_takes_part() -> None:
     run.system.later(2 * S, lambda: run.system.pause("n1", 4 * S))
     run.system.later(3 * S, lambda: run.core.process_gone("n1", run.system.bus.now_ns))
     begun: list[bool] = []
-    run.system.later(11 * S, lambda: begun.append(status(run.core, 0)["begun"]))
+    run.system.later(11 * S, lambda: begun.append(run.core.status(0)["begun"]))
     run.go()
     assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
-    assert run.seen.json["recoveries"] == [] and run.core.epoch == 1
+    assert run.seen.json["recoveries"] == [] and run.core.state.epoch == 1
     silent = "lost node n1: its connection closed: nothing was heard of it for 1.1 s; the run waits"
     assert any(line.startswith(silent) for line in run.lines), "it was stopped, its lease ran out"
-    assert begun == [False] and status(run.core, 0)["begun"]
+    assert begun == [False] and run.core.status(0)["begun"]
 
 
 @pytest.mark.parametrize("when", ["first", "later"])
@@ -198,9 +197,9 @@ def test_a_resume_that_fails_leaves_the_run_as_it_was(sets: tuple[str, ...], lat
     run = Run((*sets, "deadlines.start=5 s"))
     run.resume_at(60, {SUPERVISOR: 0.1, "n1": 1.0, "n2": 1.0, VHUB: 1.0, late: 58.0})
     run.go()
-    assert run.core.end is None and run.core.beginning.abandoned == reason
-    assert f"the run does not go on from tick {run.core.frame.tick}: {reason}" in run.lines
-    assert fold(run.core.deployment, run.system.journal).end is None and not run.system.hub.finished
+    assert run.core.state.end is None and run.core.state.abandoned == reason
+    assert f"the run does not go on from tick {run.core.state.frame.tick}: {reason}" in run.lines
+    assert fold(run.core.state.deployment, run.system.journal).end is None and not run.system.hub.finished
     run.end_all()
     run.system._timers.clear()
     run.system.start(SUPERVISOR)
@@ -213,8 +212,8 @@ def test_a_loss_that_only_its_launcher_knows_of_ends_the_run_with_that_reason() 
     run = Run()
     run.system.at_tick(60, lambda: run.system.request("down", lost="vhub: it ended with exit code 3"))
     run.go()
-    assert run.core.end is not None and run.core.end.failed
-    assert run.core.end.reason == "lost vhub: it ended with exit code 3"
+    assert run.core.state.end is not None and run.core.state.end.failed
+    assert run.core.state.end.reason == "lost vhub: it ended with exit code 3"
 
 
 def test_a_run_that_had_ended_waits_for_the_vhub_that_closes_its_capture() -> None:
@@ -229,8 +228,8 @@ def test_a_run_that_had_ended_waits_for_the_vhub_that_closes_its_capture() -> No
 
     run.system.at_tick(60, end)
     run.go()
-    hub = run.core.roster.by_name[VHUB]
-    assert run.core.end is not None and run.core.end.reason == "enough" and run.system.hub.finished
+    hub = run.core.state.roster.by_name[VHUB]
+    assert run.core.state.end is not None and run.core.state.end.reason == "enough" and run.system.hub.finished
     assert hub.farewell and run.seen.json["packets"]["offered"] > 0
     assert run.system.hub.state is not None and hub.name == channels.VHUB
 
@@ -240,5 +239,8 @@ def test_who_asks_for_the_end_while_a_run_is_resumed_waits_for_the_vhub() -> Non
     run.resume_at(60, {SUPERVISOR: 0.1, "n1": 1.0, "n2": 1.0, VHUB: 20.0})
     run.system.at_tick(60, lambda: run.system.later(2 * S, lambda: run.core.stop() and None))
     run.go()
-    assert run.core.end is not None and (run.core.end.reason, run.core.end.failed) == ("stopped", False)
-    assert run.system.hub.finished and run.core.roster.by_name[VHUB].farewell
+    assert run.core.state.end is not None and (run.core.state.end.reason, run.core.state.end.failed) == (
+        "stopped",
+        False,
+    )
+    assert run.system.hub.finished and run.core.state.roster.by_name[VHUB].farewell

@@ -1,7 +1,7 @@
-"""The commits that the vHub has: frames in order, and what came before its turn.
+"""The commits that the vHub has received: frames in order, and early ones until their turn.
 
-A layout is what the commits before say, so they are read in order; one that comes early waits for those before it.
-What is committed last is what a supervisor that takes over may have lost.
+A frame's layout follows from the commits before it, so they are read in order. A supervisor that takes over may lack
+the last one, and gets it from here.
 """
 
 from __future__ import annotations

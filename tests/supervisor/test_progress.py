@@ -12,7 +12,6 @@ import pytest
 from msgspec.structs import replace
 
 from foosim.common.units import Pace, parse_pace
-from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -20,12 +19,11 @@ from foosim.protocol.codec import encode
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
 from foosim.rehearsal.run import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
-from foosim.supervisor.progress import Watch, _names
-from foosim.supervisor.roster import Roster
+from foosim.supervisor.progress import ProgressMonitor, _names
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import status
+from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
-from foosim.vhub.wait_times import Waits
+from foosim.vhub.wait_times import WaitTimes
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -52,7 +50,7 @@ class Seen:
 
     def _look(self, tick: int) -> None:
         """The frame before was judged when it was committed."""
-        self.late[tick - 1] = self.system.supervisor.watch.late
+        self.late[tick - 1] = self.system.supervisor.progress.late
 
     def go(self) -> Seen:
         def prepare(system: System) -> None:
@@ -83,7 +81,7 @@ def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, del
     seen = delayed(process, delay_ms)
     assert seen.result["ticks"] == TICKS and seen.result["reason"] == "done"
     assert {name for tick, name in seen.late.items() if tick > 5} == {process}
-    late = status(seen.system.supervisor, 0)["late"]
+    late = seen.system.supervisor.status(0)["late"]
     assert late["waited_for"] == process and 0 < late["tick"] <= TICKS
     lines = [line for line in seen.lines if "lag" in line]
     assert lines and all(f"ms, waited for {process}" in line for line in lines)
@@ -108,7 +106,7 @@ def test_at_another_pace_it_is_the_same() -> None:
 def test_a_run_in_time_names_nobody() -> None:
     seen = Seen().go()
     assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
-    assert status(seen.system.supervisor, 0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
+    assert seen.system.supervisor.status(0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
 
 
 def test_in_fast_nobody_is_late() -> None:
@@ -129,7 +127,7 @@ def test_one_late_tick_is_blamed_once_and_the_ticks_that_catch_up_keep_the_name(
     seen.go()
     assert {name for tick, name in seen.late.items() if tick < 60} == {""}
     assert {name for tick, name in seen.late.items() if tick > 62} == {"n2"}
-    assert seen.system.supervisor.watch.late_tick in (61, 62, 63), "no tick after it was late by more"
+    assert seen.system.supervisor.progress.late_tick in (61, 62, 63), "no tick after it was late by more"
     assert seen.result["lag_ms"]["max"] == pytest.approx(18.0, abs=2.1)
 
 
@@ -154,12 +152,12 @@ DEADLINES: Final = ("deadlines.heartbeat=1 h", "deadlines.tick_named=500 ms", "d
 def ended(seen: Seen) -> tuple[str, int]:
     """How a run ended that had to end early: in order, with a result, everyone told."""
     core = seen.system.supervisor
-    assert core.end is not None and core.finished
-    assert seen.result["failed"] is True and seen.result["ticks"] == core.end.tick < seen.ticks
+    assert core.state.end is not None and core.state.finished
+    assert seen.result["failed"] is True and seen.result["ticks"] == core.state.end.tick < seen.ticks
     assert seen.system.hub.finished, "the vHub has closed what it had"
     told = [name for name, solver in seen.system.solvers.items() if solver._core.ended is not None]
     assert told or seen.nodes == 1, "who still hears is told"
-    return core.end.reason, core.end.tick
+    return core.state.end.reason, core.state.end.tick
 
 
 class _StuckNode(NodeCore):
@@ -244,9 +242,9 @@ def test_a_silent_vhub_is_lost_and_the_run_ends_without_its_farewell() -> None:
     sets = ("deadlines.heartbeat=1 s", "deadlines.tick_lost=1 h", "deadlines.tick_named=1 h", "deadlines.vhub_back=2 s")
     seen = stopped(VHUB, sets=sets)
     core = seen.system.supervisor
-    assert core.end is not None
-    assert core.end.reason == "lost vhub: no heartbeat for 1 s; it did not come back within 2 s"
-    assert core.finished and not seen.system.hub.finished and seen.result["capture"] is None
+    assert core.state.end is not None
+    assert core.state.end.reason == "lost vhub: no heartbeat for 1 s; it did not come back within 2 s"
+    assert core.state.finished and not seen.system.hub.finished and seen.result["capture"] is None
 
 
 @pytest.mark.parametrize("pace", [REALTIME, Pace("fast")], ids=str)
@@ -266,7 +264,7 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
             assert say is not None
             say(process, level, text)
             if process == VHUB and "has not answered" in text:
-                waited.append(system.supervisor.watch.waiting_for(system.supervisor))
+                waited.append(system.supervisor.progress.waiting_for())
 
         system.settings.on_say = listen
 
@@ -355,7 +353,7 @@ def never_there(absent: str, sets: Sequence[str] = ()) -> Seen:
 @pytest.mark.parametrize("absent", ["n2", VHUB, "player-red"])
 def test_who_is_not_ready_in_time_ends_the_run_before_it_starts(absent: str) -> None:
     core = never_there(absent).go().system.supervisor
-    assert core.end is not None and core.end.reason == f"lost {absent}: not ready within 2 s"
+    assert core.state.end is not None and core.state.end.reason == f"lost {absent}: not ready within 2 s"
 
 
 def test_who_is_started_by_hand_is_waited_for_without_end() -> None:
@@ -363,8 +361,8 @@ def test_who_is_started_by_hand_is_waited_for_without_end() -> None:
     system = System(RunSettings("run", TABLE.name, text, REALTIME, 10), Settings())
     system.processes["n2"].busy_until_ns = 30 * 1000 * MS
     system.run()
-    assert system.supervisor.end is not None and system.supervisor.end.reason == "done"
-    assert system.supervisor.frame.tick == 10
+    assert system.supervisor.state.end is not None and system.supervisor.state.end.reason == "done"
+    assert system.supervisor.state.frame.tick == 10
 
 
 def test_nobody_is_overdue_while_the_run_is_paused() -> None:
@@ -376,16 +374,16 @@ def test_nobody_is_overdue_while_the_run_is_paused() -> None:
     request = encode(Request(OPERATOR, "resume", "resume", b"{}"))
     system.bus.put(OPERATOR, channels.REQUEST, OPERATOR, request, 40 * 1000 * MS)
     system.run()
-    assert system.supervisor.frame.tick == TICKS and system.answers["resume"].accepted
+    assert system.supervisor.state.frame.tick == TICKS and system.answers["resume"].accepted
     assert lines == [f"run ends at tick {TICKS}: done"]
 
 
-# --- the watch by itself ---------------------------------------------------------------------------------------------
+# --- the progress monitor by itself ----------------------------------------------------------------------------------
 
 
-def watch() -> Watch:
-    deployment = load_deployment(with_nodes(TEXT, TABLE.name, 2), TABLE.name)
-    made = Watch(deployment, Roster(deployment, bytes(32)), 0)
+def monitor() -> ProgressMonitor:
+    settings = RunSettings("run", TABLE.name, with_nodes(TEXT, TABLE.name, 2), Pace("realtime"))
+    made = ProgressMonitor(RunState(settings, bytes(32), "boot", "clock"), 0)
     made.begun(0)
     made.committed(10, 0, 0, 20 * MS)
     return made
@@ -400,10 +398,10 @@ def told(waiting_for: str, tick: int) -> Heartbeat:
     [("", VHUB), (DONE_OF + "player-red", "player-red"), (SAMPLES_OF + "n2", "n2"), ("commit", VHUB)],
 )
 def test_late_deliveries_are_blamed_on_whom_the_vhub_named(said: str, name: str) -> None:
-    made = watch()
+    made = monitor()
     made.released(10, 20 * MS)
-    made.told(told(said, 9))
-    made.told(told(DONE_OF + "player-blue", 7))
+    made.on_heartbeat(told(said, 9))
+    made.on_heartbeat(told(DONE_OF + "player-blue", 7))
     made.delivered(10, 30 * MS)
     for node in ("n1", "n2"):
         made.part(10, node, 31 * MS)
@@ -412,7 +410,7 @@ def test_late_deliveries_are_blamed_on_whom_the_vhub_named(said: str, name: str)
 
 
 def test_the_slowest_node_counts_from_when_it_had_its_inputs() -> None:
-    made = watch()
+    made = monitor()
     made.released(10, 20 * MS)
     made.delivered(10, 24 * MS)
     made.part(10, "n1", 25 * MS)
@@ -422,7 +420,7 @@ def test_the_slowest_node_counts_from_when_it_had_its_inputs() -> None:
 
 
 def test_what_the_supervisor_was_busy_counts_for_nobody_else() -> None:
-    made = watch()
+    made = monitor()
     made.released(10, 20 * MS)
     made.took(20 * MS, 28 * MS)
     made.delivered(10, 28 * MS)
@@ -433,7 +431,7 @@ def test_what_the_supervisor_was_busy_counts_for_nobody_else() -> None:
 
 
 def test_waiting_for_the_clock_is_nobodys_fault() -> None:
-    made = watch()
+    made = monitor()
     made.released(10, 40 * MS)
     made.delivered(10, 21 * MS)
     made.part(10, "n1", 44 * MS)
@@ -442,13 +440,13 @@ def test_waiting_for_the_clock_is_nobodys_fault() -> None:
     assert made.late == "n1"
 
 
-def test_the_watch_keeps_a_few_ticks_only() -> None:
-    made = watch()
+def test_the_monitor_keeps_a_few_ticks_only() -> None:
+    made = monitor()
     for tick in range(10, 1000):
         made.released(tick, tick * T)
         made.delivered(tick, tick * T)
         made.part(tick, "n1", tick * T)
-        made.told(told(DONE_OF + "player-red", tick))
+        made.on_heartbeat(told(DONE_OF + "player-red", tick))
         made.committed(tick + 1, 0, tick * T, tick * T)
     sizes = [len(made._released), len(made._delivered), len(made._parts), len(made._committed), len(made._told)]
     assert max(sizes) <= 18
@@ -458,7 +456,7 @@ def test_the_watch_keeps_a_few_ticks_only() -> None:
 
 
 def closed(commit_ms: int, samples_ms: int, done_ms: int, busy_ms: int = 0, least_ms: int = 1) -> str:
-    waits = Waits()
+    waits = WaitTimes()
     waits.node, waits.client = "n2", "player-red"
     waits.begin(commit_ms * MS)
     waits.begin((commit_ms + 1) * MS)

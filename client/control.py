@@ -1,7 +1,7 @@
-"""Talking to a running system from another process: requests by id, said again until they are answered.
+"""Requests to a running system from another process: by id, repeated until they are answered.
 
-Each function finds the newest live run (or the one named), asks its supervisor, and returns the answer, which names the
-tick at which the request takes effect; what is refused raises `RequestRefused`.
+Each function finds the newest live run (or the one named), sends its supervisor a request, and returns the answer,
+which names the tick at which the request takes effect; a refusal raises `RequestRefused`.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def test_a_run_that_is_balanced_is_the_same_world() -> None:
             system.processes[name].core.busy = load
 
     def prepare(system: System) -> None:
-        system.supervisor.balancer = Balancer(system.supervisor.deployment.owners())
+        system.supervisor.balancer = Balancer(system.supervisor.state.deployment.owners())
         system.at_tick(5, lambda: busy(system))
 
     text, sets, pace = TABLE.read_text(), ["engine=pure"], Pace("realtime")

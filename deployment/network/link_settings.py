@@ -1,15 +1,18 @@
-"""Which settings are a link's: the rule that matches, over the radio that it goes via, over the defaults."""
+"""Looks up the effective settings of a link: those of the rule that matches, over the radio of the packets' way, over
+the defaults.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import Final
 
 from foosim.deployment.network.impairments import BURSTS, Impairments, LinkSettings
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import LinkRule, Network
-from foosim.deployment.schema import Deployment
 
 PERFECT: Final = "perfect"
 ON_BOARD: Final = "on_board"
@@ -36,11 +39,11 @@ def preset_radio(name: str) -> Radio:
 
 
 class Profiles:
-    """The profiles of one deployment's links."""
+    """The profiles of one network's links. `carriers` are the robots that endpoints are on board of."""
 
-    def __init__(self, deployment: Deployment, network: Network) -> None:
-        self._network = network
-        self._carriers = deployment.carriers()
+    def __init__(self, network: Network, carriers: Mapping[str, str]) -> None:
+        self.network = network
+        self._carriers = carriers
         self._by_channel = any(rule.channels is not None for rule in network.links)
         modelled = any(of.model is not None for of in (*network.radios.values(), *network.links))
         self.on_radio = modelled or any(radio.is_on_air for radio in (*network.radios.values(), self.base("")))
@@ -54,14 +57,27 @@ class Profiles:
         """Return the robot that an endpoint is or is on."""
         return self._carriers.get(endpoint, endpoint)
 
+    def rule_for(self, source: str, destination: str, channel: str | None = None) -> LinkRule | None:
+        """Return the first rule that matches the directed pair, or None."""
+        return next((rule for rule in self.network.links if rule.matches(source, destination, channel)), None)
+
+    def rules_for(self, source: str, destination: str) -> Iterator[LinkRule | None]:
+        """Yield each rule that packets on some channel meet between the directed pair; None where they meet none."""
+        for rule in self.network.links:
+            if rule.matches(source, destination):
+                yield rule
+                if rule.channels is None:
+                    return
+        yield None
+
     def find(self, source: str, destination: str, channel: str) -> Profile:
         """Return the profile of packets from source to destination on a channel."""
-        return self.of_rule(self._network.rule_for(source, destination, channel), source, destination)
+        return self.of_rule(self.rule_for(source, destination, channel), source, destination)
 
     def of_rule(self, rule: LinkRule | None, source: str, destination: str) -> Profile:
         """Return the profile of a pair of which it is known which rule matches."""
-        network = self._network
-        way = network.way(rule, source, destination, self._carriers)
+        network = self.network
+        way = self.way(rule, source, destination)
         if way is None:
             return Profile(NO_RADIO, "", preset_radio(PERFECT))
         if rule is None and self.body(source) == self.body(destination):
@@ -72,9 +88,38 @@ class Profiles:
         is_own_queue = not base.is_on_air and (way == "" or "rate_bps" in rule.model_fields_set)
         return Profile(rule.id, way, over(base, rule), is_own_queue)
 
+    def way(self, rule: LinkRule | None, source: str, destination: str) -> str | None:
+        """Return the radio by which packets that meet a rule go; empty for that of the defaults, None where there is
+        none.
+
+        A rule's `via` puts an endpoint that carries no radio on that one; who carries others needs one with the same
+        air.
+        """
+        mine, theirs = self.radios_of(source), self.radios_of(destination)
+        if rule is not None and rule.via is not None:
+            air = self._air_of(rule.via)
+            hears = all(not carried or air in map(self._air_of, carried) for carried in (mine, theirs))
+            return rule.via if hears else None
+        if self.body(source) == self.body(destination) or not mine or not theirs:
+            return ""
+        nothing = None if rule is None else ""
+        return next((radio for radio in mine if radio in theirs), nothing)
+
+    def radios_of(self, endpoint: str) -> list[str]:
+        """Return the radios that an endpoint has: its own, or those of the robot that it is on."""
+        for name in (endpoint, self._carriers.get(endpoint, "")):
+            for glob, radios in self.network.robots.items() if name else ():
+                if fnmatchcase(name, glob):
+                    return radios
+        return []
+
+    def _air_of(self, radio: str) -> str:
+        """Return the channel of a radio: others with the same share it."""
+        return self.network.radios[radio].air or radio
+
     def base(self, radio: str) -> Radio:
         """Return the settings of a radio alone; of the defaults for the empty name."""
-        return self._network.radios[radio] if radio else preset_radio(self._network.defaults.preset)
+        return self.network.radios[radio] if radio else preset_radio(self.network.defaults.preset)
 
 
 def over(base: Radio, changes: LinkRule | Impairments) -> Radio:

@@ -1,4 +1,4 @@
-"""A client that takes part, as the vHub's state knows it: in ticks and numbers, without its session."""
+"""A client that takes part, as the vHub's state has it: ticks and numbers, without its session."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How much a receiver takes at one tick: as much as fits into one message, which its readers would refuse otherwise.
+"""Limits the bytes delivered to a receiver per tick to one message: its readers refuse a larger one.
 
-Where more arrives, each source has an even share of the message, so that a flood costs others nothing; what is beyond
-its share is dropped. A function of what arrives alone.
+Where more arrives, each source has an even share of the message, so that a flood costs other sources nothing; what
+exceeds a source's share is dropped. The result is a function of the arriving packets alone.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from collections.abc import Sequence
 from foosim.vhub.network.packet import Flight, size_of
 
 
-class Room:
-    """What of some flights is taken, asked in their order. `bytes_max` is that of each receiver.
+class ReceiveBudget:
+    """The budget of one tick, asked for its flights in their order. `bytes_max` is that of each receiver.
 
-    `is_shared`: all of them are one receiver, since one message goes to all.
+    `is_shared`: one message goes to all receivers, so they share a budget.
     """
 
     def __init__(self, flights: Sequence[Flight], bytes_max: int, *, is_shared: bool) -> None:
         self._is_shared = is_shared
         self._left: dict[tuple[str, str], int] = {}
-        """Where too much arrives: what each source has left of its share."""
+        """Of receivers that are over budget: what each source has left of its share, in bytes."""
         self._shares: dict[str, int] = {}
-        """There, by receiver: the share of each source, in bytes."""
+        """Of these, by receiver: the share of each source, in bytes."""
         whole = 0
         for flight in flights:
             whole += size_of(flight)
@@ -30,7 +30,7 @@ class Room:
             self._share(flights, bytes_max)
 
     def _share(self, flights: Sequence[Flight], bytes_max: int) -> None:
-        """Find out to whom too much comes, and from whom."""
+        """Divide the budget of each receiver for which too much arrives among its sources."""
         wanted: dict[str, dict[str, int]] = {}
         for flight in flights:
             of_receiver = wanted.setdefault("" if self._is_shared else flight.destination, {})
@@ -41,7 +41,7 @@ class Room:
                 self._left.update({(receiver, source): share for source in of_receiver})
 
     def takes(self, flight: Flight) -> bool:
-        """Whether a flight is taken; one that is not is told by what."""
+        """Whether a flight fits; one that does not gets the numbers that decided it."""
         if not self._left:
             return True
         key = "" if self._is_shared else flight.destination, flight.source

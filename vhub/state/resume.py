@@ -1,6 +1,6 @@
-"""What a vHub that is started again takes from the journal of the one before it.
+"""What a restarted vHub takes from the journal of the one before it.
 
-A fold of the journal gives the state behind the last closed tick; on the way it gives what others may still ask for
+A fold of the journal gives the state after the last closed tick. On the way it gives what others may still ask for
 (deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
 capture is.
 """
@@ -16,11 +16,12 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.actions import Action, Say
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
-from foosim.vhub.commits import Committed
-from foosim.vhub.naming import in_branch
 from foosim.vhub.network.packet import received
-from foosim.vhub.recording.queue import Keep, KeepEpoch
-from foosim.vhub.records import (
+from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.state.commits import Committed
+from foosim.vhub.state.downlinks import retag
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import (
     NONE_AWAY,
     AbsencesRecord,
     Closing,
@@ -31,14 +32,13 @@ from foosim.vhub.records import (
     InputsRecord,
     TickRecord,
 )
-from foosim.vhub.state import HubState
 from foosim.world.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.world.layout import Layout
 
 
 @dataclass(frozen=True, slots=True)
 class Captured:
-    """How far a capture, or a journal, is: its last tick and its last epoch; -1 and 0 when it has none yet."""
+    """Last tick and last epoch of a capture or a journal; -1 and 0 when it has none yet."""
 
     tick: int = -1
     epoch: int = 0
@@ -46,7 +46,7 @@ class Captured:
 
 @dataclass(slots=True)
 class Past:
-    """The vHub as it was behind its last record, and what it had said."""
+    """The vHub after its last record, and what it had sent."""
 
     state: HubState
     layout: Layout
@@ -54,7 +54,7 @@ class Past:
     """The commit of the last closed tick; None before the first."""
     chain: bytes = CHAIN_START
     machine: str = ""
-    """The start of the machine that the journal names."""
+    """The boot of the machine that the journal names."""
     epoch: Epoch | None = None
     inputs: InputsRecord | None = None
     absences: AbsencesRecord = NONE_AWAY
@@ -68,15 +68,15 @@ class Past:
     """Clients that left at the last tick, owing its Done."""
     known: Frame | None = None
     """The last frame that the capture has."""
-    kept: list[Keep | KeepEpoch] = field(default_factory=list)
+    kept: list[RecordClosing | RecordEpoch] = field(default_factory=list)
     """What the capture lacks, in order."""
 
-    def words(self) -> list[Action | Keep | KeepEpoch]:
-        """Return what there is to do and to say before anything else: complete the capture."""
-        words: list[Action | Keep | KeepEpoch] = [*self.kept]
+    def actions(self) -> list[Action | RecordClosing | RecordEpoch]:
+        """Return what is to be done before anything else: complete the capture, log the position."""
+        actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
         if self.epoch is not None:
-            words.append(Say("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
-        return words
+            actions.append(Say("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
+        return actions
 
 
 def recall(
@@ -123,13 +123,15 @@ def recall(
     return past
 
 
-def _untold(found: Iterable[object], closings: Mapping[int, Closing], epoch: int) -> Iterator[Keep | KeepEpoch]:
+def _untold(
+    found: Iterable[object], closings: Mapping[int, Closing], epoch: int
+) -> Iterator[RecordClosing | RecordEpoch]:
     """Yield closings by tick, and the epochs behind one, in the order of the journal: one holds from its tick on."""
     for record in found:
         if isinstance(record, Epoch) and record.epoch > epoch:
-            yield KeepEpoch(record)
+            yield RecordEpoch(record)
         elif isinstance(record, TickRecord) and record.tick in closings:
-            yield Keep(closings[record.tick])
+            yield RecordClosing(closings[record.tick])
 
 
 def _name_branch(past: Past) -> None:
@@ -137,11 +139,11 @@ def _name_branch(past: Past) -> None:
     branch = past.state.branch
     if not branch:
         return
-    past.sent = {tick: in_branch(Deliveries, payload, branch) for tick, payload in past.sent.items()}
+    past.sent = {tick: retag(Deliveries, payload, branch) for tick, payload in past.sent.items()}
     if past.published:
-        past.published = in_branch(Deliveries, past.published, branch)
+        past.published = retag(Deliveries, past.published, branch)
     for client, said in past.downlinks.items():
-        past.downlinks[client] = [(number, in_branch(Down, payload, branch)) for number, payload in said]
+        past.downlinks[client] = [(number, retag(Down, payload, branch)) for number, payload in said]
 
 
 def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:

@@ -1,9 +1,9 @@
-"""The hub's state as a value, and the closing of a tick as a function of it.
+"""The vHub's state as a value, and the closing of a tick as a function of it.
 
-Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
-*Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
-nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte.
+Closing tick k has two phases. *World*: the packets that robots sent at k are judged; the clients that are due receive
+what has arrived. *Clients*: the packets that clients sent are judged; the deliveries of tick k+1 are final. Fates
+depend on frames, times and draws, never on nodes. The journal holds the inputs of every closing, so a fold of it
+through this class gives the state again, byte for byte.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Deliveries, Epoch, Sent
-from foosim.vhub.in_flight_limit import TRANSIT_FULL, Transit
 from foosim.vhub.links.fabric import Fabric, Link
-from foosim.vhub.members import Here, Member
 from foosim.vhub.network.ages import Ages
 from foosim.vhub.network.memory import Age, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
-from foosim.vhub.receive_limit import Room
-from foosim.vhub.send_order import Sendings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
+from foosim.vhub.state.in_flight_limit import TRANSIT_FULL, InFlightLimit
+from foosim.vhub.state.members import Here, Member
+from foosim.vhub.state.receive_limit import ReceiveBudget
+from foosim.vhub.state.send_order import SendOrder
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -66,12 +66,12 @@ class HubState:
         """What the last closing tells of them."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
-        self._sendings = Sendings(lambda flights, dropped: None)
+        self._sendings = SendOrder()
         """What clients have sent at the last closed tick."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
-        self._transit = Transit(len(self._endpoints))
+        self._transit = InFlightLimit(len(self._endpoints))
         self._here = Here(deployment)
 
     def turn_to(self, epoch: Epoch) -> bool:
@@ -164,7 +164,7 @@ class HubState:
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
-        sendings = self._sendings = Sendings(lambda flights, dropped: self._send(flights, tick, dropped))
+        sendings = self._sendings = SendOrder()
         has_radios = self.fabric.profiles.on_radio
         shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
@@ -182,11 +182,14 @@ class HubState:
                 to_robot = has_radios and sent.destination in self._robots
                 is_apart = to_robot and self._is_apart(flights[0])
                 shares = shares or (to_robot and not is_apart)
-                sendings.send(flights, now=is_apart or not has_radios)
+                if is_apart or not has_radios:
+                    self._send(flights, tick, sendings.dropped)
+                else:
+                    sendings.defer(flights)
             if self._sequence_of(source) > before and not self.members[source].period:
                 self.ages.used(source, tick)
         if shares:
-            sendings.judge_rest()
+            self._send_waiting(tick)
         self.closed = tick
         self.aged = self.ages.take(tick)
         deliveries = self._arrive_at_robots(tick + 1, sendings.arrived)
@@ -202,8 +205,13 @@ class HubState:
 
     def close_rest(self) -> list[Flight]:
         """Judge what `close_robots` has left; return the packets whose fate is final by phase two."""
-        self._sendings.judge_rest()
+        self._send_waiting(self.closed)
         return self._sendings.fates()
+
+    def _send_waiting(self, tick: int) -> None:
+        """Judge what was sent at a tick and waits for its turn."""
+        for flights, dropped in self._sendings.take_waiting():
+            self._send(flights, tick, dropped)
 
     def _is_apart(self, flight: Flight) -> bool:
         """Whether a packet's fate has to do with that of no packet on another link; what goes to clients counts so."""
@@ -391,7 +399,7 @@ class HubState:
         arriving = self._take_arrivals(tick, to_robots=False)
         if not arriving:
             return released
-        room, world = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
+        room, world = ReceiveBudget(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
         judged: list[Flight] = []
         if turns:  # what makes them act is judged first: with it comes what else is there
             arriving.sort(key=self._here.calls, reverse=True)
@@ -426,7 +434,7 @@ class HubState:
         arriving = self._take_arrivals(tick, to_robots=True)
         if not arriving:
             return deliveries
-        room, world = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True), self.fabric.world
+        room, world = ReceiveBudget(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True), self.fabric.world
         for flight in arriving:
             fates.append(flight)
             to = flight.destination

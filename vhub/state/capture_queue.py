@@ -1,6 +1,6 @@
-"""What goes to the capture and when: a closing goes once all that it released to clients has left.
+"""Hands closings to the capture, each once everything that it released to clients has left.
 
-Until then its packets do not know when that was. Closings go in the order of their ticks, so one that waits holds up
+Only then its packets have their times of leaving. Closings go in the order of their ticks, so one that waits holds back
 those behind it.
 """
 
@@ -10,41 +10,41 @@ from collections import deque
 from dataclasses import dataclass
 
 from foosim.protocol.messages import Epoch
-from foosim.vhub.commits import Commits, Committed
 from foosim.vhub.network.packet import IN_FLIGHT, flight_of, state_of
-from foosim.vhub.records import Closing, closing_of
-from foosim.vhub.state import HubState
+from foosim.vhub.state.commits import Commits, Committed
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, closing_of
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
-    """Rows for the capture, behind the journal: what one closing gave."""
+class RecordClosing:
+    """Action: record one closing in the capture. It comes after the closing's journal record."""
 
     closing: Closing
 
 
 @dataclass(frozen=True, slots=True)
-class KeepEpoch:
-    """A row for the capture: an epoch that begins."""
+class RecordEpoch:
+    """Action: record the beginning of an epoch in the capture."""
 
     epoch: Epoch
 
 
-class Keeping:
-    """The closings that the capture does not have yet, oldest first."""
+class CaptureQueue:
+    """The closings that the capture has not been handed yet, oldest first."""
 
     def __init__(self) -> None:
         self._closings: deque[Closing] = deque()
 
     def add(self, closing: Closing) -> None:
-        """Take the closing of the next tick."""
+        """Append the closing of the next tick."""
         self._closings.append(closing)
 
-    def take(self, waiting_tick: int | None) -> list[Keep]:
-        """Take the closings before `waiting_tick`, the oldest whose packets still wait; None: none do."""
+    def take(self, waiting_tick: int | None) -> list[RecordClosing]:
+        """Take the closings before `waiting_tick`, the oldest tick with packets that wait; all where it is None."""
         taken = []
         while self._closings and (waiting_tick is None or self._closings[0].frame.tick < waiting_tick):
-            taken.append(Keep(self._closings.popleft()))
+            taken.append(RecordClosing(self._closings.popleft()))
         return taken
 
 

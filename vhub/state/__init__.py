@@ -1,0 +1,1 @@
+"""What the vHub knows, as values with snapshot and restore, and how it goes on from its journal."""
