@@ -396,7 +396,7 @@ def install_units(  # a command's options
     `loginctl enable-linger`.
 
     With --pki the units are for runs with certificates: a node has its own from the folder that the deployment names
-    as the host's `pki`. What belongs there is brought there as by `foosim-pki send`.
+    as the host's `pki`. What belongs there is brought there as by `foosim-pki init --send`.
     """
     plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
     deployment = plan.deployment

@@ -109,9 +109,9 @@ class Case:
         """Whether the vHub is to run on this machine."""
         return places(self.deployment).get(VHUB) == self.host
 
-    def issued(self, remedy: str) -> str:
-        """Return a remedy that is carried out where certificates are issued, which a host is not."""
-        return f"{remedy}, then foosim-pki send DIR {self.host} FILE" if self.is_there else remedy
+    def provide(self, more: str = "") -> str:
+        """Return the command that makes what certificates are missing, and brings them to a host."""
+        return f"foosim-pki init DIR FILE{more} --send" if self.is_there else f"foosim-pki init {self.pki} FILE{more}"
 
 
 def examine(case: Case) -> list[Finding]:
@@ -170,9 +170,7 @@ def _certificates(case: Case) -> Iterator[_Said]:
     """The certificate or password of everybody here: there, of this root, its own key, valid, for the right host."""
     folder = case.pki
     if folder is None and case.ca:
-        remedy = (
-            f"say in hosts.{case.host}.pki in which folder they are to be, then foosim-pki send DIR {case.host} FILE"
-        )
+        remedy = f"say in hosts.{case.host}.pki in which folder they are to be, then {case.provide()}"
         yield "folder", "problem", "the deployment does not say where they are on this host", remedy
         return
     if folder is None:
@@ -181,11 +179,10 @@ def _certificates(case: Case) -> Iterator[_Said]:
     try:
         ca = read_ca(folder, wall_clock.now_utc())
     except CertificateError as error:
-        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki init {folder}"
-        yield CA_FILE, "problem", error.what, remedy
+        yield CA_FILE, "problem", error.what, case.provide()
         return
     if case.ca not in ("", fingerprint(ca)):
-        yield CA_FILE, "problem", "another root than the run's", f"foosim-pki send DIR {case.host} FILE"
+        yield CA_FILE, "problem", "another root than the run's", case.provide()
         return
     yield CA_FILE, "fine", "", ""
     if (folder / CA_KEY_FILE).exists():
@@ -210,24 +207,17 @@ def _password(folder: Path, who: str, case: Case) -> _Said:
     try:
         read_password(folder / f"{who}{PASSWORD_SUFFIX}")
     except CertificateError as error:
-        return who, "problem", error.what, case.issued(f"foosim-pki issue {_folder(case)} {who} --password")
+        return who, "problem", error.what, case.provide()
     if certificate_path(folder, who).exists():
         return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
     return who, "fine", "has a password", ""
 
 
-def _folder(case: Case) -> Path:
-    """Return the folder in which certificates are issued, as a remedy names it."""
-    assert case.pki is not None
-    return Path("DIR") if case.is_there else case.pki
-
-
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
     """Look at the certificate that one of the run shows."""
-    path, issuing = certificate_path(folder, who), _folder(case)
+    path = certificate_path(folder, who)
     if not path.exists():
-        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki issue {issuing} {who}"
-        return who, "problem", "no certificate", remedy
+        return who, "problem", "no certificate", case.provide()
     try:
         now = wall_clock.now_utc()
         found = read_certificate(path)
@@ -235,17 +225,17 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
         check_key(key_path(folder, who), found)
         credentials = load_credentials(folder, who)
     except CertificateError as error:
-        remedy = f"foosim-pki renew {issuing} {who}, or remove both files and issue anew"
-        return who, "problem", error.what, case.issued(remedy)
+        remedy = f"{case.provide()}; if that refuses it, remove both files before"
+        return who, "problem", error.what, remedy
     assert credentials is not None
     address = {SUPERVISOR: case.address, VHUB: case.radio}.get(who)
     hosts = [host.lower() for host in hosts_of(found)]
     if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
-        remedy = case.issued(f"foosim-pki renew {issuing} {who} --host {address.host}")
+        remedy = case.provide(f" --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
     soon = credentials.ends_soon(wall_clock.now_utc())
     if soon:
-        return who, "warning", soon, case.issued(f"foosim-pki renew {issuing} {who}")
+        return who, "warning", soon, case.provide()
     return who, "fine", f"until {found.not_valid_after_utc:%Y-%m-%d}", ""
 
 

@@ -64,17 +64,18 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     assert [finding["subject"] for finding in gone] == ["127.0.0.1"] and code == 1
     assert "cannot be reached" in gone[0]["text"] and gone[0]["remedy"].startswith("make `ssh -F ")
     root = found["there", "certificates", "ca.pem"]
-    assert root["state"] == "problem" and root["remedy"] == "foosim-pki send DIR there FILE"
+    assert root["state"] == "problem" and root["remedy"] == "foosim-pki init DIR FILE --send"
 
-    code, out, err = house.ask("foosim-pki", "send", folder, "there", file)
-    assert code == 0 and sorted(out.split()) == [f"{there}/{name}" for name in OWN], err
+    deployed(file, {"there": host})
+    code, out, err = house.ask("foosim-pki", "init", folder, file, "--send")
+    brought = sorted(line for line in out.split() if line.startswith(f"{there}/"))
+    assert code == 0 and brought == [f"{there}/{name}" for name in OWN], err
     assert sorted(path.name for path in there.iterdir()) == list(OWN), "and nothing of others"
     for path in there.iterdir():
         assert path.read_bytes() == (folder / path.name).read_bytes() and path.stat().st_mode & 0o777 == 0o600
         if path.suffix == ".key":
             (folder / path.name).unlink()  # where the others are is enough
 
-    deployed(file, {"there": host})
     (folder / "ca.key").unlink()
     code, found = examined(house, *asked)
     assert code == 0, [finding for finding in found.values() if finding["state"] == "problem"]
