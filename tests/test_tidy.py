@@ -117,7 +117,6 @@ SHELLS = {
     "launcher/detach.py",
     "launcher/doctor/checks.py",
     "cli/doctor.py",
-    "launcher/doctor/hosts.py",
     "launcher/doctor/remote.py",
     "launcher/hosts/port_check.py",
     "supervisor/journal_room.py",

@@ -16,9 +16,8 @@ from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher.doctor import checks as doctor
-from foosim.launcher.doctor.checks import Case, Finding, examine, fingerprint
-from foosim.launcher.doctor.hosts import CLOCK_WARN_NS, Told, findings_of
-from foosim.launcher.doctor.remote import GREETING, Answer, Question, serve
+from foosim.launcher.doctor.checks import CLOCK_WARN_NS, Answer, Case, Finding, Told, examine, findings_of, fingerprint
+from foosim.launcher.doctor.remote import GREETING, Question, serve
 from foosim.launcher.hosts import install
 from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.hosts.systemd_units import units_of

@@ -14,9 +14,9 @@ import pytest
 
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
-from foosim.launcher.doctor import hosts as doctor_hosts
-from foosim.launcher.doctor.hosts import LIMIT_S, ask, findings_of
-from foosim.launcher.doctor.remote import Question
+from foosim.launcher.doctor import remote as doctor_remote
+from foosim.launcher.doctor.checks import findings_of
+from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
 from foosim.launcher.hosts.ssh import Remote
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE
@@ -103,6 +103,6 @@ def test_why_a_host_does_not_answer_is_said(other: There, monkeypatch: pytest.Mo
     assert "there is no /nowhere/foosim-guard on host there" in text and remedy.startswith("install foosim ")
     text, remedy = why_silent(other.remote())
     assert text == "ended with exit code 2 on host there: :1:1: no YAML document, ''", "it was asked nonsense"
-    monkeypatch.setattr(doctor_hosts, "version", lambda name: "99.0")
+    monkeypatch.setattr(doctor_remote, "version", lambda name: "99.0")
     text, remedy = why_silent(other.remote())
     assert "is installed there, the run has 99.0" in text and remedy.startswith("install foosim 99.0 on host there")
