@@ -6,12 +6,12 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
 from foosim.supervisor.branches import Branches
 from foosim.supervisor.requests import Requests
 from foosim.vhub.footing import Footing
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 

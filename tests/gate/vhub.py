@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
@@ -17,6 +16,7 @@ from foosim.vhub.core import HubCore
 from foosim.vhub.join import Door
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 
