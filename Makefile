@@ -55,7 +55,7 @@ swarm: $(if $(MANY),compiled,environment)
 	@.venv$(if $(MANY),-compiled)/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
 
 faults: environment
-	@$(PYTHON) -m bench.faults --count $(or $(N),20) $(ARGS)
+	@$(PYTHON) -m tests.faults.campaign --count $(or $(N),20) $(ARGS)
 
 # Tests that take an hour are no longer hung than those that take a second.
 fuzz: environment
@@ -68,7 +68,7 @@ stats: environment
 	$(PYTEST) -o timeout=0 tests/links --links-full --links-seed $$seed --links-table docs/network-validation.md $(ARGS)
 
 swarm-gate: environment
-	@$(PYTHON) -m bench.gate $(ARGS)
+	@$(PYTHON) -m tests.gate.search $(ARGS)
 
 # Last in it is pytest, so that its summary ends the output.
 test: lint

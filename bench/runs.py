@@ -155,9 +155,8 @@ def watch(  # noqa: PLR0913  # what a run may be asked for, by keyword
     Raises BenchError when it did not end in order.
     """
     port = free_ports()
-    options = RunOptions(
-        deployment, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"127.0.0.1:{port}", pki=pki
-    )
+    lasts, listen = f"{round(duration_s * 1000)} ms", f"127.0.0.1:{port}"
+    options = RunOptions(deployment, pace, lasts, sets=tuple(sets), listen=listen, pki=pki)
     begun_s = time.monotonic()
     plan = make_plan(options)
     commands = [] if helpers is None else helpers(f"tcp/127.0.0.1:{port}", f"tcp/127.0.0.1:{port + 1}")

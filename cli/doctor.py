@@ -13,7 +13,7 @@ from foosim.common.addresses import check_listen
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import load_deployment, read_deployment_text
 from foosim.launcher.doctor.checks import HERE, Case, Finding, is_well
-from foosim.launcher.doctor.hosts import examine_all
+from foosim.launcher.doctor.remote import examine_all
 from foosim.runtime.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
 
 app = new_app()

@@ -9,22 +9,20 @@ from typing import Annotated
 import typer
 
 from foosim.common import wall_clock
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, Refused
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import load_deployment, read_deployment_text
-from foosim.launcher.hosts.ssh import remote_of
+from foosim.deployment.schema import Deployment, places
+from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.pki import certificates
-from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, Shown
-from foosim.launcher.pki.hosts import files_for, send_files
-from foosim.protocol.identity import FORMS, identities_of
+from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
+from foosim.launcher.pki.hosts import files_for, passwords_of, send_files
+from foosim.protocol.identity import identities_of
 from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
-from foosim.runtime.transport.certificate_folder import CA_KEY_FILE
-from foosim.runtime.transport.certificates import identities_in
 
 app = new_app()
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of certificates.", show_default=False)]
-Identities = Annotated[list[str] | None, typer.Argument(metavar="[IDENTITY]...", help=f"{FORMS}.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 
@@ -32,103 +30,62 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 def foosim_pki(version: VersionOption = False) -> None:
     """Make the certificates that a run needs where other machines reach it.
 
-    `init` makes a root, `issue` a certificate and key for each process, client and operator, `send` brings to a host
-    of a deployment what belongs to its processes. To any other machine copy the root ca.pem and what belongs to its
-    processes; keep ca.key where certificates are issued.
+    `init` makes what everybody in a deployment needs, and with --send brings to each host of the deployment what
+    belongs to its processes. To any other machine copy the root ca.pem and what belongs to its processes; keep ca.key
+    where certificates are issued.
 
-    Exit codes: 0 done, 1 a certificate would not be accepted (show), 2 bad input, 3 refused.
+    Exit codes: 0 done, 1 a certificate would not be accepted (show) or a host has not got
+    its own (init --send), 2 bad input, 3 refused.
     """
 
 
 @app.command()
 def init(
     folder: Folder,
-    name: Annotated[str, typer.Option(help="What the root calls itself.")] = "foosim",
-) -> None:
-    """Make a folder with a root of its own."""
-    print(f"{certificates.init(folder, name)} is the root; keep {folder / CA_KEY_FILE} off the machines of a run")
-
-
-@app.command()
-def issue(
-    folder: Folder,
-    identities: Identities = None,
-    deployment: Annotated[
-        Path | None, typer.Option(help="Issue to everybody in this deployment file who has nothing yet.")
-    ] = None,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
     host: Annotated[
-        list[str] | None, typer.Option(help="A name or address by which others reach it; may be repeated.")
+        list[str] | None,
+        typer.Option(help="A name or address by which others reach supervisor and vHub; may be repeated."),
     ] = None,
-    days: Annotated[int, typer.Option(help="How long it lasts.")] = LEAF_DAYS,
-    password: Annotated[
-        bool, typer.Option("--password", help="Give a client a password instead; it is read from standard input.")
-    ] = False,
-) -> None:
-    """Issue a certificate and a key to each identity.
-
-    The holder may listen as this machine's names and as the hosts given. With --password and a terminal for input, or
-    an empty line, the password is a random one, which is printed.
-    """
-    wanted = list(identities or [])
-    if password:
-        if deployment is not None or host or len(wanted) != 1:
-            raise BadValue("--password is for one client, without --deployment and --host", " ".join(wanted))
-        given = "" if sys.stdin.isatty() else sys.stdin.readline().strip()
-        made = certificates.issue_password(folder, wanted[0], given)
-        print("" if given else made, end="" if given else "\n")
-        return
-    if deployment is not None:
-        found = load_deployment(read_deployment_text(deployment), str(deployment))
-        there = identities_in(folder)
-        everybody = identities_of(found)
-        if found.access.radio == "password":
-            clients = [who for who in everybody if who.startswith("client.")]
-            everybody = [who for who in everybody if who not in clients]
-            for path in certificates.issue_passwords(folder, clients):
-                print(path)
-        wanted += [identity for identity in everybody if identity not in [*there, *wanted]]
-    elif not wanted:
-        raise BadValue(f"nobody to issue to: name identities ({FORMS}) or a --deployment")
-    for path in certificates.issue(folder, wanted, host or (), days):
-        print(path)
-
-
-@app.command()
-def renew(
-    folder: Folder,
-    identities: Identities = None,
+    days: Annotated[int, typer.Option(help="How long a new certificate lasts.")] = LEAF_DAYS,
     within: Annotated[
-        int | None, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Only what ends within so many days.")
-    ] = None,
-    host: Annotated[
-        list[str] | None, typer.Option(help="A further name or address by which others reach it; may be repeated.")
-    ] = None,
+        int, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Issue anew what ends within so many days.")
+    ] = RENEW_DAYS,
+    send: Annotated[bool, typer.Option("--send", help="Bring to the hosts of the deployment what is theirs.")] = False,
 ) -> None:
-    """Issue certificates anew, by default all in the folder.
+    """Make what the folder lacks for a deployment: a root, and a certificate and key for each of its identities.
 
-    Key and length of time stay, and so do names and addresses, to which --host adds. A process takes the new one when
-    it is started again.
+    What is there stays; so the same command serves after a change of the deployment. A certificate that ends soon, has
+    another root or lacks a --host is issued anew, for the same key, length of time, names and addresses. A process
+    takes the new one when it is started again. Supervisor and vHub may listen as this machine's names and as the hosts
+    given. Where the deployment has `access: {radio: password}` each client gets a random password, in
+    client.NAME.password, unless there is one.
+
+    With --send the root, and certificates, keys and passwords of what the deployment places on a host, go through ssh
+    into the folder that the deployment names as the host's `pki`, readable by who logs in there alone. Nobody else's
+    key is sent. What is there already under these names is replaced.
     """
-    for path in certificates.renew(folder, identities or (), within, host or ()):
+    deployment = load_deployment(read_deployment_text(file), str(file))
+    if send and not places(deployment):
+        raise BadValue("--send: the deployment places nothing on a host", deployment.world)
+    everybody = identities_of(deployment)
+    passwords = passwords_of(deployment, everybody)
+    for path in certificates.provide(folder, everybody, passwords, host or (), days, within):
         print(path)
+    if send and not _is_sent(deployment, folder):
+        raise typer.Exit(FAILED)
 
 
-@app.command()
-def send(
-    folder: Folder,
-    host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
-    deployment: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path(
-        "deploy/cluster.yaml"
-    ),
-) -> None:
-    """Bring to a host the root, and the certificates and keys of what the deployment places there, through ssh.
-
-    They go into the folder that the deployment names as the host's `pki`, readable by who logs in there alone. No key
-    of anybody else is sent. What is there already under these names is replaced: send again after `renew`.
-    """
-    found = load_deployment(read_deployment_text(deployment), str(deployment))
-    for path in send_files(remote_of(found, host), folder, files_for(found, host)):
-        print(path)
+def _is_sent(deployment: Deployment, folder: Path) -> bool:
+    """Bring to each host what is its own; say what was brought, and which host has not got it."""
+    failures = []
+    for name in sorted(set(places(deployment).values())):
+        try:
+            print(*send_files(Remote(name, deployment.hosts[name]), folder, files_for(deployment, name)), sep="\n")
+        except Refused as failure:
+            failures.append(str(failure))
+            print(failure, file=sys.stderr)
+    return not failures
 
 
 @app.command()

@@ -6,12 +6,13 @@ import os
 import sys
 import time
 from contextlib import redirect_stdout
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from foosim.cli.options import with_options
 from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
@@ -35,19 +36,12 @@ app = new_app()
 
 
 @app.command()
-def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
-    file: Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)],
-    duration: Annotated[str | None, typer.Option("--for", help="Simulated time to run, e.g. 20s.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of all random draws; short for --set seed=N.")] = None,
+@with_options("file", "duration", "seed", "branch", "sets", "engine")
+def foosim_rehearse(
+    options: RunOptions,
     nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN; each has an engine of its own.")] = 1,
-    engine: Annotated[str | None, typer.Option(help="bullet or pure; short for --set engine=NAME.")] = None,
-    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
     swarm: Annotated[bool, typer.Option("--swarm", help="Fly the random faults of --seed: see below.")] = False,
     seeds: Annotated[int, typer.Option(help="With --swarm: how many seeds, from --seed (or 1) on.", min=1)] = 1,
-    branch: Annotated[
-        str | None,
-        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
-    ] = None,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
     version: VersionOption = False,
@@ -72,13 +66,12 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     disk has no room, 130 second Ctrl-C.
     """
     if swarm:
-        raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
-    if duration is None:
+        raise typer.Exit(_swarm(options, seeds, json))
+    if options.duration is None:
         raise BadValue("--for is missing: how long is needed, e.g. --for 20s")
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
-    settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
-    plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK, branch=branch))
+    plan = make_plan(replace(options, pace="fast", listen=LOOPBACK))
     check_models_here(plan)
     free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
     if free:
@@ -88,7 +81,10 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     for warning in check_rooms(plan.deployment.capture, capture, None):
         _note(f"warning: {warning}")
     if not json:
-        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(summaries(plan.deployment), str(file))):
+        for line in (
+            *([plan.branch.text] if plan.branch else []),
+            *start_lines(summaries(plan.deployment), str(options.file)),
+        ):
             typer.echo(line)
     raise typer.Exit(_rehearse(plan, nodes, capture, json))
 
@@ -146,11 +142,12 @@ def _told(result: dict[str, Any]) -> str:
     )
 
 
-def _swarm(file: Path, duration: str | None, first: int, count: int, json: bool) -> int:
+def _swarm(options: RunOptions, count: int, json: bool) -> int:
     """Rehearse under the faults of some seeds; return the exit code."""
+    file, duration, first = options.file, options.duration, 1 if options.seed is None else options.seed
     text = read_deployment_text(file)
     load_deployment(text, str(file))
-    ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration, None, ())).ticks
+    ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration)).ticks
     if ticks < TICKS:
         raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
     longer = "" if duration is None else f" --for {duration}"

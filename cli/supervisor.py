@@ -6,13 +6,14 @@ Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `c
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
+from foosim.cli.options import with_options
 from foosim.client import control
 from foosim.common.errors import BadValue, Refused, read_at
 from foosim.common.json_text import encode_json
@@ -50,27 +51,8 @@ from foosim.supervisor.main import serve
 
 app = new_app()
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
 Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-PaceOption = Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")]
-For = Annotated[str | None, typer.Option("--for", help="End after this much simulated time, e.g. 20s.")]
-Seed = Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")]
-Sets = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
-]
-Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
-Listen = Annotated[
-    str | None,
-    typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
-]
-Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
-From = Annotated[
-    str | None,
-    typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
-]
-OptionalFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
 ConsoleOption = Annotated[
     bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
 ]
@@ -79,7 +61,8 @@ Second = Annotated[
     typer.Option(metavar="CAPTURE|CSV", help="What the console shows beside the run, on its clock."),
 ]
 Offset = Annotated[str | None, typer.Option(help="The time of --second at which the run has time 0, e.g. 2.5s or -1s.")]
-Balance = Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")]
+BESIDE_RESUME: Final = ("resumed", "console", "open_browser", "second", "offset", "pki", "json")
+"""What `up --resume` takes; the rest it takes from the run."""
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
 
@@ -95,21 +78,13 @@ def foosim_supervisor(version: VersionOption = False) -> None:
 
 
 @app.command()
+@with_options()
 def up(  # noqa: PLR0913, PLR0917  # a command's options
-    file: OptionalFile = None,
-    pace: PaceOption = None,
-    duration: For = None,
-    seed: Seed = None,
-    branch: From = None,
+    context: typer.Context,
+    options: RunOptions | None = None,
     capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
-    sets: Sets = None,
-    engine: Engine = None,
-    listen: Listen = None,
-    insecure: Insecure = False,
-    pki: PkiOption = None,
     run: RunName = None,
-    balance: Balance = False,
     detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
     resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
     console: ConsoleOption = False,
@@ -136,18 +111,14 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     try:
         page = page_of(console, open_browser, second, offset, detached)
         if resumed is not None:
-            own = {"FILE": file, "--pace": pace, "--for": duration, "--seed": seed, "--set": sets, "--engine": engine}
-            own |= {"--listen": listen, "--insecure": insecure, "--from": branch, "--balance": balance, "--run": run}
-            own |= {"--capture": capture, "--no-capture": no_capture, "--detach": detached}
-            if given := [name for name, value in own.items() if value is not None and value is not False]:
+            if given := _given(context, but=BESIDE_RESUME):
                 raise BadValue(f"--resume takes FILE and options from the run, it goes without {', '.join(given)}")
             begun = _go_on(open_run(resumed), display, page)
-        elif file is None:
+        elif options is None:
             raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
         elif no_capture and capture is not None:
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
-            options = _options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance)
             begun = _begin(options, capture, not no_capture, run, detached, display, page)
         outcome = begun.run() if isinstance(begun, Up) else begun
     except Killed as killed:
@@ -163,6 +134,16 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         display.say(line)
     _print_result(outcome.result, json)
     raise typer.Exit(FAILED if outcome.failed else DONE)
+
+
+def _given(context: typer.Context, but: Collection[str]) -> list[str]:
+    """Return which parameters of a command were typed, as they are typed, but for those with these names."""
+    return [
+        parameter.opts[0] if parameter.param_type_name == "option" else str(parameter.metavar)
+        for parameter in context.command.params
+        if (source := context.get_parameter_source(parameter.name or "")) is not None and source.name == "COMMANDLINE"
+        if parameter.name not in but
+    ]
 
 
 def _print_result(result: Mapping[str, Any], json: bool) -> None:
@@ -219,19 +200,10 @@ def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
 
 
 @app.command("run")
-def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
-    file: File,
-    pace: PaceOption = None,
-    duration: For = None,
-    seed: Seed = None,
-    branch: From = None,
-    sets: Sets = None,
-    engine: Engine = None,
-    listen: Listen = None,
-    insecure: Insecure = False,
-    pki: PkiOption = None,
+@with_options()
+def run_supervisor(
+    options: RunOptions,
     run: RunName = None,
-    balance: Balance = False,
     progress_file: ProgressOption = None,
 ) -> None:
     """Run a supervisor alone.
@@ -239,29 +211,12 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
+    plan = make_plan(options)
     if not has_launcher():  # which has looked, and ends a run in order whose room gets lost meanwhile
         _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
     raise typer.Exit(serve(settings, plan.address, plan.options.pki, folder, records, progress_file))
-
-
-def _options(  # noqa: PLR0913, PLR0917  # a command's options
-    file: Path,
-    pace: str | None,
-    duration: str | None,
-    seed: int | None,
-    sets: list[str] | None,
-    engine: str | None,
-    listen: str | None,
-    insecure: bool,
-    pki: Path | None,
-    branch: str | None,
-    balance: bool,
-) -> RunOptions:
-    settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki, branch, balance)
 
 
 @app.command()
@@ -403,13 +358,14 @@ def _show(answer: Answer, json: bool) -> None:
 
 
 @app.command()
-def validate(file: File, json: Json = False) -> None:
+@with_options("file")
+def validate(options: RunOptions, json: Json = False) -> None:
     """Check a deployment file.
 
     All problems are shown at once, one a line: file:line:column: what, value, nearest valid name. Of a file without
     any the classes of the players that run here are imported, in a process of its own.
     """
-    plan = make_plan(RunOptions(file))
+    plan = make_plan(options)
     check_players_here(plan)
     deployment = plan.deployment
     content = {
@@ -419,7 +375,7 @@ def validate(file: File, json: Json = False) -> None:
         "players": sorted(deployment.players),
     }
     described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
-    print(encode_json(content).decode() if json else f"{file}: valid, world {deployment.world}, {described}")
+    print(encode_json(content).decode() if json else f"{options.file}: valid, world {deployment.world}, {described}")
 
 
 @app.command("install")
@@ -431,7 +387,7 @@ def install_units(  # a command's options
     show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
     output: Annotated[Path | None, typer.Option(help="Write them into this folder, not onto the host.")] = None,
     pki: PkiOption = None,
-    sets: Sets = None,
+    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
 ) -> None:
     """Write a unit of systemd for each node of a host, onto the host.
 
@@ -440,7 +396,7 @@ def install_units(  # a command's options
     `loginctl enable-linger`.
 
     With --pki the units are for runs with certificates: a node has its own from the folder that the deployment names
-    as the host's `pki`. What belongs there is brought there as by `foosim-pki send`.
+    as the host's `pki`. What belongs there is brought there as by `foosim-pki init --send`.
     """
     plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
     deployment = plan.deployment

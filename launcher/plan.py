@@ -17,7 +17,7 @@ from foosim.deployment.loader import apply_sets, load_deployment, read_deploymen
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.table_clearance import clearance_findings
 from foosim.launcher.resumable import check_resumable
-from foosim.launcher.run_options import RunOptions, options_of
+from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.node.engines.mesh_trial import check_models
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -118,10 +118,7 @@ def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
     """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot go on."""
     if folder.is_live() or not folder.is_left():
         raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
-    launch = folder.launch()
-    if launch is None:
-        raise Refused(f"run {folder.name} has no launcher that was lost: what was started by hand is so again")
-    capture = Path(launch.capture) if launch.capture else None
-    plan = make_plan(options_of(launch))
+    plan, launch = make_plan(launched_options(folder)), folder.launch()
+    capture = Path(launch.capture) if launch is not None and launch.capture else None
     check_resumable(folder, plan.options, capture, has_hub_here=VHUB not in places(plan.deployment))
     return plan, capture

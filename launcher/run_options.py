@@ -1,48 +1,61 @@
-"""The options of a run, as a person gives them and as they are kept in its folder."""
+"""The options of a run: as the commands take them, as they are handed on to its processes, as its folder keeps them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Annotated, Any, get_type_hints
 
-from foosim.runtime.run_folder import Launch
+import msgspec
+import typer
+
+from foosim.common.errors import Refused
+from foosim.runtime.command import PkiOption
+from foosim.runtime.run_folder import LAUNCH_FILE, Launch, RunFolder
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How to run a deployment file; texts as a person types them."""
+    """How to run a deployment file, texts as a person types them. Each field is an option of the commands."""
 
-    file: Path
-    pace: str | None = None
-    duration: str | None = None
-    seed: int | None = None
-    sets: tuple[str, ...] = ()
-    listen: str | None = None
-    """Where to listen; None is where the deployment says."""
-    insecure: bool = False
-    pki: Path | None = None
-    branch: str | None = None
-    """`CAPTURE@12.5s`: begin with that frame."""
-    balance: bool = False
-    """Move robots by the nodes' measured load."""
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
+    pace: Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")] = None
+    duration: Annotated[str | None, typer.Option("--for", help="End after this much simulated time, e.g. 20s.")] = None
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")] = None
+    branch: Annotated[
+        str | None,
+        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+    ] = None
+    sets: Annotated[
+        tuple[str, ...],
+        typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
+    ] = ()
+    engine: Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")] = None
+    listen: Annotated[
+        str | None,
+        typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
+    ] = None
+    insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False
+    pki: PkiOption = None
+    balance: Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")] = False
 
     @property
     def all_sets(self) -> tuple[str, ...]:
-        return self.sets if self.seed is None else (*self.sets, f"seed={self.seed}")
+        engine = () if self.engine is None else (f"engine={self.engine}",)
+        return (*self.sets, *engine, *(() if self.seed is None else (f"seed={self.seed}",)))
 
     def arguments(self) -> list[str]:
-        """Return the options as arguments of `foosim-supervisor run`."""
-        given = [str(self.file)]
-        given += ["--listen", self.listen] if self.listen is not None else []
-        given += ["--insecure"] if self.insecure else []
-        given += self.pki_arguments()
-        given += ["--pace", self.pace] if self.pace is not None else []
-        given += ["--for", self.duration] if self.duration is not None else []
-        given += ["--seed", str(self.seed)] if self.seed is not None else []
-        given += ["--from", self.branch] if self.branch is not None else []
-        given += ["--balance"] if self.balance else []
-        for setting in self.sets:
-            given += ["--set", setting]
+        """Return the options as arguments of `foosim-supervisor up` or `run`."""
+        given = []
+        for name, annotation in get_type_hints(RunOptions, include_extras=True).items():
+            value, info = getattr(self, name), annotation.__metadata__[0]
+            if isinstance(info, typer.models.ArgumentInfo):
+                given.append(str(value))
+            elif isinstance(value, bool):
+                given += [info.default] if value else []
+            elif value is not None:
+                for one in value if isinstance(value, tuple) else (value,):
+                    given += [info.default, str(one.absolute() if isinstance(one, Path) else one)]
         return given
 
     def pki_arguments(self) -> list[str]:
@@ -51,26 +64,34 @@ class RunOptions:
 
 
 def launch_of(options: RunOptions, capture: Path | None) -> Launch:
-    """Return the options of a run as they are kept in its folder."""
-    return Launch(
-        str(options.file.absolute()),
-        "" if capture is None else str(capture.absolute()),
-        options.pace,
-        options.duration,
-        options.seed,
-        options.sets,
-        options.listen,
-        options.insecure,
-        None if options.pki is None else str(options.pki.absolute()),
-        None if options.branch is None else str(Path(options.branch).absolute()),
-        options.balance,
+    """Return the options of a run, and its capture, as they are kept in its folder: with absolute paths."""
+    kept = replace(
+        options,
+        file=options.file.absolute(),
+        pki=None if options.pki is None else options.pki.absolute(),
+        branch=None if options.branch is None else str(Path(options.branch).absolute()),
     )
+    raw = msgspec.Raw(msgspec.json.encode(kept, enc_hook=str))
+    return Launch("" if capture is None else str(capture.absolute()), raw)
 
 
-def options_of(launch: Launch) -> RunOptions:
-    """Return the options that are kept in a run's folder; the inverse of `launch_of`."""
-    pki = None if launch.pki is None else Path(launch.pki)
-    timing = launch.pace, launch.duration, launch.seed
-    return RunOptions(
-        Path(launch.file), *timing, launch.sets, launch.listen, launch.insecure, pki, launch.branch, launch.balance
-    )
+def launched_options(folder: RunFolder) -> RunOptions:
+    """Return the options of a run as they are kept in its folder. Raises Refused when there are none to be read."""
+    launch = folder.launch()
+    path = folder.path / LAUNCH_FILE
+    if launch is None and not path.exists():
+        raise Refused(f"run {folder.name} has no launcher that was lost: what was started by hand is so again")
+    try:
+        if launch is None:
+            raise msgspec.ValidationError("it has no capture and options")
+        known = {field.name for field in fields(RunOptions)}
+        if unknown := sorted(set(msgspec.json.decode(launch.options)) - known):
+            raise msgspec.ValidationError(f"there is no option {unknown[0]}")
+        return msgspec.json.decode(launch.options, type=RunOptions, dec_hook=_to_path)
+    except msgspec.DecodeError as error:
+        reason = f"{path} was written by another version of foosim, or is damaged: {error}"
+        raise Refused(f"run {folder.name} cannot go on with the options that it had: {reason}") from None
+
+
+def _to_path(kind: type, value: Any) -> Any:
+    return kind(value)

@@ -57,19 +57,10 @@ class RunInfo(msgspec.Struct, frozen=True):
 
 
 class Launch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How `up` was called: the options of a run as they were typed, with absolute paths. No capture: an empty path."""
+    """How `up` was called: where it captures, empty where it does not, and its options as the launcher wrote them."""
 
-    file: str
     capture: str
-    pace: str | None = None
-    duration: str | None = None
-    seed: int | None = None
-    sets: tuple[str, ...] = ()
-    listen: str | None = None
-    insecure: bool = False
-    pki: str | None = None
-    branch: str | None = None
-    balance: bool = False
+    options: msgspec.Raw
 
 
 class RunFolder:
@@ -127,7 +118,7 @@ class RunFolder:
         _replace(self.path / LAUNCH_FILE, msgspec.json.format(msgspec.json.encode(launch)))
 
     def launch(self) -> Launch | None:
-        """Return how the run was launched; None when no launcher did."""
+        """Return how the run was launched; None when no launcher did, or its file cannot be read."""
         try:
             return msgspec.json.decode((self.path / LAUNCH_FILE).read_bytes(), type=Launch)
         except (OSError, msgspec.DecodeError):

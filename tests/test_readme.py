@@ -123,7 +123,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
-        plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], None, (*asked["sets"], "engine=pure")))
+        plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], sets=tuple(asked["sets"]), engine="pure"))
         given = plan.text, str(asked["file"]), plan.ticks, asked["nodes"]
         result = rehearse(*given, prepare=add_a_ball, capture=asked["capture"]).json
         assert not result["failed"] and result["ticks"] == 2500

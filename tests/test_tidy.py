@@ -118,7 +118,6 @@ SHELLS = {
     "launcher/detach.py",
     "launcher/doctor/checks.py",
     "cli/doctor.py",
-    "launcher/doctor/hosts.py",
     "launcher/doctor/remote.py",
     "launcher/hosts/port_check.py",
     "launcher/processes.py",
@@ -432,21 +431,12 @@ def is_open(tree: ast.Module, name: str) -> bool:
     return "allow_interpreted_subclasses" in ast.dump(found)
 
 
-INTERPRETED_BENCHES = {
-    "bench/gate.py",
-    *(str(path.relative_to(ROOT)) for path in (ROOT / "bench/mutants").rglob("*.py")),
-}
-"""They plant bugs, and run where nothing is compiled."""
-
-
 def test_no_bench_replaces_what_is_compiled() -> None:
     """`make bench` runs compiled: a class's methods cannot be replaced there, and what replaces a module's function is
     not called."""
     modules = compiled()
     wrong = []
     for path in python_files("bench"):
-        if name_of(path) in INTERPRETED_BENCHES:
-            continue
         named = {
             alias.asname or alias.name
             for node in ast.walk(tree_of(path))

@@ -2,7 +2,9 @@
 
 Each check is a function that gives findings about one subject, and a row of `CHECKS`; nothing is changed, nothing is
 started. Checks are about the machine they run on, which is the supervisor's or a host of the deployment: they run on
-each host, too, and their findings come home.
+each host, too, and `doctor.remote` brings their findings home. There `findings_of` adds what only a comparison tells: a
+host's clock, its arithmetic, whether its ports are reached from here. Clocks are looked at for people, and for the
+dates of certificates; no run compares them.
 """
 
 from __future__ import annotations
@@ -19,18 +21,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
+import msgspec
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from packaging.requirements import Requirement
 
 from foosim.client.class_check import player_findings
 from foosim.common import limits, wall_clock
-from foosim.common.addresses import Address, check_listen
+from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import Refused, describe
 from foosim.deployment.schema import Deployment, places
 from foosim.launcher.hosts.install import SYSTEM_FOLDER, USER_FOLDER
-from foosim.launcher.hosts.port_check import REMEDIES, listen
-from foosim.launcher.hosts.ssh import unit_name
+from foosim.launcher.hosts.port_check import REMEDIES, listen, why_not_reached
+from foosim.launcher.hosts.prepare import check_hosts
+from foosim.launcher.hosts.ssh import Remote, remotes, unit_name
 from foosim.launcher.hosts.systemd_units import units_of
 from foosim.launcher.new_capture import place_of
 from foosim.launcher.pki.hosts import identities_on, passwords_of
@@ -56,6 +60,8 @@ from foosim.runtime.transport.certificates import certificate_path, key_path, lo
 State = Literal["fine", "warning", "problem"]
 
 HERE: Final = "here"
+PLACEMENT: Final = "placement"
+CLOCK_WARN_NS: Final = 50_000_000
 TIME_ERROR: Final = 5
 """What `adjtimex` returns of a clock that nothing keeps in time."""
 PYTHON_TESTED: Final = (3, 11)
@@ -88,6 +94,8 @@ class Case:
     """Which host of the deployment this machine is; None is the supervisor's."""
     ca: str = ""
     """On a host: the fingerprint of the root that the run has; empty for a run without certificates."""
+    reach: str = ""
+    """On a host: where the supervisor would listen, and somebody does meanwhile; empty where that cannot be tried."""
 
     @property
     def is_there(self) -> bool:
@@ -109,9 +117,34 @@ class Case:
         """Whether the vHub is to run on this machine."""
         return places(self.deployment).get(VHUB) == self.host
 
-    def issued(self, remedy: str) -> str:
-        """Return a remedy that is carried out where certificates are issued, which a host is not."""
-        return f"{remedy}, then foosim-pki send DIR {self.host} FILE" if self.is_there else remedy
+    def provide(self, more: str = "") -> str:
+        """Return the command that makes what certificates are missing, and brings them to a host."""
+        return f"foosim-pki init DIR FILE{more} --send" if self.is_there else f"foosim-pki init {self.pki} FILE{more}"
+
+
+class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the host finds of itself, and the fingerprint of its arithmetic."""
+
+    fingerprint: str
+    findings: list[Finding]
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What was heard of one host: its answer, or a `problem` and its `remedy`.
+
+    Its clock is `offset_ns` ahead of the one here, give or take `error_ns`. `radio` is where a vHub there would listen,
+    if that was tried, and `not_reached` why it would not be reached from here.
+    """
+
+    remote: Remote
+    answer: Answer | None = None
+    problem: str = ""
+    remedy: str = ""
+    offset_ns: int = 0
+    error_ns: int = 0
+    radio: str = ""
+    not_reached: str = ""
 
 
 def examine(case: Case) -> list[Finding]:
@@ -170,9 +203,7 @@ def _certificates(case: Case) -> Iterator[_Said]:
     """The certificate or password of everybody here: there, of this root, its own key, valid, for the right host."""
     folder = case.pki
     if folder is None and case.ca:
-        remedy = (
-            f"say in hosts.{case.host}.pki in which folder they are to be, then foosim-pki send DIR {case.host} FILE"
-        )
+        remedy = f"say in hosts.{case.host}.pki in which folder they are to be, then {case.provide()}"
         yield "folder", "problem", "the deployment does not say where they are on this host", remedy
         return
     if folder is None:
@@ -181,11 +212,10 @@ def _certificates(case: Case) -> Iterator[_Said]:
     try:
         ca = read_ca(folder, wall_clock.now_utc())
     except CertificateError as error:
-        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki init {folder}"
-        yield CA_FILE, "problem", error.what, remedy
+        yield CA_FILE, "problem", error.what, case.provide()
         return
     if case.ca not in ("", fingerprint(ca)):
-        yield CA_FILE, "problem", "another root than the run's", f"foosim-pki send DIR {case.host} FILE"
+        yield CA_FILE, "problem", "another root than the run's", case.provide()
         return
     yield CA_FILE, "fine", "", ""
     if (folder / CA_KEY_FILE).exists():
@@ -210,24 +240,17 @@ def _password(folder: Path, who: str, case: Case) -> _Said:
     try:
         read_password(folder / f"{who}{PASSWORD_SUFFIX}")
     except CertificateError as error:
-        return who, "problem", error.what, case.issued(f"foosim-pki issue {_folder(case)} {who} --password")
+        return who, "problem", error.what, case.provide()
     if certificate_path(folder, who).exists():
         return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
     return who, "fine", "has a password", ""
 
 
-def _folder(case: Case) -> Path:
-    """Return the folder in which certificates are issued, as a remedy names it."""
-    assert case.pki is not None
-    return Path("DIR") if case.is_there else case.pki
-
-
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
     """Look at the certificate that one of the run shows."""
-    path, issuing = certificate_path(folder, who), _folder(case)
+    path = certificate_path(folder, who)
     if not path.exists():
-        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki issue {issuing} {who}"
-        return who, "problem", "no certificate", remedy
+        return who, "problem", "no certificate", case.provide()
     try:
         now = wall_clock.now_utc()
         found = read_certificate(path)
@@ -235,17 +258,17 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
         check_key(key_path(folder, who), found)
         credentials = load_credentials(folder, who)
     except CertificateError as error:
-        remedy = f"foosim-pki renew {issuing} {who}, or remove both files and issue anew"
-        return who, "problem", error.what, case.issued(remedy)
+        remedy = f"{case.provide()}; if that refuses it, remove both files before"
+        return who, "problem", error.what, remedy
     assert credentials is not None
     address = {SUPERVISOR: case.address, VHUB: case.radio}.get(who)
     hosts = [host.lower() for host in hosts_of(found)]
     if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
-        remedy = case.issued(f"foosim-pki renew {issuing} {who} --host {address.host}")
+        remedy = case.provide(f" --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
     soon = credentials.ends_soon(wall_clock.now_utc())
     if soon:
-        return who, "warning", soon, case.issued(f"foosim-pki renew {issuing} {who}")
+        return who, "warning", soon, case.provide()
     return who, "fine", f"until {found.not_valid_after_utc:%Y-%m-%d}", ""
 
 
@@ -268,6 +291,32 @@ def _port(plane: str, address: Address) -> _Said:
     except OSError as error:
         return plane, "problem", f"{address}: {error.strerror}", REMEDIES.get(error.errno or 0, "take another address")
     return plane, "fine", f"{address} is free" if address.port else f"{address}: the system chooses a free port", ""
+
+
+def _network(case: Case) -> Iterator[_Said]:
+    """Whether processes on this host would reach the supervisor."""
+    if not case.reach:
+        return
+    address = parse_address(case.reach)
+    why = why_not_reached(address)
+    if why:
+        remedy = "let the firewalls between pass this port, or listen at an address that this host reaches (--listen)"
+        yield "supervisor", "problem", f"{address} is not reached: {why}", remedy
+    else:
+        yield "supervisor", "fine", f"{address} is reached", ""
+
+
+def _placement(case: Case) -> Iterator[_Said]:
+    """On the supervisor's machine: whether what is placed on hosts could connect to here."""
+    where = remotes(case.deployment)
+    if case.is_there or not where:
+        return
+    try:
+        check_hosts(case.deployment, case.address, where)
+    except Refused as refused:
+        yield PLACEMENT, "problem", refused.what, "change the deployment, or --listen"
+    else:
+        yield PLACEMENT, "fine", f"{len(where)} processes on {len(case.deployment.hosts)} hosts", ""
 
 
 def _clock(case: Case) -> Iterator[_Said]:
@@ -374,5 +423,51 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "clock": _clock,
     "disk": _disk,
     "units": _units,
+    "hosts": _placement,
+    "network": _network,
 }
 """Every check by its name, in the order in which they are shown."""
+
+
+# --- hosts, compared with this machine -------------------------------------------------------------------------------
+
+
+def findings_of(told: Told, own_fingerprint: str, mixed_cpu: bool) -> list[Finding]:
+    """Return what is to be said of a host: what it found itself, and what comparing it with this machine tells."""
+    name, answer = told.remote.name, told.answer
+    if answer is None:
+        return [Finding("ssh", told.remote.host.destination, "problem", told.problem, told.remedy, name)]
+    compared = [
+        Finding("ssh", told.remote.host.destination, "fine", "answers", host=name),
+        _clock_finding(told),
+        _arithmetic_finding(name, answer.fingerprint, own_fingerprint, mixed_cpu),
+    ]
+    if told.radio:
+        compared.append(_radio_finding(name, told.radio, told.not_reached))
+    return [*compared, *(replace(finding, host=name) for finding in answer.findings)]
+
+
+def _clock_finding(told: Told) -> Finding:
+    offset_ns, error_ns, name = told.offset_ns, told.error_ns, told.remote.name
+    text = f"{offset_ns / 1e6:+.0f} ms against the clock here, within {error_ns / 1e6:.0f} ms"
+    if abs(offset_ns) - error_ns <= CLOCK_WARN_NS:
+        return Finding("clock", "offset", "fine", text, host=name)
+    remedy = "start a time service on both; runs do not mind, logs and the dates of certificates do"
+    return Finding("clock", "offset", "warning", text, remedy, name)
+
+
+def _arithmetic_finding(name: str, there: str, here: str, mixed_cpu: bool) -> Finding:
+    if there == here:
+        return Finding("arithmetic", "compared", "fine", "is that of this machine", host=name)
+    text = f"{there[:16]} is not {here[:16]}, that of this machine"
+    if mixed_cpu:
+        return Finding("arithmetic", "compared", "warning", text, "mixed_cpu lets it in; runs may differ in bits", name)
+    remedy = "use processors and libraries that are alike, or say `mixed_cpu: true` in the deployment"
+    return Finding("arithmetic", "compared", "problem", text, remedy, name)
+
+
+def _radio_finding(name: str, address: str, why: str) -> Finding:
+    if not why:
+        return Finding("network", "radio plane", "fine", f"{address} is reached from here", host=name)
+    remedy = f"let the firewalls between pass this port, or correct hosts.{name}.address"
+    return Finding("network", "radio plane", "problem", f"{address} is not reached from here: {why}", remedy, name)

@@ -47,7 +47,7 @@ def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, 
         if address.protocol == "tls" and remote.host.pki is None:
             raise NoFolder(
                 f"{there} has no certificate: say in hosts.{remote.name}.pki in which folder on it they are; "
-                f"`foosim-pki send DIR {remote.name} FILE` brings them there"
+                "`foosim-pki init DIR FILE --send` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:

@@ -1,8 +1,8 @@
 """Makes certificates: a root, and one for each process, client and operator under it.
 
 Elliptic curve P-256. The root lasts ten years and may issue no further authority; what it issues lasts 90 days, names
-one identity, and serves both sides of a connection, since every process connects and two listen. Files are never
-overwritten but by `renew`, and keys can be read by their owner only.
+one identity, and serves both sides of a connection, since every process connects and two listen. Keys and passwords are
+never overwritten, and can be read by their owner only.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import os
 import socket
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from ipaddress import ip_address
@@ -24,6 +24,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
+from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.identity import parse_identity
 from foosim.runtime.transport.certificate_files import (
     check_certificate,
@@ -35,15 +36,19 @@ from foosim.runtime.transport.certificate_files import (
     read_key,
 )
 from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, PASSWORD_SUFFIX, CertificateError
-from foosim.runtime.transport.certificates import certificate_path, check_password, identities_in, key_path
+from foosim.runtime.transport.certificates import certificate_path, identities_in, key_path
 
+ROOT_NAME: Final = "foosim"
 ROOT_DAYS: Final = 3650
 LEAF_DAYS: Final = 90
+RENEW_DAYS: Final = 30
 LEAF_DAYS_MAX: Final = 825
 """More than this some libraries refuse."""
 SLACK: Final = timedelta(hours=1)
 """How far clocks of machines may be behind: from so long before now a certificate is valid."""
 LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "::1")
+LISTENERS: Final = frozenset({SUPERVISOR, VHUB})
+"""Whose certificates say where they are reached: the others only connect."""
 HOST_LENGTH_MAX: Final = 253
 
 
@@ -67,14 +72,51 @@ class Shown:
         return (self.ends - now) / timedelta(days=1)
 
 
-def init(folder: Path, name: str = "foosim") -> Path:
-    """Make the folder with a root, and return the root's path. Raises FileExists, BadValue."""
-    if not name.isprintable() or not 0 < len(name) <= 64:
-        raise BadValue("not a name for a root (1 to 64 printable characters)", name)
+def provide(
+    folder: Path,
+    identities: Sequence[str],
+    passwords: Sequence[str] = (),
+    hosts: Sequence[str] = (),
+    days: int = LEAF_DAYS,
+    within_days: int = RENEW_DAYS,
+) -> list[Path]:
+    """Make what a folder lacks for these identities, and return what was made: the root, certificates, passwords.
+
+    `passwords`: those of the identities who have a password instead. `hosts`: names and addresses by which others reach
+    supervisor and vHub. A certificate that ends within so many days, lacks such a host or has another root is issued
+    anew. Raises CertificateError, BadValue.
+    """
+    made: list[Path] = [] if (folder / CA_FILE).exists() else [init(folder)]
+    ca, there = read_ca(folder, wall_clock.now_utc()), identities_in(folder)
+    made += issue_passwords(folder, passwords)
+    for reached, who_has in ((hosts, LISTENERS), ((), set(identities) - LISTENERS)):
+        wanted = [who for who in identities if who in who_has and who not in passwords]
+        made += issue(folder, [who for who in wanted if who not in there], reached, days)
+        due = [who for who in wanted if who in there and _is_due(folder, who, ca, reached, within_days)]
+        made += renew(folder, due, reached)
+    return made
+
+
+def _is_due(folder: Path, identity: str, ca: x509.Certificate, hosts: Sequence[str], within_days: int) -> bool:
+    """Whether a certificate is to be issued anew. Raises CertificateError for one of somebody else."""
+    path, now = certificate_path(folder, identity), wall_clock.now_utc()
+    found = read_certificate(path)
+    try:
+        check_certificate(path, found, identity, ca, now)
+    except CertificateError:
+        if common_name(found) != identity:
+            raise
+        return True
+    has_hosts = {host.lower() for host in hosts} <= {host.lower() for host in hosts_of(found)}
+    return not has_hosts or found.not_valid_after_utc - now <= timedelta(days=within_days)
+
+
+def init(folder: Path) -> Path:
+    """Make the folder with a root, and return the root's path. Raises FileExists."""
     _make_folder(folder)
     _refuse_existing(folder / CA_FILE, folder / CA_KEY_FILE)
     key = ec.generate_private_key(ec.SECP256R1())
-    subject = _subject(name)
+    subject = _subject(ROOT_NAME)
     root = (
         _builder(subject, subject, key.public_key(), ROOT_DAYS)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
@@ -97,6 +139,8 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
     for identity in identities:
         parse_identity(identity)
     _refuse_existing(*(path(folder, identity) for identity in identities for path in (certificate_path, key_path)))
+    if not identities:
+        return []
     root, root_key = _authority(folder)
     made = []
     for identity in identities:
@@ -109,13 +153,12 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
     return made
 
 
-def issue_password(folder: Path, identity: str, password: str = "") -> str:
-    """Give a client a password, by default a random one, and return it. Raises BadValue, FileExists."""
+def issue_password(folder: Path, identity: str) -> str:
+    """Give a client a random password, and return it. Raises BadValue, FileExists."""
     role, _ = parse_identity(identity)
     if role != "client":
         raise BadValue("only clients have passwords (client.NAME)", identity)
-    password = password or base64.urlsafe_b64encode(os.urandom(24)).decode()
-    check_password("password", password)
+    password = base64.urlsafe_b64encode(os.urandom(24)).decode()
     path = folder / f"{identity}{PASSWORD_SUFFIX}"
     _refuse_existing(path)
     _write(path, password.encode() + b"\n")
@@ -131,28 +174,20 @@ def issue_passwords(folder: Path, identities: Sequence[str]) -> list[Path]:
     return [paths[identity] for identity in made]
 
 
-def renew(
-    folder: Path, identities: Iterable[str] = (), within_days: int | None = None, hosts: Sequence[str] = ()
-) -> list[Path]:
-    """Issue certificates anew, for the same keys, names and lengths of time; by default all in the folder.
+def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) -> list[Path]:
+    """Issue certificates anew, for the same keys, names and lengths of time; `hosts` are added to the names.
 
-    `within_days`: only those that end within so many days. `hosts`: further ones, by which others reach the holder.
     A process takes the new one when it is started again. Raises CertificateError, BadValue.
     """
-    root, root_key = _authority(folder)
-    now = wall_clock.now_utc()
     further = [_alternative(host) for host in hosts]
+    if not identities:
+        return []
+    root, root_key = _authority(folder)
     made = []
-    for identity in list(identities) or identities_in(folder):
-        parse_identity(identity)
+    for identity in identities:
         path = certificate_path(folder, identity)
-        if not path.exists():
-            known = ", ".join(identities_in(folder)) or "none"
-            raise CertificateError(f"{folder} has no certificate of {identity}; it has: {known}")
         old = read_certificate(path)
         check_key(key_path(folder, identity), old)
-        if within_days is not None and old.not_valid_after_utc - now > timedelta(days=within_days):
-            continue
         days = max(1, (old.not_valid_after_utc - old.not_valid_before_utc).days)
         alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         key = old.public_key()
@@ -196,7 +231,7 @@ def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateK
     root = read_ca(folder, wall_clock.now_utc())
     path = folder / CA_KEY_FILE
     if not path.exists():
-        raise CertificateError(f"{folder} has no {CA_KEY_FILE}: issue and renew where the root's key is kept")
+        raise CertificateError(f"{folder} has no {CA_KEY_FILE}: certificates are issued where the root's key is kept")
     check_key(path, root)
     key = read_key(path)
     if not isinstance(key, ec.EllipticCurvePrivateKey):

@@ -7,11 +7,11 @@ from typing import Final
 
 import pytest
 
-from bench.gate import find
-from bench.mutants import MUTANTS
-from bench.mutants.planting import Mutant
 from foosim.node.core import NodeCore
 from foosim.rehearsal.swarm.campaign import fly
+from tests.gate.mutants import MUTANTS
+from tests.gate.planting import Mutant
+from tests.gate.search import find
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS_MAX: Final = 1000

@@ -16,9 +16,8 @@ from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher.doctor import checks as doctor
-from foosim.launcher.doctor.checks import Case, Finding, examine, fingerprint
-from foosim.launcher.doctor.hosts import CLOCK_WARN_NS, Told, findings_of
-from foosim.launcher.doctor.remote import GREETING, Answer, Question, serve
+from foosim.launcher.doctor.checks import CLOCK_WARN_NS, Answer, Case, Finding, Told, examine, findings_of, fingerprint
+from foosim.launcher.doctor.remote import GREETING, Question, serve
 from foosim.launcher.hosts import install
 from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.hosts.systemd_units import units_of
@@ -113,12 +112,12 @@ def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> Non
     assert {finding.host for finding in findings.values()} == {"left"}
     vhub = on_host(Case(deployment, LISTEN, pki=there, host="radio", ca=ca))["vhub"]
     assert vhub.text.endswith("not for 192.168.10.4"), "where it listens is not where the supervisor does"
-    assert vhub.remedy == "foosim-pki renew DIR vhub --host 192.168.10.4, then foosim-pki send DIR radio FILE"
+    assert vhub.remedy == "foosim-pki init DIR FILE --host 192.168.10.4 --send"
     assert on_host(Case(deployment, LISTEN, pki=there, host="left", ca="00"))["ca.pem"].state == "problem"
     (there / "ca.key").write_bytes((folder / "ca.key").read_bytes())
     assert on_host(left)["ca.key"].state == "problem"
     (there / "node.blue.pem").unlink()
-    assert on_host(left)["node.blue"].remedy == "foosim-pki send DIR left FILE"
+    assert on_host(left)["node.blue"].remedy == "foosim-pki init DIR FILE --send"
     nowhere = on_host(Case(deployment, LISTEN, host="left", ca=ca))["folder"]
     assert nowhere.state == "problem" and "say in hosts.left.pki" in nowhere.remedy
 

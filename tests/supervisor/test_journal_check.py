@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -17,13 +18,13 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.launcher.journal_check import check_journals, supervisor_records
 from foosim.launcher.plan import make_plan, plan_again
-from foosim.launcher.run_options import RunOptions, launch_of
+from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
-from foosim.runtime.run_folder import LAUNCHER_FILE, RunFolder, create_run
+from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
 from foosim.supervisor.main import serve
 from tests.supervisor.conftest import Typed
 
@@ -91,6 +92,29 @@ def refused(folder: RunFolder) -> str:
 def test_a_whole_journal_is_gone_on_from(folder: RunFolder) -> None:
     plan, capture = plan_again(folder)
     assert capture is not None and plan.options.sets == SETS
+
+
+def test_all_options_are_gone_on_with(folder: RunFolder, tmp_path: Path) -> None:
+    options = RunOptions(TABLE, "2x", "9 s", 7, "a.mcap@1s", SETS, "pure", "10.0.0.1:7", True, Path("certs"), True)
+    folder.write_launch(launch_of(options, None))
+    here = Path.cwd()
+    assert launched_options(folder) == replace(options, pki=here / "certs", branch=str(here / "a.mcap@1s"))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ('{"file": "deploy/table.yaml", "capture": ""}', "it has no capture and options"),
+        ('{"capture": "", "options": {"file": "table.yaml", "speed": "2x"}}', "there is no option speed"),
+        (
+            '{"capture": "", "options": {"file": "table.yaml", "pace": 2}}',
+            r"Expected `str \| null`, got `int` - at `\$.pace`",
+        ),
+    ],
+)
+def test_a_launch_file_of_another_version_is_refused(folder: RunFolder, content: str, said: str) -> None:
+    (folder.path / LAUNCH_FILE).write_text(content)
+    assert re.search(rf"launch.json was written by another version of foosim, or is damaged: {said}", refused(folder))
 
 
 @pytest.mark.parametrize("stem", [channels.SUPERVISOR, channels.VHUB])

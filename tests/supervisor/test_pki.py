@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from foosim.cli.pki import app
 from foosim.common import wall_clock
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue, Refused
 from foosim.launcher.pki import certificates as pki
 from foosim.launcher.pki.certificates import FileExists
 from foosim.runtime.transport import certificates
@@ -40,9 +40,9 @@ def folder(tmp_path: Path) -> Path:
     return path
 
 
-def run(*arguments: str | Path, given: str | None = None) -> tuple[int, str]:
+def run(*arguments: str | Path) -> tuple[int, str]:
     """Exit code and output of the command; a refusal is its text."""
-    result = CliRunner().invoke(app, list(map(str, arguments)), input=given)
+    result = CliRunner().invoke(app, list(map(str, arguments)))
     if isinstance(result.exception, Refused):
         return result.exception.exit_code, str(result.exception)
     return result.exit_code, result.output
@@ -80,20 +80,34 @@ def test_what_is_issued_is_accepted_and_nothing_is_overwritten(folder: Path) -> 
 
 
 def test_renewed_is_the_same_but_for_the_dates(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pki.issue(folder, ["node.red"], ["10.0.0.7"], days=10)
+    everybody = ["supervisor", "node.red"]
+    pki.issue(folder, everybody, ["10.0.0.7"], days=10)
     old, key = read_certificate(folder / "node.red.pem"), (folder / "node.red.key").read_bytes()
     now = wall_clock.now_utc()
     monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=4))
-    assert pki.renew(folder, within_days=3) == []
-    assert pki.renew(folder, within_days=7) == [folder / "node.red.pem"]
+    assert pki.provide(folder, everybody, within_days=3) == []
+    made = pki.provide(folder, ["node.red"], within_days=7)
+    assert made == [folder / "node.red.pem"]
     new = read_certificate(folder / "node.red.pem")
     assert new.not_valid_after_utc - old.not_valid_after_utc > timedelta(days=3)
     assert (new.not_valid_after_utc - new.not_valid_before_utc).days == 10
     assert hosts_of(new) == hosts_of(old) and new.serial_number != old.serial_number
     assert (folder / "node.red.key").read_bytes() == key
     assert load_credentials(folder, "node.red") is not None
-    with pytest.raises(CertificateError, match=r"no certificate of node\.blue; it has: node\.red"):
-        pki.renew(folder, ["node.blue"])
+    assert pki.provide(folder, everybody, within_days=7) == [folder / "supervisor.pem"], "the other one lasts"
+
+
+def test_a_certificate_of_another_root_is_issued_anew_and_one_of_somebody_else_is_not(folder: Path) -> None:
+    pki.issue(folder, ["node.red", "node.blue"])
+    for name in ("ca.pem", "ca.key"):
+        (folder / name).unlink()
+    assert [path.name for path in pki.provide(folder, ["node.red"])] == ["ca.pem", "node.red.pem"]
+    assert load_credentials(folder, "node.red") is not None
+    before = (folder / "node.red.pem").read_bytes()
+    (folder / "node.blue.pem").write_bytes(before)
+    with pytest.raises(CertificateError, match=r"a certificate of 'node\.red', not of node\.blue"):
+        pki.provide(folder, ["node.blue"])
+    assert (folder / "node.blue.pem").read_bytes() == before
 
 
 def _expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +166,7 @@ def _no_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (_expired, r"node\.red\.pem: expired on .* UTC; foosim-pki renew .* node\.red"),
+        (_expired, r"node\.red\.pem: expired on .* UTC; foosim-pki init .* FILE"),
         (_early, r"ca\.pem: valid from .* mind the clock"),
         (_root_expired, r"ca\.pem: expired on"),
         (_others_key, r"node\.red\.key: the key does not belong to the certificate node\.red\.pem"),
@@ -195,7 +209,12 @@ def test_who_listens_has_a_certificate_for_that_host(folder: Path) -> None:
     check_host(None, "tcp/10.9.9.9:7400")
     with pytest.raises(CertificateError, match=r"not for 10\.0\.0\.2, where supervisor listens: .* --host 10\.0\.0\.2"):
         check_host(credentials, "tls/10.0.0.2:7400")
-    assert run("renew", folder, "supervisor", "--host", "10.0.0.2", "--host", "10.0.0.1")[0] == 0
+    pki.issue(folder, ["node.red"])
+    code, output = run("init", folder, TABLE, "--host", "10.0.0.2", "--host", "10.0.0.1")
+    made = {Path(line).stem for line in output.split()}
+    assert code == 0 and {"supervisor", "vhub", "node.blue"} <= made and "node.red" not in made
+    node = hosts_of(read_certificate(folder / "node.blue.pem"))
+    assert not {"10.0.0.1", "10.0.0.2"} & set(node), "it listens nowhere"
     check_host(load_credentials(folder, "supervisor"), "tls/10.0.0.2:7400")
 
 
@@ -229,12 +248,11 @@ def test_a_viewer_is_the_only_one_or_named_or_the_operator(folder: Path, monkeyp
 
 
 def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
-    code, output = run("issue", folder, "client.hand", "--password", given="\n")
-    made = output.strip()
-    assert code == 0 and len(made) >= 24
+    made = pki.issue_password(folder, "client.hand")
+    assert len(made) >= 24
     found = load_credentials(folder, "client.hand")
     assert found is not None and (found.user, found.password) == ("hand", made) and made not in repr(found)
-    assert run("issue", folder, "client.other", "--password", given="s3cret\n") == (0, "")
+    (folder / "client.other.password").write_text("s3cret\n")
     with passwords_file(folder, ["hand", "other", "third"]) as path:
         assert path.read_text() == f"hand:{made}\nother:s3cret\n"
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -249,45 +267,52 @@ def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (["issue", "FOLDER"], 2, "nobody to issue to"),
-        (["issue", "FOLDER", "robot.red"], 2, "not an identity (supervisor, vhub, node.NAME,"),
-        (["issue", "FOLDER", "node.Red"], 2, "not an identity"),
-        (["issue", "FOLDER", "node.red", "--host", "a b"], 2, "not a host name or an IP address, 'a b'"),
-        (["issue", "FOLDER", "node.red", "--days", "9999"], 2, "days of a certificate are from 1 to 825"),
-        (["issue", "FOLDER", "node.red", "--password"], 2, "only clients have passwords"),
-        (["issue", "FOLDER", "--password"], 2, "--password is for one client"),
-        (["issue", "NOWHERE", "node.red"], 3, "has no ca.pem; foosim-pki init"),
+        (["init", "FOLDER", "TABLE", "--host", "a b"], 2, "not a host name or an IP address, 'a b'"),
+        (["init", "FOLDER", "TABLE", "--days", "9999"], 2, "days of a certificate are from 1 to 825"),
+        (["init", "FOLDER", "TABLE", "--send"], 2, "--send: the deployment places nothing on a host, 'table'"),
+        (["init", "FOLDER", "NOWHERE"], 2, "there is no such file"),
         (["show", "NOWHERE"], 3, "cannot be read, No such file"),
-        (["renew", "FOLDER", "node.red"], 3, "has no certificate of node.red"),
-        (["init", "FOLDER"], 3, "exists already, and is not overwritten"),
     ],
 )
 def test_what_cannot_be_done_is_said(folder: Path, arguments: list[str], code: int, said: str) -> None:
-    places = {"FOLDER": str(folder), "NOWHERE": str(folder.parent / "nowhere")}
-    found, output = run(*(places.get(argument, argument) for argument in arguments), given="a b\n")
+    places = {"FOLDER": str(folder), "NOWHERE": str(folder.parent / "nowhere"), "TABLE": str(TABLE)}
+    found, output = run(*(places.get(argument, argument) for argument in arguments))
     assert found == code and said in output, output
+
+
+@pytest.mark.parametrize("who", ["robot.red", "node.Red"])
+def test_only_identities_get_certificates_and_only_clients_passwords(folder: Path, who: str) -> None:
+    with pytest.raises(BadValue, match=r"not an identity \(supervisor, vhub, node.NAME,"):
+        pki.issue(folder, [who])
+    with pytest.raises(BadValue, match="only clients have passwords"):
+        pki.issue_password(folder, "node.red")
+    (folder / "client.hand.password").write_text("a b\n")
+    with pytest.raises(CertificateError, match="a password is printable ASCII"):
+        load_credentials(folder, "client.hand")
+    with pytest.raises(CertificateError, match=r"has no ca.pem; foosim-pki init .* FILE makes one"):
+        pki.issue(folder.parent / "nowhere", ["node.red"])
 
 
 def test_where_clients_have_passwords_a_deployment_gets_these(folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "passwords.yaml"
     file.write_text(f"{TABLE.read_text()}\naccess: {{radio: password, operators: [ann]}}\n")
-    assert run("issue", folder, "--deployment", file)[0] == 0
+    assert run("init", folder, file)[0] == 0
     assert certificates.identities_in(folder) == ["node.blue", "node.red", "operator.ann", "supervisor", "vhub"]
     before = (folder / "client.player-red.password").read_text()
-    assert run("issue", folder, "--deployment", file) == (0, ""), "everybody has something"
+    assert run("init", folder, file) == (0, ""), "everybody has something"
     assert (folder / "client.player-red.password").read_text() == before != ""
 
 
 def test_without_the_roots_key_nothing_is_issued(folder: Path) -> None:
     os.remove(folder / "ca.key")
-    code, output = run("issue", folder, "node.red")
-    assert code == 3 and "issue and renew where the root's key is kept" in output
+    code, output = run("init", folder, TABLE)
+    assert code == 3 and "certificates are issued where the root's key is kept" in output
 
 
 def test_a_whole_deployment_is_issued_in_one_command(folder: Path) -> None:
-    assert run("issue", folder, "node.red")[0] == 0
-    code, output = run("issue", folder, "--deployment", TABLE, "--host", "10.0.0.1")
-    assert code == 0 and "node.red.pem" not in output
+    pki.issue(folder, ["node.red"])
+    code, output = run("init", folder, TABLE, "--host", "10.0.0.1")
+    assert code == 0 and "node.red.pem" not in output and "ca.pem" not in output
     everybody = {
         "supervisor",
         "vhub",

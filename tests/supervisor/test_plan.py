@@ -15,7 +15,17 @@ from foosim.runtime.run_folder import RunFolder
 from foosim.supervisor.settings import RunSettings
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
-EVERYTHING = RunOptions(TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True)
+EVERYTHING = RunOptions(
+    TABLE,
+    "2x",
+    "1.5 s",
+    7,
+    sets=("engine=bullet", "table.ball.mass=27 g"),
+    engine="pure",
+    listen="0.0.0.0:7447",
+    insecure=True,
+    balance=True,
+)
 
 
 def test_a_plan_has_what_was_asked_for() -> None:

@@ -291,7 +291,7 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
     folder: Path, deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     other = tmp_path / "other"
-    certificates.init(other, "somebody else's")
+    certificates.init(other)
     certificates.issue(other, ["node.red"])
     shutil.copytree(folder, tmp_path / "late", ignore=shutil.ignore_patterns("node.red.*"))
     credentials, theirs = load_credentials(folder, "supervisor"), load_credentials(other, "node.red")

@@ -1,4 +1,4 @@
-"""Every fault of bench/faults once, on real processes: what must hold however slow the machine is.
+"""Every fault of tests/faults once, on real processes: what must hold however slow the machine is.
 
 `make faults` repeats each at random times and asserts the figures.
 """
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
-from bench.faults.__main__ import ALL, Found, main, p99
-from bench.faults.cluster import Cluster, FaultError
-from bench.faults.digest import FAULTS
-from bench.faults.kinds import KINDS, NODE, Trial, twin_refused
-from bench.faults.outside import OUTSIDE
-from bench.faults.outside import SETS as WITH_CLIENT
 from foosim.capture.reader import open_capture
+from tests.faults.campaign import ALL, Found, main, p99
+from tests.faults.cluster import Cluster, FaultError
+from tests.faults.digest import FAULTS
+from tests.faults.kinds import KINDS, NODE, Trial, twin_refused
+from tests.faults.outside import OUTSIDE
+from tests.faults.outside import SETS as WITH_CLIENT
 from tests.wire.proxy import Weather
 
 if TYPE_CHECKING:

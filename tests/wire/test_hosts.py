@@ -14,9 +14,9 @@ import pytest
 
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
-from foosim.launcher.doctor import hosts as doctor_hosts
-from foosim.launcher.doctor.hosts import LIMIT_S, ask, findings_of
-from foosim.launcher.doctor.remote import Question
+from foosim.launcher.doctor import remote as doctor_remote
+from foosim.launcher.doctor.checks import findings_of
+from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
 from foosim.launcher.hosts.ssh import Remote
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE
@@ -64,17 +64,18 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     assert [finding["subject"] for finding in gone] == ["127.0.0.1"] and code == 1
     assert "cannot be reached" in gone[0]["text"] and gone[0]["remedy"].startswith("make `ssh -F ")
     root = found["there", "certificates", "ca.pem"]
-    assert root["state"] == "problem" and root["remedy"] == "foosim-pki send DIR there FILE"
+    assert root["state"] == "problem" and root["remedy"] == "foosim-pki init DIR FILE --send"
 
-    code, out, err = house.ask("foosim-pki", "send", folder, "there", file)
-    assert code == 0 and sorted(out.split()) == [f"{there}/{name}" for name in OWN], err
+    deployed(file, {"there": host})
+    code, out, err = house.ask("foosim-pki", "init", folder, file, "--send")
+    brought = sorted(line for line in out.split() if line.startswith(f"{there}/"))
+    assert code == 0 and brought == [f"{there}/{name}" for name in OWN], err
     assert sorted(path.name for path in there.iterdir()) == list(OWN), "and nothing of others"
     for path in there.iterdir():
         assert path.read_bytes() == (folder / path.name).read_bytes() and path.stat().st_mode & 0o777 == 0o600
         if path.suffix == ".key":
             (folder / path.name).unlink()  # where the others are is enough
 
-    deployed(file, {"there": host})
     (folder / "ca.key").unlink()
     code, found = examined(house, *asked)
     assert code == 0, [finding for finding in found.values() if finding["state"] == "problem"]
@@ -102,6 +103,6 @@ def test_why_a_host_does_not_answer_is_said(other: There, monkeypatch: pytest.Mo
     assert "there is no /nowhere/foosim-guard on host there" in text and remedy.startswith("install foosim ")
     text, remedy = why_silent(other.remote())
     assert text == "ended with exit code 2 on host there: :1:1: no YAML document, ''", "it was asked nonsense"
-    monkeypatch.setattr(doctor_hosts, "version", lambda name: "99.0")
+    monkeypatch.setattr(doctor_remote, "version", lambda name: "99.0")
     text, remedy = why_silent(other.remote())
     assert "is installed there, the run has 99.0" in text and remedy.startswith("install foosim 99.0 on host there")

@@ -1,4 +1,4 @@
-"""`python -m bench.gate [NAME...] [--seeds N]`: for each planted bug, the first seed of the swarm that finds it.
+"""`python -m tests.gate.search [NAME...] [--seeds N]`: for each planted bug, the first seed of the swarm that finds it.
 
 Exit code 1 when a bug is found by no seed, or when its recorded seed does not find it.
 """
@@ -15,10 +15,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
-from bench.mutants import MUTANTS
 from foosim.rehearsal.swarm.campaign import fly
+from tests.gate.mutants import MUTANTS
 
-TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS: Final = 1000
 
 
@@ -50,7 +50,7 @@ def find(name: str, seeds: Sequence[int]) -> Found:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search for the bugs that are named, or all; print a table; return the exit code."""
     names = [mutant.name for mutant in MUTANTS]
-    parser = argparse.ArgumentParser(prog="python -m bench.gate", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.gate.search", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="of the planted bugs; all by default")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="how many seeds a bug may take")
     parser.add_argument("--jobs", type=int, default=2, help="how many processes")

@@ -16,9 +16,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from bench.faults.cluster import LIMIT_S, Cluster, FaultError
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.children import script
+from tests.faults.cluster import LIMIT_S, Cluster, FaultError
 from tests.wire.proxy import BOTH, Direction
 
 Figures = dict[str, float]

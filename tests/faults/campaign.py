@@ -1,4 +1,7 @@
-"""`python -m bench.faults [--count N] [--seed S] [--only KIND]`: repeats each fault, prints a table, and JSON at last.
+"""`python -m tests.faults.campaign [--count N] [--seed S] [--only KIND]`: repeats faults on real processes.
+
+Each kind (`kinds`) is made again and again at random times, on runs of its own (`cluster`), and every run must end with
+the digests of an undisturbed rehearsal. It prints a table, and JSON at last.
 
 It ends with 1 when a figure misses its limit or something did not hold; the seed in the first line repeats the times
 and choices, though not what the machine did meanwhile.
@@ -20,11 +23,11 @@ from statistics import median
 from typing import Final
 
 from bench import machine
-from bench.faults.cluster import Cluster, FaultError
-from bench.faults.digest import DISTURBED
-from bench.faults.kinds import KINDS, NODE, Kind, Trial
-from bench.faults.launched import LAUNCHED, Launched
-from bench.faults.outside import OUTSIDE
+from tests.faults.cluster import Cluster, FaultError
+from tests.faults.digest import DISTURBED
+from tests.faults.kinds import KINDS, NODE, Kind, Trial
+from tests.faults.launched import LAUNCHED, Launched
+from tests.faults.outside import OUTSIDE
 
 COUNT: Final = 20
 TRIALS_A_RUN: Final = 20
@@ -112,7 +115,7 @@ def lines(kind: Kind | Launched, found: Found, took_s: float) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Repeat the kinds that are named, or all of them; return the exit code."""
     names = [kind.name for kind in ALL]
-    parser = argparse.ArgumentParser(prog="python -m bench.faults", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.faults.campaign", description=__doc__)
     parser.add_argument("--count", type=int, default=COUNT, help=f"how often each fault is made, {COUNT} by default")
     parser.add_argument("--seed", type=int, help="of times and choices; by default a new one, which is printed")
     parser.add_argument("--only", action="append", choices=names, help="this kind alone; may be repeated")

@@ -13,13 +13,13 @@ from math import inf, nan
 from statistics import median
 from typing import Any, Final
 
-from bench.faults.cluster import Cluster, FaultError
-from bench.faults.kinds import Figures, Kind, Trial
 from foosim.client.client import Client, connect
 from foosim.client.control import RequestRefused
 from foosim.client.errors import ConnectionRefused
 from foosim.common import limits
 from foosim.common.names import CHANNEL_ECHO, CHANNEL_POSITION
+from tests.faults.cluster import Cluster, FaultError
+from tests.faults.kinds import Figures, Kind, Trial
 
 CLIENT: Final = "flooder"
 SETS: Final = (f"clients={{{CLIENT}: {{}}}}",)

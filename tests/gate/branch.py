@@ -6,13 +6,13 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
 from foosim.protocol.hub_messages import ResumeGrant
 from foosim.supervisor.failover import Rollback
 from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 

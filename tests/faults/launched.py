@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bench.faults.cluster import LIMIT_S, POLL_S, TABLE, FaultError
-from bench.faults.kinds import CALM_S, Figures
 from foosim.client import control
 from foosim.common.errors import Refused
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.children import script
+from tests.faults.cluster import LIMIT_S, POLL_S, TABLE, FaultError
+from tests.faults.kinds import CALM_S, Figures
 
 END_MS: Final = 5000.0
 GONE_MS: Final = 1000.0

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bench.faults import kinds
-from bench.faults.kinds import Figures, Kind, Trial
+from tests.faults import kinds
+from tests.faults.kinds import Figures, Kind, Trial
 
 OF_EACH: Final = 5
 TICKS: Final = 30_000

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bench.mutants import branch, node, supervisor, vhub
-from bench.mutants.planting import Mutant
+from tests.gate import branch, node, supervisor, vhub
+from tests.gate.planting import Mutant
 
 MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS, *branch.MUTANTS)

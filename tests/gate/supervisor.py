@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
@@ -17,6 +16,7 @@ from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.state import InputBuffer, RunState
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 

@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
@@ -18,6 +17,7 @@ from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import hub_state, records
 from foosim.vhub.state.commits import Commits
 from foosim.vhub.state.hub_state import HubState
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import count
 from typing import Any, Final
 
-from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node import tick as step
 from foosim.node.core import NodeCore
@@ -16,6 +15,7 @@ from foosim.protocol.handshake import Member
 from foosim.world.islands import Assignment
 from foosim.world.scenes.table_world import TableWorld
 from foosim.world.sensors import encoder
+from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
 
