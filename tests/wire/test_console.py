@@ -67,15 +67,21 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         assert links["at"] >= paused["tick"]
 
 
-def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: House) -> None:
-    up = house.up("--console", "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
-    house.ticking()
+def addresses_of(house: House) -> dict[str, str]:
+    """The addresses of the live run's page, once its console serves it."""
     path = house.live().path / "console.json"
 
     def told() -> dict[str, str] | None:
         return json.loads(path.read_text()) if path.exists() else None
 
-    addresses = house.wait_for("the console's addresses", told)
+    return house.wait_for("the console's addresses", told)
+
+
+def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: House) -> None:
+    up = house.up("--console", "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
+    house.ticking()
+    path = house.live().path / "console.json"
+    addresses = addresses_of(house)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert house.read_until(up.stderr, "console: ").strip() == addresses["text"]
     assert addresses["operate"] not in (house.live().logs / "console.log").read_text()
