@@ -21,7 +21,7 @@ from typing import Any, Final
 from websockets.sync.client import ClientConnection, connect
 
 NAMES: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-LIMIT_S: Final = 60.0
+LIMIT_S: Final = 180.0
 """Only a page that hangs takes as long."""
 FLAGS: Final = (
     "--headless=new",
@@ -66,6 +66,29 @@ SEEN: Final = """new Promise((done) => {
   document.querySelector("#show-labels").click();
 })"""
 """Reads the view within a frame in which it was drawn: afterwards its buffer is the browser's."""
+SLOW_DISPLAY: Final = """(() => {
+  const next = window.requestAnimationFrame.bind(window);
+  const wanted = new Map();
+  let asked = 0;
+  const draw = (now) => {
+    const all = [...wanted.values()];
+    wanted.clear();
+    for (const one of all) {
+      try {
+        one(now);
+      } catch (error) {
+        reportError(error);
+      }
+    }
+  };
+  window.requestAnimationFrame = (one) => {
+    if (!wanted.size) setTimeout(() => next(draw), %s);
+    wanted.set(++asked, one);
+    return asked;
+  };
+  window.cancelAnimationFrame = (one) => void wanted.delete(one);
+})()"""
+"""Software draws a frame of the view in 25 ms of processor time: a display of 60 Hz takes more than a core."""
 
 
 def find_chromium() -> str | None:
@@ -93,6 +116,10 @@ class Page:
         self._call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         theme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self._call("Emulation.setEmulatedMedia", features=[theme])
+
+    def refresh(self, hertz: float) -> None:
+        """Have a display with this refresh rate, from the next page that is loaded on."""
+        self._call("Page.addScriptToEvaluateOnNewDocument", source=SLOW_DISPLAY % (1000 / hertz))
 
     def open(self, address: str) -> None:
         """Load a page anew, also where only what stands behind its # differs."""
@@ -135,11 +162,19 @@ class Page:
 
     def drag(self, start: tuple[float, float], *ends: tuple[float, float]) -> None:
         """Press the pointer at a place, take it to others, and let go there."""
+        self.hold(start, *ends)
+        self.let_go(ends[-1] if ends else start)
+
+    def hold(self, start: tuple[float, float], *ends: tuple[float, float]) -> None:
+        """The same, without letting go."""
         self._point("mouseMoved", start, 0)
         self._point("mousePressed", start, 1)
         for end in ends:
             self._point("mouseMoved", end, 1)
-        self._point("mouseReleased", ends[-1] if ends else start, 0)
+
+    def let_go(self, place: tuple[float, float]) -> None:
+        """Let go of the pointer at a place."""
+        self._point("mouseReleased", place, 0)
 
     def press(self, key: str) -> None:
         """Press a key."""
@@ -149,6 +184,11 @@ class Page:
             named["text"] = text
         self._call("Input.dispatchKeyEvent", type="keyDown", **named)
         self._call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
+
+    def choose(self, selector: str, value: str) -> None:
+        """Choose an option of a list."""
+        one = f"document.querySelector({json.dumps(selector)})"
+        self.get(f"({one}.value = {json.dumps(value)}, {one}.dispatchEvent(new Event('change')))")
 
     def fill(self, selector: str, text: str) -> None:
         """Write into a field, in the place of what is there."""
