@@ -88,7 +88,7 @@ SLOW_DISPLAY: Final = """(() => {
   };
   window.cancelAnimationFrame = (one) => void wanted.delete(one);
 })()"""
-"""Software draws a frame of the view in 25 ms of processor time: a display of 60 Hz takes more than a core."""
+"""Software draws a frame of the view in 25 to 80 ms of processor time: a display of 60 Hz takes more than a core."""
 
 
 def find_chromium() -> str | None:
@@ -247,12 +247,12 @@ class Page:
 
 
 @contextmanager
-def chromium(path: str, folder: Path) -> Iterator[Page]:
+def chromium(path: str, folder: Path, *flags: str) -> Iterator[Page]:
     """Run chromium, its profile in a folder; it ends with the block, with all of its processes."""
     root = ("--no-sandbox",) if os.geteuid() == 0 else ()  # the sandbox takes a user that is not root
     with (folder / "chromium.log").open("w") as log:
         process = subprocess.Popen(
-            [path, *FLAGS, *root, f"--user-data-dir={folder / 'profile'}", "about:blank"],
+            [path, *FLAGS, *flags, *root, f"--user-data-dir={folder / 'profile'}", "about:blank"],
             stdout=log,
             stderr=log,
             stdin=subprocess.DEVNULL,
