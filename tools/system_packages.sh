@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs what some tests need beside Python: a real sshd, ip and tc, and a browser. Tests that lack them are skipped,
-# and say so.
+# and say so; with CI in the environment those that lack the browser fail.
 # It is for machines that run the tests for others (.ci/run calls it); no other target of the Makefile does. It needs
 # root and apt-get, and does nothing where it has not both, or where nothing is missing. It starts no service.
 set -u
