@@ -1,5 +1,6 @@
 #!/bin/sh
-# Installs what some tests need beside Python: a real sshd, and ip and tc. Tests that lack them are skipped, and say so.
+# Installs what some tests need beside Python: a real sshd, ip and tc, and a browser. Tests that lack them are skipped,
+# and say so; with CI in the environment those that lack the browser fail.
 # It is for machines that run the tests for others (.ci/run calls it); no other target of the Makefile does. It needs
 # root and apt-get, and does nothing where it has not both, or where nothing is missing. It starts no service.
 set -u
@@ -8,6 +9,11 @@ missing=
 [ -x /usr/sbin/sshd ] || missing="$missing openssh-server"
 command -v ssh >/dev/null || missing="$missing openssh-client"
 command -v ip >/dev/null || missing="$missing iproute2"
+found=
+for name in chromium chromium-browser google-chrome google-chrome-stable; do
+    ! command -v "$name" >/dev/null || found=yes
+done
+[ -n "$found" ] || missing="$missing chromium"
 [ -n "$missing" ] || exit 0
 
 if [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then

@@ -101,6 +101,16 @@ async def look_later(page: str, token: str, tick: int) -> None:
         assert [name for name, points in told.items() if points[0][0] > tick] == []
 
 
+def addresses_of(house: House) -> dict[str, str]:
+    """The addresses of the live run's page, once its console serves it."""
+    path = house.live().path / "console.json"
+
+    def told() -> dict[str, str] | None:
+        return json.loads(path.read_text()) if path.exists() else None
+
+    return house.wait_for("the console's addresses", told)
+
+
 def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: House) -> None:
     table = house.folder / "walk.csv"
     rows = [f"{at},ball,0.1,0,0" for at in range(2001)]
@@ -109,11 +119,7 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
     house.ticking()
     path = house.live().path / "console.json"
-
-    def told() -> dict[str, str] | None:
-        return json.loads(path.read_text()) if path.exists() else None
-
-    addresses = house.wait_for("the console's addresses", told)
+    addresses = addresses_of(house)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert house.read_until(up.stderr, "console: ").strip() == addresses["text"]
     assert addresses["operate"] not in (house.live().logs / "console.log").read_text()
