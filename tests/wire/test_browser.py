@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.view_command import open_sources
+from foosim.cli.replay_view import open_sources
+from foosim.rehearsal.run import rehearse
 from tests.replay.conftest import TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.served import served
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 WAREHOUSE = Path(__file__).parent.parent.parent / "deploy" / "warehouse.yaml"
 ROBOTS = {f"red.{line}": ["encoder"] for line in ("goal", "defence", "midfield", "attack")} | {"camera": ["ball"]}
-PLAYER = {"class": "foosim.client.players:Team", "rate": "50 Hz", "robots": ROBOTS, "parameters": {"team": "red"}}
+PLAYER = {"class": "foosim.players.football:Team", "rate": "50 Hz", "robots": ROBOTS, "parameters": {"team": "red"}}
 LINK = ("camera", "player-red")
 STAT = "window.foosim.stat"
 WINDOW = 860, 480
