@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(bool(namespaces.missing()), reason=namespaces.mi
 LISTEN: Final = "10.77.0.1:7400"
 DESK: Final = """
 import sys
-from foosim.protocol.codec import encode_json
+from foosim.common.json_text import encode_json
 from foosim.client.control import Control
 with Control(sys.argv[1]) as control:
     for line in sys.stdin:

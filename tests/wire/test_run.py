@@ -108,7 +108,7 @@ def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None
     assert code == 3 and "no node 'rde' is declared; declared are blue, red, nearest is red" in err
     code, err = node("red", "--world", "chess")
     assert code == 3 and "world chess, this is table" in err
-    version_2 = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2"
+    version_2 = "from foosim.common import limits; limits.PROTOCOL_VERSION = 2"
     code, err = altered_node(house, version_2, "red", address)
     assert code == 3 and "protocol version 2, this is 1" in err
 

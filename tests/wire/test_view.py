@@ -22,8 +22,8 @@ LONG_S: Final = 900.0
 # Its link would end by its lease, in a second: what is seen here is what a put does to it.
 LOOK: Final = """
 import sys
-from foosim.protocol import session_settings
-session_settings.LEASE_MS = 900_000
+from foosim.runtime.transport import settings
+settings.LEASE_MS = 900_000
 from foosim.runtime.transport.inbox import Inbox
 from foosim.client.control import Control
 inbox = Inbox(10_000)
