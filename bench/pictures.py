@@ -152,11 +152,11 @@ def live(album: Album, folder: Path) -> None:
         go_on_to(page, CUT_TICK)
         control.network(CUT, RUN)
         go_on_to(page, END_TICK)
-        page.until("document.querySelector('.recoveries').textContent.includes('node blue')")
         page.click(".drops summary", "partition")
         page.get("document.querySelector('.drops').scrollIntoView()")
         album.take("network")
         page.click("#tab-machines")
+        page.until("document.querySelector('.recoveries').textContent.includes('node blue')")
         album.take("machines")
         page.click("#tab-plots")
         for name in PLOTTED[4:]:

@@ -24,7 +24,11 @@ def served(make: Callable[[], Sequence[Source]]) -> Iterator[str]:
         loop, ended = asyncio.get_running_loop(), asyncio.Event()
         async with server.listening("127.0.0.1", 0) as port:
             running = asyncio.create_task(server.run_sources())
-            told.set_result((port, lambda: loop.call_soon_threadsafe(ended.set) and None))
+
+            def end() -> None:
+                loop.call_soon_threadsafe(ended.set)
+
+            told.set_result((port, end))
             await ended.wait()
             running.cancel()
             await asyncio.wait((running,))
