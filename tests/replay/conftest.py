@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -12,6 +11,7 @@ from typing import Any, Final
 import msgspec
 import pytest
 from mcap import records
+from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from foosim.protocol.errors import Refused
@@ -25,7 +25,7 @@ from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import PROFILE, Fate, PacketRow
+from foosim.vhub.rows import FRAME, PROFILE, Fate, PacketRow
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -135,10 +135,14 @@ def with_row(message: Message, **fields: Any) -> Message:
 
 
 def damaged(path: Path, out: Path) -> Path:
-    """Write a capture with one wrong bit within the compressed data of a chunk in the middle."""
+    """Write a capture with one wrong bit within the compressed data of a chunk with frames in the middle."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    (frames,) = (channel.id for channel in summary.channels.values() if channel.topic == FRAME)
+    chunks = [chunk for chunk in summary.chunk_indexes if frames in chunk.message_index_offsets]
     content = bytearray(path.read_bytes())
-    chunks = [found.start() for found in re.finditer(re.escape(b"\x28\xb5\x2f\xfd"), content)]
-    content[chunks[len(chunks) // 2] + 40] ^= 1
+    content[content.index(b"\x28\xb5\x2f\xfd", chunks[len(chunks) // 2].chunk_start_offset) + 40] ^= 1
     out.write_bytes(content)
     return out
 
