@@ -120,7 +120,7 @@ function drawOwners() {
 }
 
 function drawSigns() {
-  bar.signs.hidden = !options.radio || stat.view !== "3d" || !store.main?.links.length;
+  bar.signs.hidden = !options.radio || stat.view !== "3d" || !store.main?.links.some(({ radio }) => radio);
 }
 
 store.on("connected", (connected) => {

@@ -112,7 +112,6 @@ export class View3D {
       if (moved <= CLICK_PX && event.button === 0) store.select(this.pick(event.clientX, event.clientY));
     });
     this.canvas.addEventListener("keydown", (event) => this._key(event));
-    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.retheme());
   }
 
   /** @param {KeyboardEvent} event */

@@ -38,7 +38,7 @@ export class ViewBar {
     bar.append(this.two);
     this.owners = h("div", { class: "legend owners", id: "owners" });
     const scale = h("span", {}, "loss 0 %");
-    this.signs = h("div", { class: "legend signs", hidden: true }, scale, h("i", { style: `background:${lossGradient()}` }), "100 %", h("span", {}, "▮ wall in the way"), h("span", {}, "✕ packet dropped"));
+    this.signs = h("div", { class: "legend signs", hidden: true }, scale, h("i", { style: `background:${lossGradient()}` }), "100 %", h("span", {}, h("i", { class: "wall" }), " wall in the way"), h("span", {}, "✕ packet dropped"));
     byId("view").append(this.owners, this.signs);
   }
 
