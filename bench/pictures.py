@@ -34,7 +34,7 @@ from tests.wire.served import served
 TO: Final = ROOT / "docs" / "pictures"
 WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
 SIZE_PX: Final = 1280, 800
-LARGEST_BYTES: Final = 150_000
+LARGEST_BYTES: Final = 120_000
 LIMIT_S: Final = 300.0
 SEED: Final = 5
 RUN: Final = "saturday"
@@ -78,7 +78,7 @@ class Album:
         if name not in self.wanted:
             return
         self.page.get("document.activeElement.blur()")
-        self.page.until("!document.querySelector('.toast')")
+        self.page.until(f"!document.querySelector('.toast') && !{STAT}.flashing")
         self.page.get("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         path = self.folder / f"{name}.webp"
         self.page.picture(path)
@@ -157,6 +157,7 @@ def live(album: Album, folder: Path) -> None:
         album.take("network")
         page.click("#tab-machines")
         page.until("document.querySelector('.recoveries').textContent.includes('node blue')")
+        page.get("document.querySelector('.recoveries').scrollIntoView({block: 'end'})")
         album.take("machines")
         page.click("#tab-plots")
         for name in PLOTTED[4:]:
@@ -175,6 +176,7 @@ def seek(page: Page, tick: int) -> None:
     """Put the slider to a tick, and wait until its frame is seen."""
     slider = "document.querySelector('#slider')"
     page.until(f"!{slider}.disabled")
+    page.get("document.activeElement.blur()")  # a button in focus has the space bar for itself
     page.press(" ")
     page.until(f"{STAT}.paused")
     page.get(f"{slider}.value = {tick}, {slider}.dispatchEvent(new Event('change'))")
@@ -205,7 +207,9 @@ def ghost(album: Album, folder: Path) -> None:
     with served(lambda: open_sources(first, second)) as address:
         page.open(address)
         page.click("#tab-compare")
+        flashed = page.get(f"{STAT}.flashes")
         seek(page, PLAY_TICK)
+        page.until(f"{STAT}.flashes > {flashed}")
         page.until("document.querySelector('#panel-compare td')")
         album.take("ghost")
 

@@ -124,7 +124,7 @@ class LineChart {
         width: Math.max(120, this.place.clientWidth),
         height: this.height,
         scales: { x: { time: false }, y: { range: this.options.stacked ? fromZero : spread } },
-        axes: [axis(this.options.x ?? "simulated time (s)", plain), axis(this.options.unit ?? "", plain, 62)],
+        axes: [axis(this.options.x ?? "simulated time (s)", plain, 30), axis(this.options.unit ?? "", plain, 62)],
         series: [{ label: this.options.x ?? "s", value: (_, value) => this._when(value) }, ...this._lines(series)],
         legend: { markers: this._markers(series) },
         cursor: { drag: { x: true, y: false, setScale: !this.onzoom } },

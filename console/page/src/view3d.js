@@ -298,6 +298,7 @@ export class View3D {
     }
     this._follow();
     const flashes = this.radio.fade(now_ms);
+    this.stat.flashing = this.radio.flashes.length;
     if (!moved && !flashes && this.dirty <= 0) return;
     this.dirty -= 1;
     const main = this.worlds.get(0);
