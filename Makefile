@@ -16,7 +16,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats machines lint page bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats machines lint page pictures bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -32,6 +32,7 @@ help:
 	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make page    lint and type check the page of the console, and bundle it into console/www: needs npm'
+	@echo 'make pictures  the pictures of the docs, from runs in Chromium: needs chromium (ARGS: names of pictures)'
 	@echo 'make compiled  .venv-compiled: foosim with its hot path compiled, as pip installs it where a C compiler is'
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
@@ -87,6 +88,10 @@ lint: environment
 page:
 	@sh tools/page.sh check
 	@sh tools/page.sh build console/www
+
+# What is checked in is what this makes. Runs and browser leave the processor to others.
+pictures: environment
+	@nice $(PYTHON) -m bench.pictures $(ARGS)
 
 bench: compiled
 	@.venv-compiled/bin/python -m bench $(ARGS)

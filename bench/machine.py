@@ -62,10 +62,10 @@ def _cpu_model() -> str:
     return platform.machine()
 
 
-def children() -> dict[int, list[str]]:
-    """Return the command lines of this process's children by process id."""
+def children(parent: int | None = None) -> dict[int, list[str]]:
+    """Return the command lines of a process's children by process id; None is this process."""
     found: dict[int, list[str]] = {}
-    for task in (PROC / "self" / "task").iterdir():
+    for task in (PROC / ("self" if parent is None else str(parent)) / "task").iterdir():
         for pid in map(int, (task / "children").read_text().split()):
             try:
                 found[pid] = (PROC / str(pid) / "cmdline").read_bytes().decode().split("\0")

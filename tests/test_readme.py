@@ -291,5 +291,18 @@ def test_files_and_names_exist(page: Path) -> None:
 
 
 def test_every_page_is_linked_from_the_readme() -> None:
-    links = set(re.findall(r"\]\(docs/([^)]+)\)", PAGES[0].read_text()))
+    links = set(re.findall(r"\]\(docs/((?!pictures/)[^)]+)\)", PAGES[0].read_text()))
     assert links == {page.name for page in PAGES[1:]}
+
+
+def test_pictures_are_shown_with_what_one_sees_and_stay_small() -> None:
+    """Each file is shown on some page, each page shows files that are there, and all together stay below 600 kB."""
+    shown = {
+        (page.parent / target).resolve()
+        for page in PAGES
+        for text, target in re.findall(r"!\[([^]]*)\]\(([^)]+)\)", page.read_text())
+        if len(text) > 40  # characters: a name is no description
+    }
+    files = set((ROOT / "docs" / "pictures").iterdir())
+    assert shown == files
+    assert sum(file.stat().st_size for file in files) < 600_000

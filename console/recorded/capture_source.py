@@ -88,7 +88,7 @@ class FileSource:
         self._placed = -1
         """Number of the world whose scene they are in."""
         self._overlay_ns = 0
-        self._readings_ns = 0
+        self._told_ns = 0
         """Up to which time readings were told."""
         self._is_inexact = False
         """Whether frames between the captured ones cannot be computed."""
@@ -297,9 +297,10 @@ class FileSource:
 
     def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
         at_ns = tick * self.recording.tick_ns
+        goes_on = at_ns - WINDOW_NS < self._told_ns <= at_ns
         drops = [
             {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
-            for key, cause, count in history.links.drops(at_ns - WINDOW_NS, at_ns)
+            for key, cause, count in history.links.drops(self._told_ns if goes_on else at_ns - WINDOW_NS, at_ns)
         ]
         frame = history.recording.frame_up_to(tick)
         if frame is not None:
@@ -321,8 +322,8 @@ class FileSource:
         ]
         for source, destination in self._wanted.links:
             told.append({"type": "watched", **history.watched(source, destination, at_ns)})
-        after_ns = self._readings_ns if at_ns - WINDOW_NS < self._readings_ns <= at_ns else at_ns - WINDOW_NS // 10
-        self._readings_ns = at_ns
+        after_ns = self._told_ns if goes_on else at_ns - WINDOW_NS // 10
+        self._told_ns = at_ns
         for robot, channel in self._wanted.readings:
             points = reading_points(history, robot, channel, after_ns, at_ns)
             if points:

@@ -60,6 +60,8 @@ class Windows:
         self._kept: deque[tuple[float, dict[Key, Count], bool]] = deque()
         """Simulated time in s, the counts then, and whether they are those of all links; the first is the one that the
         window begins with."""
+        self.latest: dict[Key, Count] = {}
+        """What has happened on each link since it was counted before; in the window, where that was the first time."""
 
     @property
     def length_s(self) -> float:
@@ -75,9 +77,13 @@ class Windows:
         if self._kept and not 0.0 <= at_s - self._kept[-1][0] <= self._window_s:
             self._kept.clear()
         self._is_beginning = not self._kept and at_s <= self._window_s
+        before = self._kept[-1][1] if self._kept else {}
+        if len(self._kept) > 1 and self._kept[-1][0] == at_s:
+            self._kept.pop()  # a paused run is counted on, for hours
         self._kept.append((at_s, counts, are_all))
         while len(self._kept) > 2 and self._kept[1][0] <= at_s - self._window_s:
             self._kept.popleft()
+        self.latest = {key: _between(before.get(key, self._before(key)), count) for key, count in counts.items()}
         return {key: _between(self._before(key), count) for key, count in counts.items()}
 
     def _before(self, key: Key) -> Count:
@@ -147,7 +153,7 @@ class Links:
         self._look([key for key in rows if self._is_on_air(key)])
         links = [self._line(key, rows[key][7], count) for key, count in seen.items()]
         window_s = round(self._windows.length_s, 1)
-        drops = _drops(seen)
+        drops = _drops(self._windows.latest)
         at = status["ticks"]
         return {"type": "links", "at": at, "window_s": window_s, "in_all": in_all, "links": links, "drops": drops}
 
@@ -245,7 +251,7 @@ def lost_where(cause: str) -> str:
 
 
 def _drops(seen: Mapping[Key, Count]) -> list[dict[str, Any]]:
-    """Return the packets that were lost in the window, by link and cause, and where that was."""
+    """Return the packets that were lost, by link and cause, and where that was."""
     found: Counter[tuple[str, str, str]] = Counter()
     for (source, destination, _), count in seen.items():
         for cause, lost in count.causes.items():

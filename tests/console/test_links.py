@@ -96,6 +96,20 @@ def test_a_link_that_was_not_told_before_begins_with_its_first_count() -> None:
     assert found[new] == count(4, 0), "all were told: it is new"
 
 
+def test_what_happened_since_the_count_before_is_told_once_however_long_the_run_is_paused() -> None:
+    windows, other = Windows(5.0), ("b", "c", "rule")
+    windows.take(1.0, {KEY: count(10, 1, snr=1)})
+    assert windows.latest == {KEY: count(10, 1, snr=1)}, "the window's: nobody counted before"
+    once, nothing = {KEY: count(10, 2, snr=2), other: count(2, 1, snr=1)}, {KEY: count(0, 0), other: count(0, 0)}
+    told = []
+    for _ in range(3):
+        assert windows.take(2.0, {KEY: count(20, 3, snr=3), other: count(2, 1, snr=1)}) == once, "in the window"
+        told.append(windows.latest)
+    assert told == [once, nothing, nothing]
+    windows.take(3.0, {KEY: count(25, 4, snr=3, blocked=1)})
+    assert windows.latest == {KEY: count(5, 1, blocked=1)}
+
+
 def status(ticks: int, *rows: list[Any]) -> dict[str, Any]:
     return {"ticks": ticks, "tick_ns": 10_000_000, "links": list(rows), "links_in_all": len(rows)}
 
@@ -128,3 +142,4 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
         ("snr", "receiver", 3),
         ("queue_full", "sender", 1),
     }
+    assert links.message({**status(100, row), "links_in_all": 300})["drops"] == [], "told already"

@@ -9,6 +9,13 @@ export function paletteColour(index) {
   return PALETTE[index % PALETTE.length];
 }
 
+const CURVES = 8;
+
+/** The CSS variable with the colour of a curve, which follows the theme. @param {number} index */
+export function curveVariable(index) {
+  return `--curve-${index % CURVES}`;
+}
+
 /**
  * The colour of each name, by its place among all of them.
  * @param {string[]} names

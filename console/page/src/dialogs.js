@@ -63,7 +63,7 @@ export function shown(title, content) {
   const box = h(
     "dialog",
     { class: "wide", "aria-label": title },
-    h("form", { method: "dialog" }, h("h2", {}, title), ...content, h("div", { class: "actions" }, h("button", { class: "primary" }, "Close"))),
+    h("form", { method: "dialog" }, h("h2", {}, title), ...content, h("div", { class: "actions" }, h("button", { class: "primary", autofocus: true }, "Close"))),
   );
   box.addEventListener("close", () => box.remove());
   document.body.append(box);

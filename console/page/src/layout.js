@@ -60,6 +60,7 @@ export class Layout {
     this._splitter();
     this.theme(memory.get("theme", "auto"));
     byId("theme").addEventListener("click", () => this.nextTheme());
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.theme(this.name ?? "auto"));
     byId("help").addEventListener("click", () => this.help());
     document.addEventListener("keydown", (event) => this._key(event));
     store.on("show-tab", (tab) => this.show(tab));

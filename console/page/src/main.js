@@ -26,7 +26,7 @@ const HZ = 50;
 /** @type {Stat} */
 const stat = {
   frames: 0, tick: -1, generation: -1, connected: false, errors: 0, messages: 0, poses: 0, links: 0, bodies: 0, drawn: -1,
-  role: "", paused: false, marks: 0, contacts: 0, rays: 0, radio: 0, flashes: 0, view: "",
+  role: "", paused: false, marks: 0, contacts: 0, rays: 0, radio: 0, flashes: 0, flashing: 0, view: "",
 };
 window.foosim = { stat };
 window.addEventListener("error", () => (stat.errors += 1));
@@ -121,6 +121,7 @@ function drawOwners() {
 
 function drawSigns() {
   bar.signs.hidden = !options.radio || stat.view !== "3d" || !store.main?.links.length;
+  bar.scale.hidden = !store.main?.links.some(({ radio }) => radio);
 }
 
 store.on("connected", (connected) => {

@@ -1,7 +1,7 @@
 // Charts from data alone: lines and stacked bars over time, counts. They need no server and no scene: a report inlines them.
 
 import uPlot from "uplot";
-import { paletteColour } from "./colours.js";
+import { curveVariable } from "./colours.js";
 import { lonely, stack } from "./series.js";
 import { number } from "./text.js";
 import { h, keyed, setText } from "./ui.js";
@@ -43,7 +43,7 @@ const plain = (value) => String(+value.toPrecision(6));
  * @property {string} [x] what the horizontal axis shows
  * @property {number} [height] px
  * @property {boolean} [stacked] bars, each series on those before it; all have the same points
- * @property {string[]} [colours] of the series, instead of the palette's
+ * @property {string[]} [colours] of the series, instead of the theme's
  * @property {Shade[]} [shades] behind the values
  * @property {number[]} [moments] where something happened: upright lines
  */
@@ -124,8 +124,9 @@ class LineChart {
         width: Math.max(120, this.place.clientWidth),
         height: this.height,
         scales: { x: { time: false }, y: { range: this.options.stacked ? fromZero : spread } },
-        axes: [axis(this.options.x ?? "simulated time (s)", plain), axis(this.options.unit ?? "", plain, 62)],
+        axes: [axis(this.options.x ?? "simulated time (s)", plain, 30), axis(this.options.unit ?? "", plain, 62)],
         series: [{ label: this.options.x ?? "s", value: (_, value) => this._when(value) }, ...this._lines(series)],
+        legend: { markers: this._markers(series) },
         cursor: { drag: { x: true, y: false, setScale: !this.onzoom } },
         hooks: {
           setSelect: [(plot) => this._selected(plot)],
@@ -143,7 +144,7 @@ class LineChart {
     const { stacked, colours } = this.options;
     const bars = stacked ? uPlot.paths.bars?.({ size: [0.9, 60] }) : undefined;
     const lines = series.map(({ name, unit, points, step }, index) => {
-      const colour = colours?.[index] ?? paletteColour(index);
+      const colour = colours?.[index] ?? variable(curveVariable(index));
       return {
         label: name,
         stroke: colour,
@@ -159,6 +160,18 @@ class LineChart {
       };
     });
     return stacked ? lines.reverse() : lines;
+  }
+
+  /**
+   * The colours of names, which are made once: the browser keeps them the theme's.
+   * @param {Series[]} series @returns {uPlot.Legend.Markers}
+   */
+  _markers(series) {
+    const { stacked, colours } = this.options;
+    const named = series.map((_, index) => colours?.[index] ?? `var(${curveVariable(index)})`);
+    if (stacked) named.reverse();
+    const colour = (/** @type {uPlot} */ _, /** @type {number} */ line) => named[line - 1] ?? "";
+    return stacked ? { stroke: colour, fill: colour } : { stroke: colour };
   }
 
   /** The place of the cursor, and what held there. @param {number | null} x */

@@ -146,6 +146,7 @@ interface Stat {
   rays: number;
   radio: number;
   flashes: number;
+  flashing: number;
   view: string;
 }
 

@@ -112,7 +112,6 @@ export class View3D {
       if (moved <= CLICK_PX && event.button === 0) store.select(this.pick(event.clientX, event.clientY));
     });
     this.canvas.addEventListener("keydown", (event) => this._key(event));
-    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.retheme());
   }
 
   /** @param {KeyboardEvent} event */
@@ -299,6 +298,7 @@ export class View3D {
     }
     this._follow();
     const flashes = this.radio.fade(now_ms);
+    this.stat.flashing = this.radio.flashes.length;
     if (!moved && !flashes && this.dirty <= 0) return;
     this.dirty -= 1;
     const main = this.worlds.get(0);

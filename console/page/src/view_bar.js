@@ -37,8 +37,8 @@ export class ViewBar {
     } });
     bar.append(this.two);
     this.owners = h("div", { class: "legend owners", id: "owners" });
-    const scale = h("span", {}, "loss 0 %");
-    this.signs = h("div", { class: "legend signs", hidden: true }, scale, h("i", { style: `background:${lossGradient()}` }), "100 %", h("span", {}, "▮ wall in the way"), h("span", {}, "✕ packet dropped"));
+    this.scale = h("span", { class: "legend" }, "loss 0 %", h("i", { style: `background:${lossGradient()}` }), "100 %", h("i", { class: "wall" }), "wall in the way");
+    this.signs = h("div", { class: "legend signs", hidden: true }, this.scale, h("span", {}, "✕ packet dropped"));
     byId("view").append(this.owners, this.signs);
   }
 

@@ -1,9 +1,10 @@
 // The parts of the page that need no browser: `node --test test`.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import test from "node:test";
 import { choiceOf, choicesOf } from "../src/choices.js";
-import { lossColour } from "../src/colours.js";
+import { curveVariable, lossColour } from "../src/colours.js";
 import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
 import { scaleLength } from "../src/map.js";
@@ -210,4 +211,25 @@ test("a mesh is seen from above by its convex outline, turned as it stands", () 
   });
   const { points } = fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], { m: meshOf(ball) });
   assert.ok(points.length > 10 && points.length < 400 && points.every((point) => Math.hypot(...point) > 0.95));
+});
+
+/** The relative luminance of WCAG 2. @param {string} colour */
+function luminance(colour) {
+  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255).map((share) => (share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+}
+
+test("every curve stands out from the ground of its theme", () => {
+  const rules = readFileSync(new URL("../src/theme.css", import.meta.url), "utf8").split("{").filter((rule) => rule.includes("--ground"));
+  assert.equal(rules.length, 3, "light, dark as the system is, dark as it was chosen");
+  const themes = rules.map((rule) => new Map([...rule.matchAll(/(--[\w-]+): (#[0-9a-f]{6});/g)].map(([, name, colour]) => [name, colour])));
+  assert.deepEqual(themes[1], themes[2]);
+  for (const theme of themes) {
+    const colours = [...Array(8).keys()].map((index) => theme.get(curveVariable(index)) ?? "none");
+    assert.equal(new Set(colours).size, 8);
+    for (const colour of colours) {
+      const [low, high] = [luminance(colour), luminance(theme.get("--ground") ?? "")].sort((a, b) => a - b);
+      assert.ok((high + 0.05) / (low + 0.05) > (theme === themes[0] ? 2 : 4), colour);
+    }
+  }
 });
