@@ -23,11 +23,11 @@ from typing import Any, Final
 
 from bench.machine import children
 from bench.runs import ROOT, TABLE, name_of
-from foosim.protocol.errors import Refused
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.view_command import open_sources
-from foosim.supervisor import control
-from foosim.supervisor.run_folder import find_run
+from foosim.cli.replay_view import open_sources
+from foosim.client import control
+from foosim.common.errors import Refused
+from foosim.rehearsal.run import rehearse
+from foosim.runtime.run_folder import find_run
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.served import served
 
