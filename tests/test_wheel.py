@@ -133,7 +133,7 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", RUNS)
 def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: Path, name: str) -> None:
     """Equal frames, fates and rows, to the last bit."""
-    assert list(installed.packages.glob("foosim/vhub/rays.*.so"))
+    assert list(installed.packages.glob("foosim/vhub/line_of_sight/rays.*.so"))
     file, *options = RUNS[name]
     for commands in (installed.commands, INTERPRETED):
         capture = tmp_path / f"{commands.parent.name}.mcap"
@@ -164,7 +164,7 @@ def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> N
     assert "foosim gets no compiled modules" in run(*build, cwd=source, CC="/nowhere/cc", FOOSIM_COMPILE="auto")
     (wheel,) = tmp_path.glob("*.whl")
     names = run(sys.executable, "-m", "zipfile", "--list", wheel, cwd=tmp_path)
-    assert "foosim/protocol/draws.py" in names and ".so" not in names
+    assert "foosim/common/keyed_random.py" in names and ".so" not in names
     for choice, says in {"always": "/nowhere/cc", "perhaps": "it can be auto, always, quick, never"}.items():
         environment = {**os.environ, "CC": "/nowhere/cc", "FOOSIM_COMPILE": choice}
         done = subprocess.run(build, cwd=source, capture_output=True, text=True, check=False, env=environment)
