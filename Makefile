@@ -29,7 +29,7 @@ help:
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
-	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
+	@echo 'make machines  further cuts between machines: needs root, see docs/how-to/testing.md'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make page    lint and type check the page of the console, and bundle it into console/www: needs npm'
 	@echo 'make pictures  the pictures of the docs, from runs in Chromium: needs chromium (ARGS: names of pictures)'
@@ -66,7 +66,7 @@ fuzz: environment
 stats: environment
 	@seed=$(if $(filter file,$(origin SEED)),$$(od -An -N3 -tu4 /dev/urandom | tr -d ' '),$(SEED)); \
 	echo "make stats SEED=$$seed repeats this"; \
-	$(PYTEST) -o timeout=0 tests/links --links-full --links-seed $$seed --links-table docs/network-validation.md $(ARGS)
+	$(PYTEST) -o timeout=0 tests/links --links-full --links-seed $$seed --links-table docs/reference/network-validation.md $(ARGS)
 
 swarm-gate: environment
 	@$(PYTHON) -m tests.gate.search $(ARGS)

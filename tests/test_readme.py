@@ -1,7 +1,7 @@
 """The README and the docs are true: their code runs, their commands parse, their files, names and options exist.
 
 What stands in the tutorials is extracted and run as a reader would run it, through the rehearsal on the pure engine.
-The generated parts of the docs are those that docs/reference.py writes today.
+The generated parts of the docs are those that docs/generate.py writes today.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ from foosim.rehearsal.system import System
 from foosim.world.payloads import Command, decode_payload
 
 ROOT: Final = Path(__file__).parents[1]
-PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FRONT: Final = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+PAGES: Final = [*FRONT, *sorted((ROOT / "docs").rglob("*.md"))]
+FIRST_PLAYER: Final = ROOT / "docs" / "tutorials" / "first_player.md"
 PACKAGES: Final = (
     "analysis",
     "capture",
@@ -58,8 +60,8 @@ pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 
 @cache
 def reference() -> ModuleType:
-    """docs/reference.py as a module."""
-    spec = importlib.util.spec_from_file_location("reference", ROOT / "docs" / "reference.py")
+    """docs/generate.py as a module."""
+    spec = importlib.util.spec_from_file_location("reference", ROOT / "docs" / "generate.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -114,9 +116,9 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A reader's folder: deploy/table.yaml, the README's player, and the capture of its first game."""
     folder = tmp_path_factory.mktemp("house")
     (folder / "deploy").symlink_to(ROOT / "deploy")
-    player, _ = blocks(ROOT / "README.md", "python")
+    (player,) = blocks(FIRST_PLAYER, "python")
     (folder / "follower.py").write_text(player)
-    (words,) = typed_lines(ROOT / "README.md")
+    (words,) = typed_lines(FIRST_PLAYER)
     command, arguments = command_of(words)
     asked = command.make_context("readme", arguments).params
     assert asked["engine"] == "pure"
@@ -143,7 +145,9 @@ def test_the_readmes_player_plays(house: Path) -> None:
     assert len(capture.frame_blocks) == 3, "something was added, and removed again"
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/capture.md", "docs/writing_a_player.md"])
+@pytest.mark.parametrize(
+    "name", ["docs/tutorials/first_capture.md", "docs/reference/capture.md", "docs/tutorials/writing_a_player.md"]
+)
 def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """Each page's last block of Python; it prints what it found."""
     program = blocks(ROOT / name, "python")[-1]
@@ -155,7 +159,7 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
 def test_a_players_declaration_is_valid() -> None:
     table = (ROOT / "deploy" / "table.yaml").read_text()
     classes = []
-    for text in blocks(ROOT / "docs" / "writing_a_player.md", "yaml"):
+    for text in blocks(ROOT / "docs" / "tutorials" / "writing_a_player.md", "yaml"):
         tree, _ = read_tree(text, locate_in("page"))  # not PyYAML's own: there the key `on` would be true
         assert tree is not None
         content: Any = plain(tree)
@@ -171,7 +175,7 @@ def test_a_players_declaration_is_valid() -> None:
 @pages
 def test_generated_parts_are_current(page: Path) -> None:
     text = page.read_text()
-    assert reference().regenerated(text) == text, "write it anew: python docs/reference.py"
+    assert reference().regenerated(text) == text, "write it anew: python docs/generate.py"
 
 
 NO_DEADLINES = {
@@ -284,15 +288,30 @@ def test_files_and_names_exist(page: Path) -> None:
                 missing.append(span)
         elif re.fullmatch(r"[A-Z][A-Za-z]+\._?[a-z]\w*", span) and span not in all_names():
             missing.append(span)
-    for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
-        if not (page.parent / link).is_file():
-            missing.append(link)
     assert not missing
 
 
-def test_every_page_is_linked_from_the_readme() -> None:
-    links = set(re.findall(r"\]\(docs/((?!pictures/)[^)]+)\)", PAGES[0].read_text()))
-    assert links == {page.name for page in PAGES[1:]}
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them of their text."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+@pages
+def test_links_lead_to_pages_and_headings(page: Path) -> None:
+    missing = []
+    for target, anchor in re.findall(r"\]\(([^)#:\s]*)(?:#([^)]*))?\)", page.read_text()):
+        to = page.parent / target if target else page
+        if not to.is_file() or (anchor and anchor not in anchors(to)):
+            missing.append(f"{target}#{anchor}")
+    assert not missing
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = ROOT / "docs" / "README.md"
+    links = {(index.parent / target).resolve() for target in re.findall(r"\]\(([^)#:]+)\)", index.read_text())}
+    assert links == {page for page in PAGES if page not in FRONT and page != index}
 
 
 def test_pictures_are_shown_with_what_one_sees_and_stay_small() -> None:

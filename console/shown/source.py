@@ -1,9 +1,9 @@
 """What a page looks at: a running system, a capture, a replay, recorded poses; all behind one interface.
 
 A `Source` runs inside the console's event loop and tells a `Feed` of its world: which scene it has, what there is to
-see at a moment, and messages in the form that pages read (docs/console.md lists them). It knows no browser; what all
-browsers together look at it is told by `want`. Whatever takes longer than a millisecond or waits goes into a thread of
-its own.
+see at a moment, and messages in the form that pages read (docs/reference/console.md lists them). It knows no browser;
+what all browsers together look at it is told by `want`. Whatever takes longer than a millisecond or waits goes into a
+thread of its own.
 """
 
 from __future__ import annotations

@@ -150,8 +150,8 @@ def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
 
 
 def test_the_example_of_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What docs/network.md shows, in a package as it says."""
-    guide = (TABLE.parents[1] / "docs" / "network.md").read_text()
+    """What docs/explanation/network.md shows, in a package as it says."""
+    guide = (TABLE.parents[1] / "docs" / "explanation" / "network.md").read_text()
     (code,) = [block for block in guide.split("```python\n")[1:] if "Judged" in block]
     folder = install(tmp_path / "site")
     (folder / "foggy.py").write_text(code.partition("```")[0])

@@ -23,7 +23,7 @@ from foosim.world.robots.overhead_camera import CameraRobot
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
-REGENERATE = "python docs/reference.py"
+REGENERATE = "python docs/generate.py"
 
 
 @pytest.fixture(scope="module")

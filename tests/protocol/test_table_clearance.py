@@ -26,7 +26,7 @@ WRONG: Final = {
 RIGHT: Final = (
     "shape: cylinder, radius: 2 mm, length: 1 cm, z: 40 mm",  # on the ball, between the figures
     f"{CUBE}, x: 522 mm, z: 206.5 mm",
-    # Midway between two lines, on the floor, as docs/deployment.md has it.
+    # Midway between two lines, on the floor, as docs/reference/deployment.md has it.
     "shape: box, length: 3 cm, width: 3 cm, height: 3 cm, x: 15 cm, z: 15 mm, surface: walls, radio: wood",
     "shape: cylinder, radius: 1 cm, length: 4 cm, x: -15 cm, z: 2 cm, surface: walls, radio: metal",
     f"{CUBE}, x: 660 mm, z: 84 mm",

@@ -320,7 +320,7 @@ def test_with_certificates_operators_listen_and_nobody_else(tmp_path: Path, monk
 
 
 def test_the_program_in_the_docs_listens(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page = (TABLE.parents[1] / "docs" / "capture.md").read_text()
+    page = (TABLE.parents[1] / "docs" / "reference" / "capture.md").read_text()
     (program,) = re.findall(r"^```py\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     assert "tcp/127.0.0.1:7470" in program
     with playing(run, pace=FAST, paused=True) as play:

@@ -1,7 +1,7 @@
 """The rod's position actuator: a proportional loop from wanted position and angle to motor speeds, limited.
 
 Wanted speed = gain x error, at most the drive's speed; the motor reaches it with at most the drive's force. The loop is
-the one of the original table (`docs/table.md`); its gains and limits are in the deployment.
+the one of the original table (`docs/reference/table.md`); its gains and limits are in the deployment.
 """
 
 from __future__ import annotations

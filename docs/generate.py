@@ -1,4 +1,4 @@
-"""Writes the generated parts of the docs, and the schema of deployments: `python docs/reference.py`.
+"""Writes the generated parts of the docs, and the schema of deployments: `python docs/generate.py`.
 
 A generated part stands between the comments `<!-- generated: NAME -->` and `<!-- end -->` of a page in this folder. It
 says what the code says: the deployment's schema, the commands' options, the table of channels, the rows of a capture.
@@ -328,6 +328,6 @@ def regenerated(page: str) -> str:
 
 
 if __name__ == "__main__":
-    for path in sorted(DOCS.glob("*.md")):
+    for path in sorted(DOCS.rglob("*.md")):
         path.write_text(regenerated(path.read_text()))
     (DOCS.parent / "deploy" / "deployment.schema.json").write_text(deployment_schema_text())
