@@ -6,7 +6,8 @@ frame's tick and the chain up to it, so that equal inputs give equal digests.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shlex
+from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 import msgspec
@@ -42,6 +43,14 @@ class Origin(Item, frozen=True):
     source: Text
     digest: Digest
     chain: Digest
+
+
+def new_run_text(arguments: Sequence[str], capture: str) -> str:
+    """Return in words how a run begins with the last frame of a capture; `arguments` are those of the run before."""
+    if not capture:
+        return "The run has no capture to begin a new one with"
+    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@last"]
+    return f"A new run begins with the last captured frame: {shlex.join(command)}"
 
 
 def place_ball(

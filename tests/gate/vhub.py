@@ -1,4 +1,4 @@
-"""Bugs of the vHub: closing of ticks, account, deliveries, clients, fold."""
+"""Bugs of the vHub and of its clients: closing of ticks, account, deliveries, clients, fold."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
+from foosim.client.core import ClientCore
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
@@ -199,6 +200,14 @@ def _unsaid(planting: Planting) -> None:
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)
 def _kept_commits(planting: Planting) -> None:
     planting.swap(Commits, "forget", lambda self, tick: None)
+
+
+@register("client takes any welcome", "a welcome answers one hello", 221)
+def _any_welcome(planting: Planting) -> None:
+    def on_welcome(self: Any, welcome: Any) -> None:
+        before(self, replace(welcome, returns=self._gone))
+
+    before: Any = planting.swap(ClientCore, "_on_welcome", on_welcome)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)
