@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Sequence
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 import numpy as np
@@ -45,12 +45,15 @@ class Origin(Item, frozen=True):
     chain: Digest
 
 
+NEW_RUN: Final = "A new run begins with the last captured frame"
+
+
 def new_run_text(arguments: Sequence[str], capture: str) -> str:
     """Return in words how a run begins with the last frame of a capture; `arguments` are those of the run before."""
     if not capture:
         return "The run has no capture to begin a new one with"
     command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@last"]
-    return f"A new run begins with the last captured frame: {shlex.join(command)}"
+    return f"{NEW_RUN}: {shlex.join(command)}"
 
 
 def place_ball(

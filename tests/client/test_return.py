@@ -254,7 +254,7 @@ def test_the_end_of_a_run_is_heard_whatever_its_number() -> None:
     air.carry(ear)
     arrived, tick = len(ear.arrivals), ear.tick
     ear.receive(channels.DOWN, "ear", encode(Down(1, 3, 0, [], False)), air.now_ns)
-    assert not ear.ended and ear.statistics().repeated == 1
+    assert (ear.ended, ear.statistics().repeated) == (False, 1)
     ear.receive(channels.DOWN, "ear", encode(Down(1, 3, 0, [], True)), air.now_ns)
     assert ear.ended and (len(ear.arrivals), ear.tick) == (arrived, tick)
 
