@@ -513,6 +513,8 @@ class SupervisorCore:
         if standing.boot != state.granted_boot and lacks_inputs(state, standing):
             if state.end is not None:
                 return False
+            if state.is_vhub_away:
+                self.vhub_loss.note()
             self.fail(*why_it_ends(state, standing))
         else:
             state.grant(standing)
