@@ -318,16 +318,18 @@ def _hub(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
 
 
-def _hub_again(dice: Dice, names: Sequence[str]) -> Fault:
-    """The vHub is killed, and the one that is started in its place as well, perhaps before it may go on."""
-    lives_ns, back_ms = dice.between(20, 300) * MS // 10, dice.one_of((1, 40, 400, 2_000))
+def _both(dice: Dice, names: Sequence[str]) -> Fault:
+    """Supervisor and vHub end at once; both go on from their journals, whichever of them is back first."""
+    hub_ms, down_ms = dice.between(20, 300), dice.one_of((1, 40, 400, 2_000))
 
     def do(system: System) -> None:
-        system.kill_hub("now", back_ms * MS)
-        system.later(back_ms * MS + lives_ns, partial(system.kill_hub, "now", back_ms * MS))
+        system.kill_hub("now", hub_ms * MS)
+        if channels.SUPERVISOR in system.processes and not system.is_dying(channels.SUPERVISOR):
+            system.end_amid(channels.SUPERVISOR, 0)
+            system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
 
-    what = f"the vHub ends for {back_ms} ms, and once more {lives_ns / MS:g} ms later"
-    return Fault(_tick(dice), "again", what, do)
+    what = f"the vHub ends for {hub_ms} ms, and the supervisor for {down_ms} ms"
+    return Fault(_tick(dice), "both", what, do)
 
 
 def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
@@ -378,7 +380,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "clock": _clock,
     "late": _echo_of_old,
     "tempo": _tempo,
-    "again": _hub_again,
+    "both": _both,
 }
 KINDS: Final = list(FAULT_OF)
 LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
