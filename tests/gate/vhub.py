@@ -6,7 +6,6 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from foosim.client.core import ClientCore
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
@@ -192,22 +191,9 @@ def _unwritten_leave(planting: Planting) -> None:
     before: Any = planting.swap(Clients, "leave_owing", leave_owing)
 
 
-@register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
-def _unsaid(planting: Planting) -> None:
-    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
-
-
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)
 def _kept_commits(planting: Planting) -> None:
     planting.swap(Commits, "forget", lambda self, tick: None)
-
-
-@register("client takes any welcome", "a welcome answers one hello", 221)
-def _any_welcome(planting: Planting) -> None:
-    def on_welcome(self: Any, welcome: Any) -> None:
-        before(self, replace(welcome, returns=self._gone))
-
-    before: Any = planting.swap(ClientCore, "_on_welcome", on_welcome)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)
