@@ -1,4 +1,4 @@
-"""A frame of a capture as the start of another run: `CAPTURE@12.5s`, read with what has to fit.
+"""A frame of a capture as the start of another run: `CAPTURE@12.5s` or `CAPTURE@last`, read with what has to fit.
 
 A branch begins with the newest captured frame at or before the time, keeps its tick, and goes on from the chain over
 all frames up to it: with the inputs of the captured run it has the digests of the captured run.
@@ -6,21 +6,24 @@ all frames up to it: with the inputs of the captured run it has the digests of t
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.reader import FRAME_MARKS, Scan, chain_at_start, deployment_of, layout_of
+from foosim.capture.reader import Scan, chain_at_start, deployment_of, layout_of
 from foosim.capture.rows import FRAME, LAYOUT, TICK, FrameRow, LayoutRow, TickRow
 from foosim.common.errors import BadValue, Malformed, Refused
 from foosim.common.units import format_ns, parse_ns
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, Start, start_with
+from foosim.world.initial_state import AddedEntity, Start, new_run_text, start_with
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Outbox
+
+LAST: Final = "last"
+"""What stands for the time of the last captured frame."""
 
 
 class BadBranch(Refused):
@@ -38,10 +41,12 @@ class Branch:
 
 
 def parse_branch(text: str) -> tuple[Path, int | None]:
-    """Return the file and the time in ns of `CAPTURE@12.5s`; without a time it is None: the last frame."""
+    """Return the file and the time in ns of `CAPTURE@12.5s`; without a time, or with `@last`, None: the last frame."""
     path, at, time = text.rpartition("@")
     if not at or not path or "/" in time:
         return Path(text), None
+    if time == LAST:
+        return Path(path), None
     try:
         return Path(path), parse_ns(time)
     except BadValue as error:
@@ -126,22 +131,13 @@ def _find(path: Path, at_ns: int | None) -> _Found:
 
 def branch_command(arguments: Sequence[str], capture: Path | None) -> str:
     """Return in words how a new run begins with the last captured frame; `arguments` are those of the run before."""
-    if capture is None:
-        return "The run has no capture to begin a new one with"
     try:
-        last_ns = _last_frame_ns(capture)
+        has_frame = capture is None or any(True for _ in Scan(capture).messages(frozenset({FRAME})))
     except Refused as error:
         return f"No new run can begin with its capture: {error}"
-    if last_ns is None:
+    if not has_frame:
         return f"No new run can begin with its capture: {capture} has no frame"
-    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@{format_ns(last_ns).replace(' ', '')}"]
-    return f"A new run begins with the last captured frame: {shlex.join(command)}"
-
-
-def _last_frame_ns(path: Path) -> int | None:
-    scan = Scan(path)
-    tick = max((scan.decode(FRAME_MARKS, message).tick for message in scan.messages(frozenset({FRAME}))), default=None)
-    return None if tick is None else int(tick) * deployment_of(scan.about).tick_ns
+    return new_run_text(arguments, "" if capture is None else str(capture))
 
 
 def _seconds(at_ns: int | None) -> str | None:

@@ -100,9 +100,9 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     another host is started there through ssh. Nodes that it declares as `launch: manual` are waited for; their command
     line is printed.
 
-    With --from the world begins with the newest captured frame at or before that time (without a time: the last one),
-    and time goes on from there; --for counts from there, too. The deployment may differ from the captured one in
-    everything but its robots, their sensors, and the tick.
+    With --from the world begins with the newest captured frame at or before that time (with @last, or without a time,
+    with the last one), and time goes on from there; --for counts from there, too. The deployment may differ from the
+    captured one in everything but its robots, their sensors, and the tick.
 
     --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
     """

@@ -225,7 +225,6 @@ class Client:
         self._link = link
         self._subscriptions: set[tuple[str, str]] = set()
         self._newest = Newest({})
-        self._branch = link.core.branch
         self._period: int | None = None
         self._turns: Turns = (0, 0, ())
         """As it has joined."""
@@ -418,9 +417,6 @@ class Client:
 
     def _take(self, received: Iterable[Received]) -> None:
         received = list(received)
-        if self._core.branch != self._branch:
-            self._branch = self._core.branch
-            self._newest.set_back(self._core.branch_ns)
         self._newest.take(received)
         self.packets = [self._packet(packet) for packet in received]
 

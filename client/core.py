@@ -4,8 +4,7 @@ Hello until it is answered, Join until something new is heard, and again wheneve
 lockstep `go` is the Go that waits for an answer, and `done` answers it: stop and wait, so that a Go that comes again
 gets the same bytes again. A free-running client takes `arrivals` and sends when it likes; what it sent is kept until
 the vHub has recorded it. Downlinks are numbered: repeats are dropped, gaps counted. When the vHub is gone (`hub_gone`)
-all starts again with hello, and goes on where it was; or where the run does, if that has lost its last ticks and goes
-on as a branch from before them.
+all starts again with hello, and goes on where it was.
 """
 
 from __future__ import annotations
@@ -69,8 +68,6 @@ class ClientStatistics:
     """Packets that were not sent, since too many wait to be recorded."""
     returns: int = 0
     """How often it went on after the vHub was gone."""
-    lost: int = 0
-    """Packets that the vHub had recorded in ticks that a branch has left behind."""
 
 
 class ClientCore:
@@ -89,11 +86,7 @@ class ClientCore:
         self.arrivals: deque[Received] = deque()
         """What has reached a free-running client and was not taken yet, in order."""
         self.tick = -1
-        """The newest tick that the vHub has named; less than before when a branch begins."""
-        self.branch = 0
-        """The branch in which it takes part: when that is another one, nothing holds that is newer than `branch_ns`."""
-        self.branch_ns = 0
-        """The time of the tick behind which that began, where it was in an earlier one."""
+        """The newest tick that the vHub has named."""
         self.ended = False
         self.is_away = False
         """Whether the vHub is gone, and has not let the client in again."""
@@ -118,7 +111,7 @@ class ClientCore:
         self._done = b""
         self._done_number = -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
-        self._received = self._sent = self._answered = self._unsent = self._returns = self._lost = 0
+        self._received = self._sent = self._answered = self._unsent = self._returns = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
@@ -201,7 +194,7 @@ class ClientCore:
     def statistics(self) -> ClientStatistics:
         downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed
         packets = self._received, self._sent, self._answered, self._unsent
-        return ClientStatistics(*downlinks, *packets, self._returns, self._lost)
+        return ClientStatistics(*downlinks, *packets, self._returns)
 
     # --- what the client does --------------------------------------------------------------------------------------
 
@@ -239,7 +232,7 @@ class ClientCore:
         assert self.go is not None and self.deployment is not None, "nothing to answer"
         # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
         sent = self._numbered(packets, self.go.tick * self.deployment.tick_ns)
-        payload = encode(Done(self.name, self.boot, self.go.tick, sent, self.branch))
+        payload = encode(Done(self.name, self.boot, self.go.tick, sent))
         if len(payload) > channels.UP.bytes_max:
             raise PacketError(f"{len(payload)} bytes in one answer, at most {channels.UP.bytes_max} are allowed")
         self._count_sent(sent)
@@ -270,7 +263,7 @@ class ClientCore:
             self._resend_ns = NEVER_NS
             return
         for part in split(sent, channels.UP.bytes_max):
-            self._publish(encode(Up(self.name, self.boot, part, self.branch)))
+            self._publish(encode(Up(self.name, self.boot, part)))
 
     def fail(self, reason: str, trace: str = "") -> None:
         """Say that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
@@ -299,7 +292,6 @@ class ClientCore:
         self.deployment = deployment
         self._sequence = self.first_sequence = welcome.sequence
         self._downlink = welcome.downlink
-        self.branch = welcome.branch
 
     def _return(self, welcome: ClientWelcome, before: ClientWelcome) -> None:
         """Go on with a vHub that is back: join as before, and send what it has not recorded."""
@@ -314,37 +306,8 @@ class ClientCore:
             self._say_join()
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
-        if welcome.branch != self.branch:
-            self._set_back(welcome)
         self._resend(whole=True)
         self.actions.append(Say("info", "the vHub is back"))
-
-    def _set_back(self, welcome: ClientWelcome) -> None:
-        """Go on in a branch, from its tick: forget what came later, and number again what is not recorded."""
-        assert self.deployment is not None
-        kept = self._unrecorded
-        last = kept[0].sequence - 1 if kept else self._sequence
-        lost, ticks = max(0, last - welcome.sequence), max(0, self.tick - welcome.branch_tick)
-        self._lost += lost
-        self._unrecorded = deque(
-            structs.replace(sent, sequence=number) for number, sent in enumerate(kept, welcome.sequence + 1)
-        )
-        self._sequence = welcome.sequence + len(kept)
-        self._downlink = welcome.downlink
-        self._missing -= len(self._gaps)
-        self._gaps.clear()
-        self.branch, self.tick = welcome.branch, welcome.branch_tick
-        self.branch_ns = self.tick * self.deployment.tick_ns
-        self.go, self._done, self._done_number = None, b"", -1
-        self.arrivals = deque(packet for packet in self.arrivals if self._has_arrived(packet))
-        what = f"{ticks} ticks of this client's and {lost} packets that were recorded in them are lost"
-        self.actions.append(Say("warning", f"the run goes on as a branch from tick {self.tick}: {what}"))
-
-    def _has_arrived(self, packet: Received) -> bool:
-        """Whether a packet arrives up to the present tick; what a client sends does at the next tick, not before."""
-        assert self.deployment is not None
-        is_sent = packet.source in self.deployment.robots or packet.sent_ns < self.branch_ns
-        return is_sent and packet.due_ns <= self.branch_ns
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:
         is_in = self.welcome is not None and not self.is_away
@@ -363,14 +326,8 @@ class ClientCore:
         return message.boot == self.boot
 
     def _on_heard(self, heard: Heard) -> None:
-        if self._is_present(heard):
-            self._hears()
-            self._recorded(heard.acknowledged)
-
-    def _is_present(self, message: Go | Down | Heard) -> bool:
-        """Whether a message is of the present branch."""
-        self._repeated += message.branch != self.branch
-        return message.branch == self.branch
+        self._hears()
+        self._recorded(heard.acknowledged)
 
     def _hears(self) -> None:
         """Something new has come, so the Join is known. A repeat is no sign of that: it may be of a vHub before."""
@@ -379,8 +336,6 @@ class ClientCore:
             self._again_ns = self._now_ns + self._again_after_ns
 
     def _on_go(self, go: Go) -> None:
-        if not self._is_present(go):
-            return
         if go.number == self._done_number:
             self._repeated += 1
             self._publish(self._done)
@@ -399,9 +354,10 @@ class ClientCore:
         self._received += len(go.packets)
 
     def _on_down(self, down: Down) -> None:
-        if not self._is_present(down):
-            return
         self._recorded(down.acknowledged)
+        if down.ended:  # also of a vHub that has lost the numbers of its last downlinks
+            self.ended = True
+            self.go = None
         if not self._is_new(down):
             return
         self._take_number(down.number)
@@ -410,9 +366,6 @@ class ClientCore:
         room = limits.INBOX_MESSAGES_MAX - len(self.arrivals)
         self.arrivals.extend(down.packets[: max(0, room)])
         self._overflowed += max(0, len(down.packets) - room)
-        if down.ended:
-            self.ended = True
-            self.go = None
 
     def _is_new(self, downlink: Go | Down) -> bool:
         """Whether a downlink has not come before; one that nobody asked for is refused."""
@@ -465,7 +418,7 @@ class ClientCore:
     def _resend(self, whole: bool) -> None:
         """Send again what is not recorded: all of it, or the first message's worth."""
         for part in split(self._unrecorded, channels.UP.bytes_max):
-            self._publish(encode(Up(self.name, self.boot, part, self.branch)))
+            self._publish(encode(Up(self.name, self.boot, part)))
             if not whole:
                 break
         self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX if self._unrecorded else NEVER_NS
@@ -473,7 +426,7 @@ class ClientCore:
     def _say_hello(self) -> None:
         received = min(self._gaps, default=self._downlink + 1) - 1
         who = self.name, self.boot, limits.PROTOCOL_VERSION, self._world
-        hello = ClientHello(*who, received, self._gone, self.branch)
+        hello = ClientHello(*who, received, self._gone)
         self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
 
     def _say_join(self) -> None:

@@ -95,16 +95,9 @@ class Newest:
                 continue
             self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
 
-    def set_back(self, at_ns: int) -> None:
-        """Forget the samples that were sent after a time, in simulated ns."""
-        self.samples = {pair: sample for pair, sample in self.samples.items() if sample.sent_ns <= at_ns}
-
 
 class PlayerLoop:
-    """Runs the player that the deployment declares under the core's name. `step` after every message and wake.
-
-    Where the run goes on as a branch the player is made anew: what it remembers is of ticks that are void.
-    """
+    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
 
     def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
         self.core = core
@@ -112,7 +105,6 @@ class PlayerLoop:
         self._load = load
         self._declaration: Declaration | None = None
         self._player: Player | None = None
-        self._branch = 0
         self._beat_ns = NEVER_NS
         self._period_ns = 0
 
@@ -126,10 +118,6 @@ class PlayerLoop:
             return
         if self._player is None:
             self._begin(core.deployment, now_ns)
-        elif core.branch != self._branch:
-            self._player = self._make(core.deployment)
-            self.newest.set_back(core.branch_ns)
-        self._branch = core.branch
         if core.go is not None:
             self.newest.take(core.go.packets)
             self._say(core.go.tick, now_ns)

@@ -84,8 +84,6 @@ EVENT_BYTES_MAX: Final = 4_096
 """What one request may say that shall happen to the network."""
 MODEL_MEMORY_BYTES_MAX: Final = 4_096
 """What a link model of one's own may remember of a link."""
-EDITED_TICKS_KEPT: Final = 256
-"""Ticks whose edits the supervisor knows after they are committed: a branch orders them again."""
 CHECKPOINT_TICKS: Final = 500
 """How often the vHub's state goes to its journal: a fold begins at the last one."""
 LAG_ANCHOR_NS: Final = 100_000_000

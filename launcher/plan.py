@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from foosim.capture.start_frame import Branch, read_branch
@@ -52,7 +52,8 @@ class Plan:
     def settings(self, run: str) -> RunSettings:
         """Return what the supervisor of the run with this name is started with."""
         name, balance = str(self.options.file), self.options.balance
-        return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, self.files)
+        again = replace(self.options, branch=None).arguments()
+        return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, again, self.files)
 
 
 def check_certificates(plan: Plan) -> list[str]:

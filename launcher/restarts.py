@@ -20,7 +20,7 @@ NO_MEMORY: Final = (
     *("std::bad_alloc", "memory allocation of", "Memory allocation still failed"),
 )
 """What Python, the system and its loader, C++, Rust and OpenBLAS say when they get no memory."""
-WORDS_MAX: Final = 300
+WORDS_MAX: Final = 4_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ class RunOptions:
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")] = None
     branch: Annotated[
         str | None,
-        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame: run.mcap@12.5s or @last."),
     ] = None
     sets: Annotated[
         tuple[str, ...],

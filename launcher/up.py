@@ -37,6 +37,7 @@ from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
+from foosim.world.initial_state import NEW_RUN
 
 POLL_S: Final = 0.02
 """How often a run that starts is looked at."""
@@ -461,7 +462,7 @@ class Up:
             reason = self._lost.how.last_words
         if ended is None:
             result = self.unended(reason)
-            may_resume = self._is_resumed or self._has_begun
+            may_resume = (self._is_resumed or self._has_begun) and NEW_RUN not in reason
             then = f"; foosim-supervisor up --resume {self.folder.name} goes on with it" if may_resume else ""
             line = f"the run did not end in order{then}"
         else:

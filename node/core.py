@@ -419,8 +419,7 @@ class NodeCore:
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
         self.member.entered()
-        if self._inputs.begin(epoch):
-            self._history = {tick: frame for tick, frame in self._history.items() if tick <= epoch.branch_tick}
+        self._inputs.begin(epoch)
         self._parts.clear()
         self._sent_parts.clear()
         self.work = None
@@ -451,7 +450,7 @@ class NodeCore:
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         """The frame that the epoch starts from, when mine is not there or not the same; or one to sample."""
-        if commit.tick in self._unsampled and not self._inputs.is_void(commit):
+        if commit.tick in self._unsampled:
             self._take_old_frame(commit)
             return
         epoch = self._awaited_epoch

@@ -1,6 +1,6 @@
 """What a node has been told for its ticks: orders and deliveries, each by tick.
 
-Both may be about several ticks at once. Deliveries are final within a branch: those of another one do not count.
+Both may be about several ticks at once. Deliveries are final.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Commit, Deliveries, Epoch, Order
+from foosim.protocol.messages import Deliveries, Epoch, Order
 from foosim.world.edits import Edit, check_edits
 
 
@@ -19,25 +19,15 @@ class Inputs:
     def __init__(self) -> None:
         self._orders: dict[int, list[Edit]] = {}
         self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
-        self._branch = self._branch_tick = 0
 
-    def begin(self, epoch: Epoch) -> bool:
-        """A new epoch issues orders again. Deliveries stay true, unless it is of a newer branch: then return True.
+    def begin(self, epoch: Epoch) -> None:
+        """A new epoch issues orders again. Deliveries stay true.
 
         A node that was away for long has some of ticks that nobody asks for any more.
         """
         self._orders.clear()
-        if epoch.branch <= self._branch:
-            oldest = epoch.tick - limits.KEPT_TICKS
-            self._deliveries = {tick: kept for tick, kept in self._deliveries.items() if tick >= oldest}
-            return False
-        self._deliveries.clear()
-        self._branch, self._branch_tick = epoch.branch, epoch.branch_tick
-        return True
-
-    def is_void(self, commit: Commit) -> bool:
-        """Whether a commit is one that the last branch has left behind."""
-        return commit.epoch < self._branch and commit.tick > self._branch_tick
+        oldest = epoch.tick - limits.KEPT_TICKS
+        self._deliveries = {tick: kept for tick, kept in self._deliveries.items() if tick >= oldest}
 
     def take_order(self, order: Order, own_tick: int) -> bool:
         """Take an order; False for a repeat. Raises `Malformed` for edits that none can carry out."""
@@ -51,14 +41,13 @@ class Inputs:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, own_tick: int) -> bool:
-        """Take deliveries as they came; False for a repeat, and for those of another branch."""
-        is_known = deliveries.tick in self._deliveries or deliveries.tick < own_tick - limits.KEPT_TICKS
-        if is_known or deliveries.branch != self._branch:
+        """Take deliveries as they came; False for a repeat."""
+        if deliveries.tick in self._deliveries or deliveries.tick < own_tick - limits.KEPT_TICKS:
             return False
         check_near(deliveries.last, own_tick)
         self._deliveries[deliveries.tick] = payload, deliveries
         for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            empty = Deliveries(tick, [], branch=self._branch)
+            empty = Deliveries(tick, [])
             self._deliveries.setdefault(tick, (encode(empty), empty))
         return True
 

@@ -166,8 +166,6 @@ class Member:
             raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
         if not set(owners.values()) <= roster or len(roster) != len(epoch.roster):
             raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
-        if epoch.branch > epoch.epoch:
-            raise Malformed(f"epoch {epoch.epoch}: of branch {epoch.branch}, which is to come")
         build_layout(self.deployment, [(entity.name, entity.model) for entity in epoch.added])
 
     def want_layout(self, layout: Layout) -> None:

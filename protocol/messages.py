@@ -33,13 +33,12 @@ class Order(Message, frozen=True):
 class Deliveries(Message, frozen=True):
     """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published.
 
-    At the `following` ticks none do, and that is final, too. They are those of the branch with this number.
+    At the `following` ticks none do, and that is final, too.
     """
 
     tick: Counter
     packets: Annotated[list[Delivered], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     following: Annotated[int, Meta(ge=0, le=limits.KEPT_TICKS)] = 0
-    branch: Counter = 0
 
     @property
     def last(self) -> int:
@@ -200,8 +199,7 @@ class Prepare(Message, frozen=True):
 class Epoch(Message, frozen=True):
     """Who does what from tick `tick` on: `owners` is (robot, node) for every robot.
 
-    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in. The last
-    branch has the number `branch` (0: there is none); whatever was behind frame `branch_tick` before it is void.
+    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in.
     """
 
     epoch: Counter
@@ -211,8 +209,6 @@ class Epoch(Message, frozen=True):
     owners: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
     added: Added
     arithmetic: Annotated[bytes, Meta(max_length=32)]
-    branch: Counter = 0
-    branch_tick: Counter = 0
 
 
 class Tempo(Message, frozen=True):
@@ -307,8 +303,8 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number that it has, in `branch`. It goes on with its
-    own numbers when it had been let in and has lost the vHub: `returns` is how often."""
+    """A client asks to be let in. `received` is the last downlink number that it has. It goes on with its own numbers
+    when it had been let in and has lost the vHub: `returns` is how often."""
 
     name: Name
     boot: Name
@@ -316,13 +312,12 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
     returns: Counter = 0
-    branch: Counter = 0
 
 
 class ClientWelcome(Message, frozen=True):
     """The vHub accepts a client, as an answer to its hello with the same `returns`: numbers go on from `sequence`, the
     next downlink is `downlink` + 1. Everything up to `sequence` is recorded, nothing behind it is: who comes back sends
-    that again. Who was here before the branch with this number knows more than `branch_tick`, which does not hold."""
+    that again."""
 
     name: Name
     boot: Name
@@ -332,8 +327,6 @@ class ClientWelcome(Message, frozen=True):
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
-    branch: Counter = 0
-    branch_tick: Counter = 0
     returns: Counter = 0
 
 
@@ -367,15 +360,11 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap.
-
-    This, and what is said in answer, is part of the branch with the number that it names.
-    """
+    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
 
     name: Name
     boot: Name
     packets: Packets
-    branch: Counter = 0
 
 
 class Done(Message, frozen=True):
@@ -385,7 +374,6 @@ class Done(Message, frozen=True):
     boot: Name
     tick: Counter
     packets: Packets
-    branch: Counter = 0
 
 
 class Received(Item, frozen=True):
@@ -407,7 +395,6 @@ class Go(Message, frozen=True):
     tick: Counter
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
-    branch: Counter = 0
 
 
 class Down(Message, frozen=True):
@@ -418,7 +405,6 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
-    branch: Counter = 0
 
 
 class Heard(Message, frozen=True):
@@ -428,7 +414,6 @@ class Heard(Message, frozen=True):
     """
 
     acknowledged: Counter
-    branch: Counter = 0
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):

@@ -12,9 +12,7 @@ def lose_hub(system: System, records: int, back_ns: int = HUB_BACK_NS) -> None:
     """Lose the vHub's machine with the last records of its journal; it is started again after a while."""
     if channels.VHUB not in system.processes or system.hub.ended is not None:
         return
-    lost = system.hub_journal.lose(records)
-    if system.settings.on_hub_loss is not None:
-        system.settings.on_hub_loss(lost, system.hub_journal.captured_tick)
+    system.hub_journal.lose(records)
     system.hub_journal.ending = None
     system.kill_hub("now", back_ns)
 
@@ -24,6 +22,4 @@ def lose_supervisor(system: System, records: int) -> None:
     journal = system.journal
     begun = next(at for at, raw in enumerate(journal) if isinstance(decode_any(Record, raw), CommitRecord))
     del journal[max(begun + 1, len(journal) - records) :]
-    if system.settings.on_supervisor_loss is not None:
-        system.settings.on_supervisor_loss(journal)
     system.kill(channels.SUPERVISOR)

@@ -54,7 +54,7 @@ class Replica:
             build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
             self._say(channels.BUILD, node, encode(build))
         self._settle()
-        self._epoch = self._branch = 0
+        self._epoch = 0
         self._begin(self.frame)
 
     def _begin(self, frame: Frame) -> None:
@@ -62,7 +62,7 @@ class Replica:
         self.frame = frame
         self._epoch += 1
         owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
-        who = sorted(self._nodes), owners, added, b"", self._branch, frame.tick
+        who = sorted(self._nodes), owners, added, b""
         self._say(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
         commit = Commit(
             self._epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], last=False
@@ -72,8 +72,7 @@ class Replica:
         self._settle()
 
     def set_back(self, frame: Frame) -> None:
-        """Go on from another frame than the last one, of an earlier tick."""
-        self._branch = self._epoch + 1
+        """Go on from another frame of the same run. What the nodes know of its ticks stays true."""
         self._begin(frame)
 
     @property
@@ -90,7 +89,7 @@ class Replica:
             self._say(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
             self._settle()
         self._say(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
-        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered), branch=self._branch)))
+        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
         self._settle()
         core, _ = next(iter(self._nodes.values()))
         assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"

@@ -75,8 +75,8 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
 ) -> Rehearsed:
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
-    `start` is a frame of another run to begin with (`vhub.branching.read_branch`). `prepare` is called with the built
-    system before it runs: a test's or notebook's place to ask for things at ticks.
+    `start` is a frame of another run to begin with (`capture.start_frame.read_branch`). `prepare` is called with the
+    built system before it runs: a test's or notebook's place to ask for things at ticks.
     `folder` is the one that the text's file is in: where the files are that it refers to (None: the present one).
     `progress` gets a line each second of wall time, from another thread. A player that does not answer within
     `deadlines.lockstep_fast` is interrupted, where this is called from the main thread, and the run ends in order; for

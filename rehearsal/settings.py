@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -97,11 +97,6 @@ class Settings:
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
     on_epoch: Callable[[Epoch], None] | None = None
-    on_hub_loss: Callable[[int, int], None] | None = None
-    """Told of records that the vHub's journal has lost with a machine: how many, and up to which tick it is captured.
-    """
-    on_supervisor_loss: Callable[[Sequence[bytes]], None] | None = None
-    """Told of the supervisor's journal that is left when its machine is lost."""
     closing: Callable[[HubCore, int], bool] = lambda hub, passed_ns: True
     """Whether the vHub has closed its capture, and in its `recording` how far it is, so long after the run's end."""
     on_say: Callable[[str, str, str], None] | None = None

@@ -38,7 +38,7 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
 from foosim.runtime.closed import closed
-from foosim.supervisor.failover import Failover, Rollback
+from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.load_balancing import Balancer
 from foosim.supervisor.node_loss import NodeLoss
@@ -79,9 +79,8 @@ class SupervisorCore:
         self.handshake = Handshake(state, self.process_gone)
         self.vhub_loss, self.player_losses = VhubLoss(state, self.progress), PlayerLosses(state)
         self.node_loss = NodeLoss(state, self.open_epoch, self._layout_ready, self.fail)
-        self.rollback = Rollback(state, self.progress)
         ends = self.fail, self.publish_last_commit
-        self.failover = Failover(state, self.closing, self.node_loss, self.rollback, *ends)
+        self.failover = Failover(state, self.closing, self.node_loss, *ends)
         self.balancer = Balancer(state.deployment.owners()) if settings.balance else None
         does = self.status, self.open_epoch, self.stop, self.fail
         self.requests = Requests(state, self.viewing, self.node_loss, *does)
@@ -204,8 +203,11 @@ class SupervisorCore:
         self.closing.on_standstill(stood_ns, now_ns)
         self.failover.on_standstill(stood_ns)
 
-    def finish(self, reason: str, failed: bool) -> None:
-        """End the run in order at the last committed tick, once. A run that was only resumed is abandoned."""
+    def finish(self, reason: str, failed: bool, tick: int | None = None) -> None:
+        """End the run in order, once: at the last committed tick, or at an earlier one that is the last in the capture.
+
+        A run that was only resumed is abandoned.
+        """
         state = self.state
         if state.end is not None or state.finished:
             return
@@ -213,16 +215,16 @@ class SupervisorCore:
             state.finished = True
             state.log("error", f"the run does not go on from tick {state.frame.tick}: {reason}")
             return
-        state.end = End(state.frame.tick, reason, failed)
+        state.end = End(state.frame.tick if tick is None else tick, reason, failed)
         self.closing.ended(self.progress.now_ns)
         state.log("error" if failed else "info", f"run ends at tick {state.frame.tick}: {reason}")
         state.journal(state.end)
         state.publish_end()
         self.requests.end()
 
-    def fail(self, reason: str) -> None:
-        """End the run as failed."""
-        self.finish(reason, failed=True)
+    def fail(self, reason: str, tick: int | None = None) -> None:
+        """End the run as failed, by default at the last committed tick."""
+        self.finish(reason, failed=True, tick=tick)
 
     def stop(self) -> int:
         """End the run in order and return after which tick: what is released, or one more when all of it is committed.
@@ -331,7 +333,7 @@ class SupervisorCore:
         state.frame = frame
         state.account.count(*solved)
         state.chain = chain_next(state.chain, frame.digest)
-        over = close_outages(state.recovered, state.committed_ns, now_ns, frame.tick)
+        over = close_outages(state.recovered, state.committed_ns, now_ns)
         self.player_losses.committed(state.committed_ns, now_ns)
         self.vhub_loss.committed(state.committed_ns, now_ns)
         state.committed_ns = now_ns
@@ -502,20 +504,20 @@ class SupervisorCore:
         self.state.repeated += not self._resume_hub(standing, now_ns)
 
     def _resume_hub(self, standing: ResumeState, now_ns: int) -> bool:
-        """Let the vHub go on, after a rollback where it needs one; False for a repeat, and for another start's."""
+        """Let the vHub go on, or end the run where it lacks inputs; False for a repeat, and for another start's."""
         state, process = self.state, self.state.roster.by_name.get(channels.VHUB)
         if process is None or process.boot != standing.boot or standing.supervisor != state.boot:
             return False
         if state.is_resuming:
             return self.failover.on_standing(standing, now_ns)
-        if self.rollback.is_due(standing):
+        if standing.boot != state.granted_boot and lacks_inputs(state, standing):
             if state.end is not None:
-                return False  # the run ends at its last commit
-            self.rollback.begin(standing, now_ns)
-            self.requests.rolled_back()
-            if state.members:
-                self.node_loss.open(state.owners, state.members, now_ns)
-        state.grant(standing)
+                return False
+            if state.is_vhub_away:
+                self.vhub_loss.note()
+            self.fail(*why_it_ends(state, standing))
+        else:
+            state.grant(standing)
         return True
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:

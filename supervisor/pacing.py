@@ -88,12 +88,6 @@ class Pacer:
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
-    def roll_back(self, ticks: int, tick: int, now_ns: int) -> None:
-        """Continue from an earlier tick, `ticks` before; while paused, grant no later tick than before."""
-        if self.paused:
-            self.granted = max(tick, self.granted - ticks)
-        self.start(now_ns, tick)
-
     def set_pace(self, pace: Pace, next_tick: int, now_ns: int) -> None:
         """Change the pace from `next_tick` on."""
         self.pace = pace

@@ -79,14 +79,6 @@ class ProgressMonitor:
         process.in_doubt = now_ns < self._doubt_ns and not process.in_doubt
         return process.in_doubt
 
-    def roll_back(self, tick: int, now_ns: int) -> None:
-        """The run goes on from an earlier tick: nothing has come for those after it."""
-        for known in (self._released, self._delivered, self._committed, self._parts, self._told):
-            for behind in [each for each in known if each > tick]:
-                known.pop(behind)
-        self._released.pop(tick, None)
-        self.begun(now_ns)
-
     def released(self, tick: int, now_ns: int) -> None:
         self._released[tick] = now_ns - self._busy_ns
         before = (tick - 1, tick - 2)

@@ -21,7 +21,7 @@ from foosim.protocol import messages
 from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Answer, Commit, End, Epoch
-from foosim.world.edits import Edit, layout_after
+from foosim.world.edits import Disrupt, Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.initial_state import AddedEntity, Start, first_chain, first_frame
 from foosim.world.layout import BALL, Layout, build_layout
@@ -55,8 +55,7 @@ class Account:
 
 @dataclass(slots=True)
 class Recovered:
-    """One loss or return. `outage_ns` is the wall time without a commit, -1 until one follows, and `told` the tick of
-    the commit that reports it."""
+    """One loss or return. `outage_ns` is the wall time without a commit, -1 until one follows."""
 
     what: str
     name: str
@@ -64,22 +63,14 @@ class Recovered:
     tick: int
     epoch: int
     outage_ns: int = -1
-    told: int = -1
 
     def message(self) -> messages.Recovered:
         """Return it as a commit reports it, when it is over."""
         return messages.Recovered(self.what, self.name, self.reason, self.tick, self.epoch, self.outage_ns)
 
 
-def reopen_outages(recovered: Sequence[Recovered], tick: int) -> None:
-    """Open the outages that were reported by commits after a tick: these commits are void."""
-    for entry in recovered:
-        if entry.told > tick:
-            entry.outage_ns = entry.told = -1
-
-
-def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int, tick: int) -> list[Recovered]:
-    """Close the outages that end with frame `tick`, committed at `now_ns`; the frame before was at `before_ns`.
+def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> list[Recovered]:
+    """Close the outages that end with the frame committed at `now_ns`; the frame before was at `before_ns`.
 
     Return those, the oldest first; no more than a commit can report, the next one has the rest.
     """
@@ -88,29 +79,16 @@ def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int, t
         first -= 1
     over = list(recovered[first : first + limits.RECOVERIES_PER_COMMIT_MAX])
     for entry in over:
-        entry.outage_ns, entry.told = max(0, now_ns - before_ns), tick
+        entry.outage_ns = max(0, now_ns - before_ns)
     return over
 
 
-class EditLog:
-    """The edits of the last ticks that have any: what a rollback orders again. Bounded."""
+DISRUPTIONS_KEPT: Final = 16
 
-    def __init__(self) -> None:
-        self.by_tick: dict[int, list[Edit]] = {}
-        self.forgotten = -1
-        """The last tick whose edits are not known any more."""
 
-    def add(self, tick: int, edits: Sequence[Edit]) -> None:
-        """Note what is added to the order of a tick."""
-        if edits:
-            self.by_tick.setdefault(tick, []).extend(edits)
-        while len(self.by_tick) > limits.EDITED_TICKS_KEPT:
-            self.forgotten = min(self.by_tick)
-            self.by_tick.pop(self.forgotten)
-
-    def since(self, tick: int) -> dict[int, list[Edit]]:
-        """Return the edits of a tick and of those after it."""
-        return {known: list(edits) for known, edits in sorted(self.by_tick.items()) if known >= tick}
+def disruptions_of(tick: int, edits: Iterable[Edit]) -> list[tuple[int, str]]:
+    """Return the network events among the edits of a tick: the tick at which each takes effect, the event as JSON."""
+    return [(tick + 1, edit.event) for edit in edits if isinstance(edit, Disrupt)]
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
@@ -221,11 +199,7 @@ class Checkpoint(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     started_ns: int
     committed_ns: int
     end: End | None
-    branch: tuple[int, int] = (0, 0)
-    """Number of the last branch, and its tick: also of one whose first epoch has not begun."""
-    forgotten: int = -1
-    issued: list[tuple[int, list[Edit]]] = []
-    """What was ordered at the last ticks that have edits, and the last tick whose edits are not known any more."""
+    disruptions: list[tuple[int, str]] = []
     asked: list[Asked] = []
 
 
@@ -258,8 +232,8 @@ class History:
     started_ns: int = 0
     committed_ns: int = 0
     end: End | None = None
-    branch: tuple[int, int] = (0, 0)
-    edit_log: EditLog = field(default_factory=EditLog)
+    disruptions: list[tuple[int, str]] = field(default_factory=list)
+    """The last network events that were requested: the tick at which each takes effect, the event as JSON."""
     asked: list[Asked] = field(default_factory=list)
     """The last requests that change something."""
 
@@ -309,8 +283,6 @@ def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)
         return History(first, frame, frame.layout, deployment.owners(), control, account, chain=chain)
-    edit_log = EditLog()
-    edit_log.forgotten, edit_log.by_tick = first.forgotten, {tick: list(edits) for tick, edits in first.issued}
     return History(
         first.run,
         first_frame(deployment, first.run.start),
@@ -328,8 +300,7 @@ def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
         started_ns=first.started_ns,
         committed_ns=first.committed_ns,
         end=first.end,
-        branch=first.branch,
-        edit_log=edit_log,
+        disruptions=list(first.disruptions),
         asked=list(first.asked),
     )
 
@@ -343,7 +314,6 @@ def _apply(history: History, record: Change) -> None:
         before = dict(history.owners if history.epoch is None else history.epoch.owners)
         history.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
         history.epoch, history.owners = record, owners
-        history.branch = record.branch, record.branch_tick
     elif isinstance(record, RequestRecord):
         history.answers[record.answer.sender, record.answer.id] = record.answer
         history.asked = [*history.asked, asked(record.verb, record.answer)][-ASKED_KEPT:]
@@ -362,7 +332,7 @@ def _apply(history: History, record: Change) -> None:
 def _order(history: History, record: RequestRecord | OrderedRecord) -> None:
     if record.edits:
         history.edits.setdefault(record.tick, []).extend(record.edits)
-        history.edit_log.add(record.tick, record.edits)
+        history.disruptions = [*history.disruptions, *disruptions_of(record.tick, record.edits)][-DISRUPTIONS_KEPT:]
 
 
 def _commit(history: History, record: CommitRecord) -> None:
@@ -379,7 +349,7 @@ def _commit(history: History, record: CommitRecord) -> None:
     history.account.count(record.solved, record.ball_solver)
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)
-    over = close_outages(history.recovered, history.committed_ns, record.now_ns, commit.tick)
+    over = close_outages(history.recovered, history.committed_ns, record.now_ns)
     for entry, told in zip(over, commit.recovered, strict=False):
         entry.outage_ns = told.outage_ns  # the vHub's is longer than that between two commits
     history.committed_ns = record.now_ns

@@ -169,15 +169,9 @@ class Requests:
         answer = Answer(request.sender, request.id, True, tick if effective is None else effective, text, b"{}")
         self._write(request.verb, answer, tick, edits or [], owners or self._state.owners)
         if edits:
-            self._state.edit_log.add(tick, edits)
+            self._state.note_disruptions(tick, edits)
             self._state.coming_edits.setdefault(tick, []).extend(edits)
         return answer
-
-    def rolled_back(self) -> None:
-        """The run goes on from an earlier tick: the first change that waits builds on what is ordered then."""
-        if self._pending:
-            first = self._pending[0]
-            first.layout = layout_after(self._state.next_layout(), [first.edit])
 
     # --- pace --------------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foosim.common.units import Pace
@@ -26,12 +26,19 @@ class RunSettings:
     start: Start | None = None
     balance: bool = False
     """Whether robots move between nodes by measured load."""
+    options: Sequence[str] = ()
+    """The arguments of the command that began the run; where there are none, its deployment's file."""
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """The contents of the files that the deployment refers to, by path."""
 
     def load_deployment(self) -> Deployment:
         """The deployment with its files; raises DeploymentError or AssetError."""
         return load_deployment(self.deployment_text, self.deployment_name).with_assets(self.files)
+
+    @property
+    def arguments(self) -> Sequence[str]:
+        """Return the arguments with which another run of the deployment begins."""
+        return self.options or (self.deployment_name,)
 
     @property
     def origin(self) -> Origin | None:

@@ -2,7 +2,7 @@
 
 `RunState` holds the last committed frame, the epoch and who owns what in it, orders and commits of the last ticks, what
 requests have asked for, the account, and the actions for the shell. `checkpoint` returns it as the record with which a
-journal file starts, `restore` puts it where a journal ends, `roll_back` at an earlier frame. Its methods change the
+journal file starts, `restore` puts it where a journal ends, `catch_up` at a later frame. Its methods change the
 state and append the records and messages that belong to the change; decisions are those of the core and its helpers.
 """
 
@@ -25,16 +25,17 @@ from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import (
     ANSWERS_KEPT,
     ASKED_KEPT,
+    DISRUPTIONS_KEPT,
     Account,
     Asked,
     Checkpoint,
     Control,
-    EditLog,
     History,
     OrderedRecord,
     Recovered,
     RecoveredRecord,
     RunRecord,
+    disruptions_of,
 )
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
@@ -53,14 +54,12 @@ class InputBuffer:
         self.deliveries: dict[int, bytes] = {}
         self.delivered = 0
         """The last tick whose deliveries are here."""
-        self.branch = 0
-        """The branch whose deliveries count."""
 
-    def reset(self, tick: int, branch: int) -> None:
-        """Drop everything: frame `tick` of `branch` is the last committed one."""
+    def reset(self, tick: int) -> None:
+        """Drop everything: frame `tick` is the last committed one."""
         self.parts.clear()
         self.deliveries.clear()
-        self.delivered, self.branch = tick - 1, branch
+        self.delivered = tick - 1
 
     def take_part(self, part: Part, committed: int, members: Collection[str]) -> bool:
         """Take a part of the present epoch; False for a repeat. Raises Malformed for a part of another node."""
@@ -75,19 +74,15 @@ class InputBuffer:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, committed: int) -> bool:
-        """Take deliveries as they came; False for a repeat, and for those of another branch.
-
-        Raises Malformed for a tick too far ahead.
-        """
-        is_known = deliveries.tick in self.deliveries or deliveries.tick < committed
-        if is_known or deliveries.branch != self.branch:
+        """Take deliveries as they came; False for a repeat. Raises Malformed for a tick too far ahead."""
+        if deliveries.tick in self.deliveries or deliveries.tick < committed:
             return False
         if deliveries.last > committed + limits.KEPT_TICKS:
             raise Malformed(f"deliveries of tick {deliveries.last}, the last commit is {committed}")
         self.deliveries[deliveries.tick] = payload
         self.delivered = max(self.delivered, deliveries.last)
         for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            self.deliveries.setdefault(tick, encode(Deliveries(tick, [], branch=self.branch)))
+            self.deliveries.setdefault(tick, encode(Deliveries(tick, [])))
         return True
 
     def missing(self, tick: int, members: Collection[str]) -> list[str]:
@@ -137,20 +132,17 @@ class RunState:
     orders: dict[int, list[Edit]]
     commits: dict[int, bytes]
     """The last ones, as they were published."""
-    branch: int
-    """Number of the last branch, which is that of the first epoch in it (`failover.Rollback`)."""
-    branch_tick: int
-    """The tick at which it begins."""
 
     coming_edits: dict[int, list[Edit]]
     """Edits of ticks that are not released yet."""
-    edit_log: EditLog
     answers: dict[tuple[str, str], Answer]
     """By sender and id of the request."""
     asked: deque[Asked]
     """The last requests that change something, for people."""
     disruptions: int
     """Events of the network that were asked for."""
+    last_disruptions: deque[tuple[int, str]]
+    """The last of them: the tick at which each takes effect, the event as JSON."""
 
     account: Account
     recovered: list[Recovered]
@@ -197,9 +189,8 @@ class RunState:
         self.owners, self.members = self.deployment.owners(), ()
         self.inputs = InputBuffer()
         self.orders, self.commits = {}, {}
-        self.branch = self.branch_tick = 0
 
-        self.coming_edits, self.edit_log, self.disruptions = {}, EditLog(), 0
+        self.coming_edits, self.disruptions, self.last_disruptions = {}, 0, deque(maxlen=DISRUPTIONS_KEPT)
         self.answers, self.asked = {}, deque(maxlen=ASKED_KEPT)
 
         self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
@@ -244,13 +235,9 @@ class RunState:
         self.publish(channels.PREPARE, channels.SUPERVISOR, Prepare(self.added(layout)))
 
     def grant(self, standing: ResumeState) -> None:
-        """Let the vHub go on: its resume position is known.
-
-        A branch without an epoch, since no node is here, begins with the first epoch that is opened.
-        """
+        """Let the vHub go on: its resume position is known."""
         self.granted_boot = standing.boot
-        grant = ResumeGrant(channels.VHUB, standing.boot, max(self.epoch, self.branch))
-        self.publish(channels.RESUME_GRANT, channels.VHUB, grant)
+        self.publish(channels.RESUME_GRANT, channels.VHUB, ResumeGrant(channels.VHUB, standing.boot, self.epoch))
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
@@ -264,7 +251,7 @@ class RunState:
         self.inputs.parts.clear()
         frame, added = self.frame, self.added(self.frame.layout)
         who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
-        self.epoch_payload = encode(Epoch(self.epoch, frame.tick, frame.digest, *who, self.branch, self.branch_tick))
+        self.epoch_payload = encode(Epoch(self.epoch, frame.tick, frame.digest, *who))
         self.actions.append(Journal(self.epoch_payload))
         self.publish_epoch()
 
@@ -317,11 +304,15 @@ class RunState:
         if not edits:
             return
         self.journal(OrderedRecord(tick, edits))
-        self.edit_log.add(tick, edits)
+        self.note_disruptions(tick, edits)
         if tick < self.released:
             self.orders[tick] = [*self.orders[tick], *edits]
         else:
             self.coming_edits.setdefault(tick, []).extend(edits)
+
+    def note_disruptions(self, tick: int, edits: list[Edit]) -> None:
+        """Keep the network events among the edits of a tick for the status."""
+        self.last_disruptions.extend(disruptions_of(tick, edits))
 
     def keep_answer(self, answer: Answer) -> None:
         """Keep an answer for a request that is repeated."""
@@ -357,7 +348,7 @@ class RunState:
             self.abandoned = reason
         return bool(self.abandoned)
 
-    # --- checkpoint, restore, rollback -------------------------------------------------------------------------------
+    # --- checkpoint, restore, catch up -------------------------------------------------------------------------------
 
     def control(self) -> Control:
         """Return what people have set, for the journal."""
@@ -384,9 +375,7 @@ class RunState:
             self.started_ns,
             self.committed_ns,
             self.end,
-            (self.branch, self.branch_tick),
-            self.edit_log.forgotten,
-            sorted(self.edit_log.by_tick.items()),
+            list(self.last_disruptions),
             list(self.asked),
         )
         return encode(checkpoint)
@@ -395,8 +384,7 @@ class RunState:
         """Put the state of a run that has not begun where a journal ends, before an epoch."""
         self.frame, self.chain = history.frame, history.chain
         self.released = self.frame.tick
-        self.branch, self.branch_tick = history.branch
-        self.inputs.reset(self.frame.tick, self.branch)
+        self.inputs.reset(self.frame.tick)
         self.commits = dict(history.commits)
         if history.epoch is not None:
             self.epoch, self.owners = history.epoch.epoch, dict(history.epoch.owners)
@@ -413,23 +401,18 @@ class RunState:
 
     def restore_requests(self, history: History) -> None:
         """Restore what requests have asked for, and the last answers, as many as are kept."""
-        self.coming_edits, self.edit_log = history.edits, history.edit_log
-        self.disruptions = history.control.disruptions
+        self.coming_edits, self.disruptions = history.edits, history.control.disruptions
+        self.last_disruptions.extend(history.disruptions)
         self.answers = dict(list(history.answers.items())[-ANSWERS_KEPT:])
 
-    def roll_back(self, frame: Frame, chain: bytes, commit: bytes) -> None:
-        """Put the state at a committed frame that is not the last one in the journal, which begins anew with it."""
+    def catch_up(self, frame: Frame, chain: bytes, commit: bytes) -> None:
+        """Put the state at a committed frame after the last one in the journal, which begins anew with it."""
         self.frame, self.chain = frame, chain
         self.released = frame.tick
-        self.inputs.reset(frame.tick, self.branch)
-        self.orders.clear()
-        self.reorder_from(frame.tick)
+        self.inputs.reset(frame.tick)
+        self.coming_edits = {tick: edits for tick, edits in self.coming_edits.items() if tick >= frame.tick}
         self.commits = {frame.tick: commit}
         self.actions.append(Journal(self.checkpoint()))
-
-    def reorder_from(self, tick: int) -> None:
-        """Order the known edits of a tick, and of those after it, once more."""
-        self.coming_edits = self.edit_log.since(tick)
 
     def frame_of(self, standing: ResumeState) -> Frame:
         """Return the vHub's last committed frame. Raises Malformed for a commit that does not fit its frame."""

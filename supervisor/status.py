@@ -14,7 +14,6 @@ from foosim.deployment.schema import places
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
-from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.layout import BALL
 
@@ -108,10 +107,7 @@ def status(
         "links_in_all": report.get("links_in_all", 0),
         "disruptions": {
             "asked": state.disruptions,
-            "last": [
-                {"tick": tick, "event": decode_json(text.encode())}
-                for tick, text in _network_events(state)[-DISRUPTIONS_SHOWN:]
-            ],
+            "last": [{"tick": tick, "event": decode_json(text.encode())} for tick, text in state.last_disruptions],
         },
         "requests": [asdict(asked) for asked in state.asked],
         "refusals": report.get("refusals", {}),
@@ -133,12 +129,6 @@ def _recoveries(state: RunState) -> list[dict[str, object]]:
         }
         for entry in state.recovered
     ]
-
-
-def _network_events(state: RunState) -> list[tuple[int, str]]:
-    """Return the network events of the last ticks that have requested ones: the tick, the event."""
-    by_tick = sorted(state.edit_log.by_tick.items())
-    return [(tick + 1, edit.event) for tick, edits in by_tick for edit in edits if isinstance(edit, Disrupt)]
 
 
 def _recording(state: RunState) -> dict[str, Any]:

@@ -70,7 +70,7 @@ class VhubLoss:
         state.publish_tempo()
         if state.is_vhub_away:
             state.is_vhub_away = False
-            self._note()
+            self.note()
             self._progress.begun(now_ns)
             state.log("info", f"the vHub is back after {(now_ns - self._since_ns) / 1e9:.2f} s")
 
@@ -91,10 +91,10 @@ class VhubLoss:
         wait_ns = state.wait_ns(state.deployment.deadlines.vhub_back_ns)
         if not state.is_vhub_away or now_ns < self._since_ns + wait_ns:
             return ""
-        self._note()
+        self.note()
         return f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s"
 
-    def _note(self) -> None:
+    def note(self) -> None:
         """Add the loss to the account: the world has stood still until now."""
         self._entry = self._state.note_recovery("vhub", channels.VHUB, self._reason, *self._lost_at)
 

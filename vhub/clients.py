@@ -123,7 +123,7 @@ class Clients:
             return
         for flight in flights:
             flight.released_wall_ns = now_ns
-        go = Go(member.downlink, tick, member.sequence, received(flights), self._state.branch)
+        go = Go(member.downlink, tick, member.sequence, received(flights))
         self._sessions.send_go(session, go)
         session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
         allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")
@@ -174,7 +174,7 @@ class Clients:
         session = self._session(up)
         if session is None or self._state is None:
             return
-        if up.branch != self._state.branch or self._sessions.is_in_doubt(session, self._state.deployment):
+        if self._sessions.is_in_doubt(session, self._state.deployment):
             self.repeated += 1
             return
         if not self._sessions.admits(session, len(up.packets), len(payload)):
@@ -190,9 +190,8 @@ class Clients:
         session = self._session(done)
         if session is None:
             return
-        is_of_another = self._state is None or done.branch != self._state.branch
         is_asked = self.waits_for(done.name) and done.tick == session.go_tick
-        if is_of_another or not is_asked or not session.is_present:
+        if not is_asked or not session.is_present:
             self.repeated += 1
             return
         self.take_done(done.name)

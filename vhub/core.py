@@ -62,7 +62,6 @@ from foosim.vhub.paced_release import Releases
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state.capture_queue import CaptureQueue, RecordClosing, RecordEpoch, last_closings
 from foosim.vhub.state.commits import Commits
-from foosim.vhub.state.downlinks import retag
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.state.resume import Past
@@ -363,7 +362,7 @@ class HubCore:
         if not state.was_final:
             self._sent[tick + 1] = payload
             for following in range(tick + 2, state.final + 1):
-                self._sent[following] = encode(Deliveries(following, [], branch=state.branch))
+                self._sent[following] = encode(Deliveries(following, []))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
         world.step = _Step.WRITTEN
         return True
@@ -437,8 +436,7 @@ class HubCore:
             for flight in release.flights:
                 flight.released_wall_ns = now_ns
             member = self.state.members[release.client]
-            packets, branch = received(release.flights), self.state.branch
-            down = Down(release.number, release.tick, member.sequence, packets, False, branch)
+            down = Down(release.number, release.tick, member.sequence, received(release.flights), False)
             self.sessions.send_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 
@@ -516,15 +514,12 @@ class HubCore:
         if first and epoch.tick > self.state.closed + 1:
             self.failure = f"the run is at tick {epoch.tick}: the journal of the vHub that brought it there is not here"
             return
-        branches = self.state.turn_to(epoch)
         self._take_epoch(epoch)
         self.actions += [Journal(self.epoch_payload), RecordEpoch(epoch)]
-        if branches:
-            self._branch_off(self.state)
         self._enter()
         if first:
             tick = self.state.closed + 1
-            self._sent[tick] = encode(Deliveries(tick, [], branch=epoch.branch))
+            self._sent[tick] = encode(Deliveries(tick, []))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
             self._patience.progress(self.state.tick_ns, now_ns)
 
@@ -570,12 +565,11 @@ class HubCore:
             self.member.boot,
             build.supervisor,
             self.epoch,
-            state.branch,
-            state.branch_tick,
             *self.commits.last(state.deployment),
             state.final,
             self.handshake.waits,
             self.handshake.lost_machine,
+            self.capture_file,
         )
         return Publish(channels.RESUME_STATE, channels.VHUB, encode(standing))
 
@@ -609,22 +603,12 @@ class HubCore:
                 self.actions.append(Publish(channels.WANT, channels.VHUB, want))
 
     def _fences(self, commit: Commit) -> bool:
-        """Whether a commit does not count: it is of an epoch before the present one, or a branch has voided it.
+        """Whether a commit does not count: it is of an epoch before the present one.
 
-        Up to the epoch's first tick it counts under its old epoch: in a branch, what is committed never changes.
+        Up to the epoch's first tick it counts under its old epoch: what is committed never changes.
         """
-        state = self.state
         is_old = commit.epoch < self.epoch and commit.tick > self._epoch_tick
-        is_void = state is not None and commit.epoch < state.branch and commit.tick > state.branch_tick
-        return is_old or is_void or self.handshake.waits
-
-    def _branch_off(self, state: HubState) -> None:
-        """A branch begins behind the last closed tick: tag with its number the deliveries that others may ask for."""
-        self.actions.append(Say("warning", f"the run goes on as branch {state.branch} from tick {state.branch_tick}"))
-        for tick, payload in self._sent.items():
-            self._sent[tick] = retag(Deliveries, payload, state.branch)
-        self.handshake.published = [payload for tick, payload in sorted(self._sent.items()) if tick >= state.closed]
-        self.sessions.downlinks.turn_to(state.branch)
+        return is_old or self.handshake.waits
 
     # --- time --------------------------------------------------------------------------------------------------------
 
@@ -686,7 +670,7 @@ class HubCore:
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
-            self.sessions.send_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
+            self.sessions.send_down(name, Down(number, self.ended.tick, 0, [], True), now_ns)
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""

@@ -222,8 +222,6 @@ class Sessions:
             build.deployment_name,
             build.deployment,
             build.run,
-            state.branch,
-            state.branch_tick,
             hello.returns,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
@@ -252,10 +250,7 @@ class Sessions:
         sequence = 0 if member is None else member.sequence
         downlink = 0 if member is None else member.downlink if said is None else said
         if hello.returns:
-            has = hello.received
-            if hello.branch != state.branch:
-                has = min(has, 0 if member is None else member.branched)
-            return Claim(hello, sequence, min(has, downlink))
+            return Claim(hello, sequence, min(hello.received, downlink))
         # another process: the numbers of what the one before has sent are taken
         waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
         waiting += [] if session.done is None else session.done.packets
@@ -379,7 +374,7 @@ class Sessions:
         It is not known whether any process, or the one that joins next, has received that Go.
         """
         go = decode(Go, self.by_name[name].go)
-        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
+        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False))
         self.downlinks.keep(name, go.number, payload, now_ns)
         self._actions.append(Publish(channels.DOWN, name, payload))
 
@@ -414,7 +409,7 @@ class Sessions:
                 continue
             if now_ns >= session.heard_ns + limits.HEARTBEAT_NS:
                 session.heard, session.heard_ns = member.sequence, now_ns
-                self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
+                self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence))))
 
     def rest(self, for_ns: int, now_ns: int) -> None:
         """For so long no client could do anything."""

@@ -6,8 +6,9 @@ frame's tick and the chain up to it, so that equal inputs give equal digests.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated
+import shlex
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Final
 
 import msgspec
 import numpy as np
@@ -42,6 +43,17 @@ class Origin(Item, frozen=True):
     source: Text
     digest: Digest
     chain: Digest
+
+
+NEW_RUN: Final = "A new run begins with the last captured frame"
+
+
+def new_run_text(arguments: Sequence[str], capture: str) -> str:
+    """Return in words how a run begins with the last frame of a capture; `arguments` are those of the run before."""
+    if not capture:
+        return "The run has no capture to begin a new one with"
+    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@last"]
+    return f"{NEW_RUN}: {shlex.join(command)}"
 
 
 def place_ball(

@@ -149,7 +149,6 @@ class Prober:
         self._sent = 0
         self._back: dict[bytes, int] = {}
         """The echoes that have come, with the tick at which they did."""
-        self._branch = 0
         self._robots: list[str] = []
 
     def step(self, now_ns: int) -> None:
@@ -165,9 +164,6 @@ class Prober:
             self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
             heard = [(robot, CHANNEL_ECHO) for robot in self._robots]
             core.join(deployment.ticks(spec.rate_hz), heard, spec.offset_ns // deployment.tick_ns)
-        if core.branch != self._branch:
-            self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
-            self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}
         if core.go is not None:
             for packet in core.go.packets:
                 if packet.payload in self._back:
@@ -208,7 +204,6 @@ class Flown:
     losses: int = 0
     joins: int = 0
     restarts: int = 0
-    branches: int = 0
     seen: int = 0
     """Things that were written or said, each of them checked."""
     virtual_s: float = 0.0
@@ -251,8 +246,6 @@ class Flight:
             observer=self._see,
             observes=("journal", "publish"),
             on_closing=self.laws.close,
-            on_hub_loss=self.laws.lose_hub,
-            on_supervisor_loss=self.laws.lose_supervisor,
             on_commit=self._committed,
         )
         self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
@@ -338,7 +331,6 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks
     flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9
     flown.losses = sum(entry.what == "node" for entry in told)
     flown.joins = sum(entry.what == "join" for entry in told)
-    flown.branches = sum(entry.reason.startswith("branch") for entry in told)
     flown.restarts = sum(entry.what == channels.SUPERVISOR for entry in told)
     if system.hub.state is not None:
         packets = system.hub.state.packets

@@ -16,7 +16,6 @@ from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.rehearsal.journals import ENDINGS
-from foosim.rehearsal.machine_loss import lose_hub
 from foosim.rehearsal.system import System
 
 TICKS: Final = 208
@@ -319,11 +318,18 @@ def _hub(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
 
 
-def _machine(dice: Dice, names: Sequence[str]) -> Fault:
-    """The vHub's machine loses its power, its journal what had not reached the disk: the run goes on as a branch."""
-    lost, back_ms = dice.between(20, 300), dice.one_of((1, 40, 400, 2_000))
-    what = f"the vHub's machine is lost for {back_ms} ms, its journal without the last {lost} records"
-    return Fault(_tick(dice), "machine", what, lambda system: lose_hub(system, lost, back_ms * MS))
+def _both(dice: Dice, names: Sequence[str]) -> Fault:
+    """Supervisor and vHub end at once; both go on from their journals, whichever of them is back first."""
+    hub_ms, down_ms = dice.between(20, 300), dice.one_of((1, 40, 400, 2_000))
+
+    def do(system: System) -> None:
+        system.kill_hub("now", hub_ms * MS)
+        if channels.SUPERVISOR in system.processes and not system.is_dying(channels.SUPERVISOR):
+            system.end_amid(channels.SUPERVISOR, 0)
+            system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
+
+    what = f"the vHub ends for {hub_ms} ms, and the supervisor for {down_ms} ms"
+    return Fault(_tick(dice), "both", what, do)
 
 
 def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
@@ -374,13 +380,13 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "clock": _clock,
     "late": _echo_of_old,
     "tempo": _tempo,
-    "machine": _machine,
+    "both": _both,
 }
 KINDS: Final = list(FAULT_OF)
 LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
 """Of sixteen seeds those, by their remainder, that also have players that are lost: by dice of their own, so that
 others are the same. Those of 7 and 15 are in the last world, where players act at arrival, those of 10 are not."""
-CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine", "player"})
+CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

@@ -7,8 +7,7 @@ replica, and at the end the journals are folded and compared with those who wrot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Final
+from collections.abc import Callable, Collection, Mapping
 
 from msgspec.structs import replace
 
@@ -23,7 +22,7 @@ from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws, hold
 from foosim.rehearsal.swarm.world_bounds import strays
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import Checkpoint, CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
+from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
@@ -31,9 +30,6 @@ from foosim.vhub.state.records import fold as fold_hub
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
 from foosim.world.initial_state import initial_frame
-
-FRAMES_KEPT: Final = 400
-"""More ticks than are lost with a machine."""
 
 
 class Laws:
@@ -49,12 +45,6 @@ class Laws:
         self._deployment = deployment
         self._chains = {0: CHAIN_START}
         """By tick, over all frames up to it."""
-        self._frames = {0: initial_frame(deployment)}
-        """Those of the last ticks that are captured."""
-        self._branch = 0, 0
-        """Number and tick of the last branch."""
-        self._is_begun = False
-        """Whether no epoch is in it yet."""
         self._digests = {0: initial_frame(deployment).digest}
         self._rosters: dict[int, list[str]] = {}
         self._epochs: set[bytes] = set()
@@ -109,9 +99,6 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
-        elif isinstance(record, Checkpoint) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
-            self._branches(*record.branch)
-            self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
         elif isinstance(record, OrderedRecord):
             self._ordered.setdefault(record.tick, []).extend(record.edits)
         elif isinstance(record, RecoveredRecord):
@@ -180,49 +167,9 @@ class Laws:
         hold(owners.keys() == self._deployment.robots.keys(), f"epoch {epoch.epoch} has not all robots")
         hold(not {*epoch.roster} & {*self._stopped}, f"epoch {epoch.epoch} is with a node that is stopped")
         hold({*owners.values()} <= {*epoch.roster}, f"epoch {epoch.epoch}: an owner takes no part")
-        branch = (epoch.epoch if self._is_begun else self._branch[0]), self._branch[1]
-        hold((epoch.branch, epoch.branch_tick) == branch, f"epoch {epoch.epoch} is not of branch {branch}")
-        if self._is_begun:
-            self._branch, self._is_begun = branch, False
-            self.packets.branch(epoch.branch)
         self.epoch = epoch.epoch
         self._rosters[epoch.epoch] = sorted(epoch.roster)
         self._epochs.add(raw)
-
-    def _branches(self, number: int, tick: int) -> None:
-        """A branch begins where the vHub stands; all behind is void, but for what was asked for at its tick."""
-        hold(
-            tick == self.packets.closed, f"branch {number} from tick {tick}, the vHub has closed {self.packets.closed}"
-        )
-        self._branch, self._is_begun = (number, tick), True
-        for known in (self._commits, self._digests, self._chains):
-            for behind in [each for each in known if each > tick]:
-                known.pop(behind)
-        self._orders = {each: edits for each, edits in self._orders.items() if each < tick}
-        self._parts.clear()
-        self.packets.branch(number)
-
-    def _tells_again(self, untold: list[Recovered]) -> None:
-        """What commits told that are void is told again, with that a branch begins."""
-        void = [entry for tick in sorted(self._told) if tick > self.committed for entry in self._told.pop(tick)]
-        again = [*(replace(entry, outage_ns=-1) for entry in void), *self._untold]
-        hold(untold[:-1] == again, f"the branch tells again of {untold[:-1]}, void are {again}")
-        self._captured_told = {tick for tick in self._captured_told if tick <= self.committed}
-        self._untold = untold
-
-    def lose_supervisor(self, journal: Sequence[bytes]) -> None:
-        """The supervisor's machine is lost: of what no commit has told it knows what its journal has."""
-        left = fold_supervisor(self._deployment, journal).recovered
-        self._untold = [entry.message() for entry in left if entry.outage_ns < 0]
-
-    def lose_hub(self, records: int, captured: int) -> None:
-        """The vHub's machine is lost with so many records; up to tick `captured` the capture holds what it held."""
-        journal = self._journals[channels.VHUB]
-        del journal[len(journal) - records :]
-        self.packets.lose(journal, captured)
-        if captured < self._replica.frame.tick:
-            self._replica.set_back(self._frames[max(0, captured)])
-            self.ticks = captured
 
     def _hub_writes(self, traced: Traced) -> None:
         self._journals[channels.VHUB].append(traced.payload)
@@ -238,7 +185,7 @@ class Laws:
         hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
         hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
         self._said_epoch[part.node] = part.epoch
-        if part.tick <= self.committed or part.epoch < self._branch[0]:
+        if part.tick <= self.committed:
             return
         said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
         hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")
@@ -298,8 +245,6 @@ class Laws:
         stray = strays(self._deployment, again)
         hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")
         self.ticks = frame.tick
-        self._frames[frame.tick] = again
-        self._frames.pop(frame.tick - FRAMES_KEPT, None)
 
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""

@@ -28,7 +28,6 @@ KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
     "Held._messages": limits.HELD_MESSAGES_MAX,
     "RunState.answers": ANSWERS_KEPT,
-    "EditLog.by_tick": limits.EDITED_TICKS_KEPT,
     "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,

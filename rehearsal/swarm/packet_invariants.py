@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from typing import Final
-
-from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.messages import Commit, Deliveries, Done, Down, Go, Samples, Sent
+from foosim.protocol.messages import Deliveries, Done, Down, Go, Samples, Sent
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.system import System
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
-from foosim.vhub.state.downlinks import retag
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.records import Closing, HubRecord, TickRecord, fold, world_packets
+from foosim.vhub.state.records import Closing, TickRecord, world_packets
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
 from foosim.world.sampling import Sampling
@@ -48,12 +44,11 @@ class PacketLaws:
         self._written: dict[int, bytes] = {0: self.said[0]}
         self._delivered: dict[tuple[str, int, int], int] = {}
         """The tick at which each packet reached a robot."""
-        self._branch = 0
         self._samples: dict[int, list[Samples]] = {}
         self._sequences: dict[str, int] = {}
         self._downlinks: dict[str, dict[int, bytes]] = {}
         self._go_ticks: dict[str, int] = {}
-        self._dones: dict[tuple[str, str, int, int], bytes] = {}
+        self._dones: dict[tuple[str, str, int], bytes] = {}
         self._answered: dict[int, dict[str, list[Sent]]] = {}
         """What clients answered to a tick that is not closed, by tick and client."""
         self._reached: dict[int, list[Key]] = {}
@@ -93,7 +88,7 @@ class PacketLaws:
         if tick + 1 not in self._written:
             self._written[tick + 1] = record.deliveries
             for following in range(tick + 2, deliveries.last + 1):
-                self._written[following] = encode(Deliveries(following, [], branch=deliveries.branch))
+                self._written[following] = encode(Deliveries(following, []))
         hold(
             not deliveries.packets or self._written[tick + 1] == record.deliveries, f"deliveries {tick + 1} were final"
         )
@@ -101,7 +96,7 @@ class PacketLaws:
     def delivers(self, deliveries: Deliveries, raw: bytes) -> None:
         """Law 3: deliveries are written before they are said, and then they never change. Law 4: each packet once."""
         for tick in range(deliveries.tick, deliveries.last + 1):
-            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, [], branch=deliveries.branch))
+            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, []))
             written = self._written.get(tick)
             hold(written is not None, f"deliveries {tick} are said before they are written")
             hold(written == payload, f"deliveries {tick} are said otherwise than they are written")
@@ -186,53 +181,14 @@ class PacketLaws:
         if said is None or said.tick < tick:
             self._owed.setdefault((client, tick))
         elif isinstance(said, Go):
-            known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False, said.branch))
+            known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False))
 
     def answers(self, done: Done, raw: bytes) -> None:
         """A lockstep client's answer to a tick is one; a process that takes another's place answers for itself."""
-        said = self._dones.setdefault((done.name, done.boot, done.branch, done.tick), raw)
+        said = self._dones.setdefault((done.name, done.boot, done.tick), raw)
         hold(said == raw, f"{done.name} has two Dones of {done.tick}")
-        if done.tick > self.closed and done.branch == self._branch:
+        if done.tick > self.closed:
             self._answered.setdefault(done.tick, {})[done.name] = done.packets
-
-    # --- a machine is lost -------------------------------------------------------------------------------------------
-
-    def lose(self, journal: Sequence[bytes], captured: int) -> None:
-        """Only these records of the vHub are left, and the capture up to a tick: what it wrote and said is less."""
-        self.closed, self._sequences, self._samples, self._reached = -1, {}, {}, {}
-        self._written = {0: encode(Deliveries(0, []))}
-        for raw in journal:
-            record = decode_any(HubRecord, raw)
-            if isinstance(record, TickRecord):
-                self._answered[record.tick] = dict(record.admitted)
-                self.closes(record, decode(Commit, record.commit).digest)
-        self._answered.clear()
-        self._received = {tick: told for tick, told in self._received.items() if tick <= self.closed}
-        self._owed = {key: keys for key, keys in self._owed.items() if key[1] <= self.closed}
-        for state, _ in fold(self._deployment, journal):
-            last = state
-        for client, known in self._downlinks.items():
-            number = last.members[client].downlink if client in last.members else 0
-            self._downlinks[client] = {each: raw for each, raw in known.items() if each <= number}
-        self._go_ticks.clear()
-        self._samples = {tick: samples for tick, samples in self._samples.items() if tick > captured}
-        self._fates = {key: told for key, told in self._fates.items() if told[0] <= captured}
-        self._name(self._branch)
-
-    def branch(self, number: int) -> None:
-        """What is said from now on names this branch; what was said and is not written any more is void."""
-        self._branch = number
-        self._answered.clear()
-        self.said = {tick: raw for tick, raw in self.said.items() if tick in self._written}
-        self._delivered = {key: tick for key, tick in self._delivered.items() if tick in self._written}
-        self._name(number)
-
-    def _name(self, branch: int) -> None:
-        for known in (self.said, self._written):
-            known.update({tick: retag(Deliveries, raw, branch) for tick, raw in known.items()})
-        for downlinks in self._downlinks.values():
-            named = {number: decode_any(Go | Down, raw) for number, raw in downlinks.items()}
-            downlinks.update({number: encode(replace(down, branch=branch)) for number, down in named.items()})
 
     # --- account -----------------------------------------------------------------------------------------------------
 

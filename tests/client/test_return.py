@@ -15,7 +15,7 @@ from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import ResumeGrant
-from foosim.protocol.messages import Build, ClientWelcome, Deliveries, Down, Epoch, Sent, Up
+from foosim.protocol.messages import Build, ClientWelcome, Deliveries, Down
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import HubRecord, TickRecord
 from foosim.vhub.state.resume import recall
@@ -43,27 +43,12 @@ class Storm(Air):
             published(client)
             client.hub_gone(self.now_ns)
 
-    def lose(self, tick: int) -> None:
-        """What it wrote behind a tick has not reached its machine's disk."""
-        found = [decode_any(HubRecord, raw) for raw in self.records]
-        last = next(at for at, record in enumerate(found) if isinstance(record, TickRecord) and record.tick == tick)
-        del self.records[last + 1 :]
-
-    def branch(self) -> None:
-        """Another one is started, where the run goes on as a branch."""
-        self.epoch += 1
-        self.come_back(branches=True)
-
-    def come_back(self, run: str = "run-1", branches: bool = False) -> None:
+    def come_back(self, run: str = "run-1") -> None:
         """Another one is started."""
         self.hub = HubCore("boot-2", bytes(32), self.now_ns)
         self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", run, NAME, TEXT, "fast", [])))
         self.hub.begin(recall(DEPLOYMENT, run, self.records, None, limits.DOWNLINK_KEPT_NS), self.now_ns)
-        if branches:
-            owners, at = [(robot, "n1") for robot in DEPLOYMENT.robots], self.closed()
-            epoch = Epoch(self.epoch, at, bytes(32), ["n1"], owners, [], b"", self.epoch, at)
-            self.tell(channels.EPOCH, channels.SUPERVISOR, encode(epoch))
-        self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", "boot-2", self.epoch if branches else 0)))
+        self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", "boot-2", 0)))
         self.tick = self.closed()
 
     def settle(self, *clients: ClientCore) -> None:
@@ -259,75 +244,19 @@ def test_a_welcome_that_nobody_asked_for_changes_nothing() -> None:
     assert ear.welcome is before and not [m for m in published(ear) if m.channel.plane is Plane.RADIO]
 
 
-def payloads(ear: ClientCore) -> list[int]:
-    """What has arrived and is taken now."""
-    taken = [int(packet.payload) for packet in ear.arrivals]
-    ear.arrivals.clear()
-    return taken
-
-
-@pytest.mark.parametrize("late", [0, 12])
-def test_a_client_goes_on_in_a_branch_from_its_tick(late: int) -> None:
-    """Each packet once in the branch, both ways, also what the branch said before the client was back."""
-    air = Storm()
-    air.start()
-    ear = air.enter("ear", 0)
-    got: list[int] = []
-    for tick in range(24):
-        air.carry(ear)
-        ear.send(packets_of(tick))
-        air.carry(ear)
-        air.close()
-        got += payloads(ear) if tick < 12 else []
-    air.carry(ear)
-    assert got == [0, 5, 10] and [int(packet.payload) for packet in ear.arrivals] == [15, 20]
-    air.settle(ear)
-    air.lose(14)
-    air.die([ear])
-    ear.send(packets_of(98))
-    air.branch()
-    state = air.hub.state
-    assert state is not None and (state.closed, state.branch, ear.branch) == (14, 2, 0)
-    recorded, sent = state.members["ear"].sequence, ear.statistics().sent
-    for _ in range(late):
-        air.close()
-    air.carry(ear)
-    assert (ear.branch, ear.branch_ns) == (2, 14 * DEPLOYMENT.tick_ns)
-    assert ear.statistics().lost == sent - 2 - recorded > 0, "what was recorded behind tick 14"
-    for _ in range(24):
-        air.close()
-        air.carry(ear)
-        got += payloads(ear)
-    assert got == list(range(0, air.tick + 1, 5)), "15 and 20 of the branch, not those of before"
-    delivered = [packet for one in deliveries_of(air.records) for packet in one.packets]
-    assert [packet.sequence for packet in delivered if packet.source == "ear"] == [*range(1, recorded + 3)]
-    assert [packet.payload for packet in delivered][-2:] == [b"98", b"98"] and not ear._unrecorded
-    assert ear.statistics().missing == 0 and state.refusals == {}
-
-
-def test_what_was_said_before_a_branch_does_not_count_in_it() -> None:
+def test_the_end_of_a_run_is_heard_whatever_its_number() -> None:
+    """A vHub that has lost the end of its journal goes on counting downlinks from before those that were sent."""
     air = Storm()
     air.start()
     ear = air.enter("ear", 0)
     for _ in range(11):
         air.close()
     air.carry(ear)
-    air.lose(3)
-    air.die([ear])
-    air.branch()
-    air.carry(ear)
-    state = air.hub.state
-    assert state is not None and len(ear.arrivals) == 1 and ear.tick == 3
-    ear.receive(channels.DOWN, "ear", encode(Down(2, 5, 0, [], False)), air.now_ns)
-    ear.receive(channels.DOWN, "ear", encode(Down(2, 5, 0, [], True)), air.now_ns)
-    assert not ear.ended and ear.tick == 3 and ear.statistics().repeated == 2
-    packet = Sent(1, "red.goal", "echo", 0, b"old")
-    air.tell(channels.UP, "ear", encode(Up("ear", "one", [packet])))
-    air.close()
-    assert state.members["ear"].sequence == 0
-    air.tell(channels.UP, "ear", encode(Up("ear", "one", [packet], state.branch)))
-    air.close()
-    assert state.members["ear"].sequence == 1
+    arrived, tick = len(ear.arrivals), ear.tick
+    ear.receive(channels.DOWN, "ear", encode(Down(1, 3, 0, [], False)), air.now_ns)
+    assert (ear.ended, ear.statistics().repeated) == (False, 1)
+    ear.receive(channels.DOWN, "ear", encode(Down(1, 3, 0, [], True)), air.now_ns)
+    assert ear.ended and (len(ear.arrivals), ear.tick) == (arrived, tick)
 
 
 def test_a_late_downlink_of_a_vhub_that_is_gone_is_no_answer_to_a_join() -> None:

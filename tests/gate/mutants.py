@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tests.gate import branch, node, supervisor, vhub
+from tests.gate import node, supervisor, vhub
 from tests.gate.planting import Mutant
 
-MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS, *branch.MUTANTS)
+MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS)

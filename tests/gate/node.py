@@ -36,16 +36,6 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node goes back to an old epoch", "epochs only grow", 46)
-def _epochs_fall(planting: Planting) -> None:
-    def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
-        if self.epoch > epoch.epoch and self.name in epoch.roster:
-            self.epoch = epoch.epoch - 1
-        before(self, epoch, payload, now_ns)
-
-    before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
-
-
 @register("node does not compare bases", "a node collects parts with its own basis only", 217)
 def _any_basis(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))

@@ -9,7 +9,6 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.supervisor import core, records
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.failover import Failover
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.pacing import Pacer
@@ -174,21 +173,6 @@ def _same_epoch(planting: Planting) -> None:
         before(self, *given)
 
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
-
-
-@register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 60)
-def _volatile(planting: Planting) -> None:
-    def restore(self: Any, history: Any) -> None:
-        before(self, history)
-        self.epoch = 0
-
-    before: Any = planting.swap(RunState, "restore", restore)
-    planting.swap(Failover, "on_standing", _standing_without_epoch)
-
-
-def _standing_without_epoch(self: Any, standing: Any, now_ns: int) -> bool:
-    self._standing = self._standing or standing
-    return True
 
 
 @register("robots are not adopted", "a lost node's robots are adopted", 1)

@@ -1,4 +1,4 @@
-"""Bugs of the vHub: closing of ticks, account, deliveries, clients, fold."""
+"""Bugs of the vHub and of its clients: closing of ticks, account, deliveries, clients, fold."""
 
 from __future__ import annotations
 
@@ -189,11 +189,6 @@ def _unwritten_leave(planting: Planting) -> None:
         closing.owing = []
 
     before: Any = planting.swap(Clients, "leave_owing", leave_owing)
-
-
-@register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
-def _unsaid(planting: Planting) -> None:
-    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
 
 
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)

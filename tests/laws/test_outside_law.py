@@ -224,7 +224,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (
             channels.RESUME_STATE,
             VHUB,
-            ResumeState(VHUB, "other", "boot", FAR, FAR, 0, b"", bytes(32), [], 0, True, True),
+            ResumeState(VHUB, "other", "boot", FAR, b"", bytes(32), [], 0, True, True, ""),
         ),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
         (channels.HEARTBEAT, "n1", beat),

@@ -139,6 +139,7 @@ def test_the_frame_is_the_newest_at_or_before_the_time(captured: Captured) -> No
         assert start_of(captured.alone, at).origin.tick == tick
     deployment = load_deployment(TEXT, TABLE.name)
     last = read_branch(str(captured.alone), deployment)
+    assert read_branch(f"{captured.alone}@last", deployment) == last
     assert last.text == f"the run begins with frame 300 of {captured.alone}, at 0.6 s"
     assert last.start.origin.chain.hex() == captured.alone_run.json["digest"]["chain"]
 

@@ -261,7 +261,7 @@ def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(
     assert written < said and hub.state.closed == 5
     number = hub.state.members[RED].downlink
     (down,) = hub.said(channels.DOWN)
-    assert down == Down(number, 5, 0, [], False, 0)
+    assert down == Down(number, 5, 0, [], False)
     if is_started:
         hub.say(channels.UP, RED, Join(RED, "two", 5, []))
         assert hub.said(channels.DOWN) == [down], "it may not have heard it before"
@@ -302,14 +302,14 @@ def test_the_numbers_of_who_joins_behind_a_said_go_have_no_gap(joins: str) -> No
         hub, returns = restarted(hub), 1
         hub.say(channels.CLIENT_HELLO, RED, ClientHello(RED, boot, limits.PROTOCOL_VERSION, "", go.number - 1, returns))
     hub.say(channels.UP, RED, Join(RED, boot, 5, []))
-    assert told(hub, RED)[-1] == Down(go.number, 5, go.acknowledged, go.packets, False, 0)
+    assert told(hub, RED)[-1] == Down(go.number, 5, go.acknowledged, go.packets, False)
 
 
 def test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_unsaid() -> None:
     """It was written and not said; the next one says it when it may proceed, as it says the deliveries."""
     hub, go = left_owing()
     hub.done(BLUE, 5)
-    owed = Down(go.number, 5, go.acknowledged, go.packets, False, 0)
+    owed = Down(go.number, 5, go.acknowledged, go.packets, False)
     (at,) = (at for at, action in enumerate(hub.core.actions) if isinstance(action, Journal) and _is_of_tick(action, 5))
     assert owed in told(hub, RED)
     del hub.core.actions[at + 1 :]

@@ -1,17 +1,15 @@
-"""A vHub that goes on from a journal: what it does before it may, and what counts in a branch."""
+"""A vHub that goes on from a journal: what it does before it may."""
 
 from __future__ import annotations
 
 from typing import Final
-
-import pytest
 
 from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
-from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
+from foosim.protocol.messages import Build, ClientHello, Deliveries, Epoch, Want
 from foosim.supervisor.state import InputBuffer
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
@@ -62,9 +60,9 @@ class Waiting(Storm):
         self.hub.actions.clear()
         return taken
 
-    def begin(self, epoch: int, tick: int, branch: int, branch_tick: int) -> None:
+    def begin(self, epoch: int, tick: int) -> None:
         owners = [(robot, "n1") for robot in DEPLOYMENT.robots]
-        message = Epoch(epoch, tick, bytes(32), ["n1"], owners, [], b"", branch, branch_tick)
+        message = Epoch(epoch, tick, bytes(32), ["n1"], owners, [], b"")
         self.tell(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
     def proceed(self, epoch: int, boot: str = "boot-2") -> None:
@@ -101,12 +99,12 @@ def test_it_waits_for_the_epoch_in_which_it_may_proceed() -> None:
     air = Waiting()
     air.proceed(3)
     assert air.waits()
-    air.begin(2, CLOSED, 0, 0)
+    air.begin(2, CLOSED)
     assert air.waits()
-    air.begin(3, CLOSED, 3, CLOSED)
+    air.begin(3, CLOSED)
     assert not air.waits()
     said = [decode(Deliveries, raw) for raw in published(air.take(), channels.DELIVERIES)]
-    assert {deliveries.branch for deliveries in said} == {3} and said[0].tick <= CLOSED + 1
+    assert said[0].tick <= CLOSED + 1
 
 
 def test_the_journal_names_another_machine_only_when_its_end_is_known() -> None:
@@ -130,41 +128,24 @@ def test_the_journal_names_another_machine_only_when_its_end_is_known() -> None:
     assert not air.lost_machine()
 
 
-def test_what_is_void_counts_in_no_later_epoch() -> None:
-    """A commit that was on its way when the branch began, and a client's answer."""
+def test_a_commit_of_an_older_epoch_does_not_count() -> None:
+    """One that was on its way when the epoch began."""
     air = Waiting()
     air.take()
-    air.begin(4, CLOSED, 4, CLOSED)
+    air.begin(4, CLOSED)
     air.proceed(4)
-    air.begin(5, CLOSED + 3, 4, CLOSED)
     air.tick, air.epoch = CLOSED, 2
     air.close()
     assert air.closed() == CLOSED and air.hub.repeated > 0
     air.tick, air.epoch = CLOSED, 4
-    air.hand.hub_gone(air.now_ns)
-    air.carry(air.hand)
-    for _ in range(3):
-        air.close()
-    air.carry(air.hand)
-    assert air.hand.branch == 4 and air.hand.go is not None and (air.closed(), air.hand.go.tick) == (9, 10)
-    air.tell(channels.UP, "hand", encode(Done("hand", "one", 10, [], 0)))
-    assert air.closed() == 9
-    air.tell(channels.UP, "hand", encode(Done("hand", "one", 10, [], 4)))
-    assert air.closed() == 10
+    air.close()
+    assert air.closed() == CLOSED + 1
 
 
-def test_a_branch_from_before_what_is_closed_is_refused() -> None:
-    air = Waiting()
-    air.begin(2, CLOSED - 1, 2, CLOSED - 1)
-    assert air.hub.epoch == 1 and air.hub.state is not None and air.hub.state.branch == 0
-
-
-@pytest.mark.parametrize("branch", [0, 3])
-def test_deliveries_count_in_their_branch(branch: int) -> None:
+def test_deliveries_are_taken_once() -> None:
     inputs = InputBuffer()
-    inputs.reset(5, branch)
-    other = Deliveries(5, [], 2, 3 - branch)
-    assert not inputs.take_deliveries(other, encode(other), 5) and inputs.delivered == 4
-    own = Deliveries(5, [], 2, branch)
-    assert inputs.take_deliveries(own, encode(own), 5) and inputs.delivered == 7
-    assert decode(Deliveries, inputs.deliveries[7]) == Deliveries(7, [], 0, branch)
+    inputs.reset(5)
+    told = Deliveries(5, [], 2)
+    assert inputs.take_deliveries(told, encode(told), 5) and inputs.delivered == 7
+    assert not inputs.take_deliveries(told, encode(told), 5)
+    assert decode(Deliveries, inputs.deliveries[7]) == Deliveries(7, [], 0)

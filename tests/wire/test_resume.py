@@ -1,10 +1,12 @@
-"""A run in the background, whose launcher is killed with everything: another one goes on with it, also when both
-journals have lost their ends, as with a machine that loses its power."""
+"""A run in the background, whose launcher is killed with everything: another one goes on with it, but not when the
+vHub's journal has lost its end, as with a machine that loses its power."""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
+import shutil
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,12 +15,13 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Refused
-from foosim.launcher.plan import plan_again
+from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.run_options import RunOptions
 from foosim.protocol import channels
 from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from foosim.runtime.journal import journal_files, read_records
-from foosim.runtime.run_folder import open_run
+from foosim.runtime.run_folder import RunFolder, open_run
 from tests.wire.conftest import LONG, SLOW
 from tests.wire.test_run import last_json
 
@@ -57,7 +60,9 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
     assert folder.result() is None
     flip(folder.journals, channels.VHUB)
-    with pytest.raises(Refused, match=r"run far cannot go on: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@\d"):
+    with pytest.raises(
+        Refused, match=r"run far cannot go on: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@last"
+    ):
         plan_again(folder)
     flip(folder.journals, channels.VHUB)
     (journal,) = journal_files(folder.journals, channels.VHUB)
@@ -68,7 +73,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
     assert last_json(out)["capture"] == str(house.folder / "far.mcap")
     journal.with_suffix(".away").rename(journal)
-    tear(folder.journals, channels.VHUB, 60)
+    _ends_where_inputs_are_lost(house, folder)
     tear(folder.journals, channels.SUPERVISOR, 9)
     up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
     house.ticking(before + 100)
@@ -76,8 +81,8 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
-    told = {entry["what"]: entry["reason"] for entry in content["recoveries"]}
-    assert "supervisor" in told and re.fullmatch(r"branch from tick \d+: \d\d ticks are lost", told["vhub"])
+    recovered = [entry["what"] for entry in content["recoveries"]]
+    assert "supervisor" in recovered
     same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, BARE[3::2]).json
     assert content["digest"] == same["digest"]
     assert open_capture(house.folder / "far.mcap").about.finished
@@ -85,6 +90,27 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert verified.ticks == content["ticks"]
     code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
     assert (code, last_json(out)) == (0, content) and "run far has ended: stopped" in err
+
+
+def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
+    """Resume a run whose vHub lacks the end of its journal: it stays on the disk, and the capture begins a new one."""
+    shutil.copytree(folder.journals, house.folder / "whole")
+    tear(folder.journals, channels.VHUB, 60)
+    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    assert code == 1 and folder.result() is None and "goes on with it" not in err
+    told = re.fullmatch(
+        r".*: vhub has lost the end of its journal: it ends at tick (\d+), deliveries are known up to tick (\d+)\. "
+        r"A new run begins with the last captured frame: (.*)",
+        last_json(out)["reason"],
+    )
+    assert told is not None, err
+    words = shlex.split(told[3])
+    assert words[:3] == ["foosim-supervisor", "up", str(house.table)]
+    assert words[-2:] == ["--from", f"{house.folder / 'far.mcap'}@last"]
+    begun = make_plan(RunOptions(Path(words[2]), sets=tuple(BARE[1::2]), branch=words[-1])).start
+    assert begun is not None and 0 < begun.origin.tick <= int(told[1]) < int(told[2])
+    shutil.rmtree(folder.journals)
+    shutil.copytree(house.folder / "whole", folder.journals)
 
 
 def test_a_run_that_does_not_come_up_says_why(house: House) -> None:

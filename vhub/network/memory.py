@@ -246,7 +246,6 @@ class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_f
     sequence: int = 0
     downlink: int = 0
     active: bool = True
-    branched: int = 0
     offset: int = 0
     arrivals: tuple[tuple[str, str], ...] = ()
     called_tick: int = -1
@@ -266,5 +265,4 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
     ages: list[tuple[str, list[HeardState]]]
-    branch: tuple[int, int]
     flights: list[FlightState]

@@ -17,7 +17,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode_any
-from foosim.protocol.messages import Deliveries, Epoch, Sent
+from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric, Link
 from foosim.vhub.network.ages import Ages
 from foosim.vhub.network.memory import Age, Joining, Snapshot
@@ -53,8 +53,6 @@ class HubState:
         """What reaches robots at the last closed tick and at the next one."""
         self.final = first_tick
         """The last tick whose deliveries are final. Behind the next one they are without packets."""
-        self.branch = self.branch_tick = 0
-        """Number of the last branch, and the tick behind which it began; what is said from then on names it."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
         self.at_door: dict[str, int] = {}
@@ -74,20 +72,6 @@ class HubState:
         self._transit = InFlightLimit(len(self._endpoints))
         self._here = Here(deployment)
 
-    def turn_to(self, epoch: Epoch) -> bool:
-        """Go on in the branch that an epoch is of; False when it is the present one.
-
-        Raises Malformed when that began before the last closed tick: what is closed here never changes.
-        """
-        if epoch.branch <= self.branch:
-            return False
-        if epoch.branch_tick < self.closed:
-            raise Malformed(f"branch {epoch.branch} from tick {epoch.branch_tick}, tick {self.closed} is closed")
-        self.branch, self.branch_tick = epoch.branch, epoch.branch_tick
-        for member in self.members.values():
-            member.branched = member.downlink
-        return True
-
     # --- joining -----------------------------------------------------------------------------------------------------
 
     def join(self, joining: Joining, tick: int) -> None:
@@ -95,7 +79,7 @@ class HubState:
         known = self.members.get(joining.name)
         member = self.members[joining.name] = Member.of(joining, tick)
         if known is not None:
-            member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
+            member.sequence, member.downlink = known.sequence, known.downlink
         self.ages.joins(joining.name, member.subscriptions)
         self._here.renew(self.members)
 
@@ -198,10 +182,10 @@ class HubState:
         if self.was_final:
             assert not any(member.is_due(tick) for member in self.members.values()), f"tick {tick} asks a client"
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
-            return Deliveries(tick + 1, [], branch=self.branch)
+            return Deliveries(tick + 1, [])
         following = self._following(tick)
         self.final = tick + 1 + following
-        return Deliveries(tick + 1, deliveries, following, self.branch)
+        return Deliveries(tick + 1, deliveries, following)
 
     def close_rest(self) -> list[Flight]:
         """Judge what `close_robots` has left; return the packets whose fate is final by phase two."""
@@ -467,7 +451,6 @@ class HubState:
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "ages": self.ages.state(),
-                "branch": [self.branch, self.branch_tick],
                 "flights": [state_of(flight) for flight in self.in_flight()],
             }
         )
@@ -486,7 +469,6 @@ class HubState:
         state.fabric.restore(content.links, content.radios, content.airs, content.asked)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
-        state.branch, state.branch_tick = content.branch
         state.ages.restore(content.ages)
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")

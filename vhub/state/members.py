@@ -36,8 +36,6 @@ class Member:
         self.downlink = state.downlink
         """Number of the last message to the client."""
         self.active = state.active
-        self.branched = state.branched
-        """The number of that message when the last branch began: what was said then behind it is void."""
         self.offset = state.offset
         self.arrivals = state.arrivals
         self.called_tick = state.called_tick

@@ -220,7 +220,6 @@ class Fold:
                 self.inputs = record
             elif isinstance(record, Epoch):
                 self.epoch = raw
-                self.state.turn_to(record)
             elif isinstance(record, AbsencesRecord):
                 self.absences = record
             else:

@@ -19,7 +19,6 @@ from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.network.packet import received
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.commits import Committed
-from foosim.vhub.state.downlinks import retag
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import (
     NONE_AWAY,
@@ -115,7 +114,6 @@ def recall(
         past.kept = list(_untold(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     past.absences = fold.absences
-    _name_branch(past)
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)
     if frame is not None:
@@ -132,18 +130,6 @@ def _untold(
             yield RecordEpoch(record)
         elif isinstance(record, TickRecord) and record.tick in closings:
             yield RecordClosing(closings[record.tick])
-
-
-def _name_branch(past: Past) -> None:
-    """What was said before the last branch is said in it from then on."""
-    branch = past.state.branch
-    if not branch:
-        return
-    past.sent = {tick: retag(Deliveries, payload, branch) for tick, payload in past.sent.items()}
-    if past.published:
-        past.published = retag(Deliveries, past.published, branch)
-    for client, said in past.downlinks.items():
-        past.downlinks[client] = [(number, retag(Down, payload, branch)) for number, payload in said]
 
 
 def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:
@@ -171,14 +157,14 @@ def _deliveries_of(state: HubState) -> tuple[int, bytes]:
     """Return the deliveries that are behind a state, as they were published where they were."""
     tick = state.closed + 1
     following = 0 if state.was_final else state.final - tick
-    return tick, encode(Deliveries(tick, state.deliveries[tick], following, state.branch))
+    return tick, encode(Deliveries(tick, state.deliveries[tick], following))
 
 
 def _remember(past: Past, tick: int, payload: bytes) -> None:
     """Note the deliveries of a tick, and that those behind it are final where they are."""
     past.sent[tick] = past.sent.get(tick, payload)
     for following in range(tick + 1, past.state.final + 1):
-        past.sent.setdefault(following, encode(Deliveries(following, [], branch=past.state.branch)))
+        past.sent.setdefault(following, encode(Deliveries(following, [])))
     past.sent.pop(tick - limits.KEPT_TICKS, None)
     if not past.state.was_final:
         past.published = payload
@@ -191,7 +177,7 @@ def _number(past: Past, folded: Folded) -> None:
         member = members[name]
         if name in owing or not member.is_due(tick):
             packets = received(folded.released.get(name, []))
-            down = Down(member.downlink, tick, member.sequence, packets, False, folded.state.branch)
+            down = Down(member.downlink, tick, member.sequence, packets, False)
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
 
 
