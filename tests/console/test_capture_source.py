@@ -109,6 +109,11 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
             assert heard.of("overlay")[-1]["tick"] == 230
             assert heard.of("watched")[-1]["link"] == ["camera", "player-red"]
             assert heard.of("readings")[-1]["points"]
+            assert heard.of("links")[-1]["drops"], "it was sought: those of the window"
+            told = len(heard.of("links"))
+            source.want(Wanted(1, 50.0, frozenset(), (("camera", "player-blue"),), ()))
+            await heard.until(lambda: len(heard.of("links")) > told)
+            assert heard.of("links")[-1]["drops"] == [], "told already"
             name, unit, points = await source.history(Curve("a", status="score.red"))
             assert name == "score.red" and unit == "" and len(points) > 100
         between.close()

@@ -100,6 +100,7 @@ export class View3D {
       if (world && this.options.radio && document.visibilityState === "visible") {
         this.radio.flash(world, drops, performance.now());
         this.stat.flashes += drops.length;
+        this.stat.flashing = this.radio.flashes.length;
       }
       this.touch();
     });
