@@ -6,7 +6,7 @@ refuses something names the limit it broke.
 
 from typing import Final
 
-PROTOCOL_VERSION: Final = 1
+PROTOCOL_VERSION: Final = 2
 """Version of the messages; a peer with another one is refused at the handshake, both versions named."""
 
 NAME_LENGTH_MAX: Final = 32

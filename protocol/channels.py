@@ -97,8 +97,8 @@ REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the nam
 READY: Final = _simulation(
     "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
 )
-RESUME_STATE: Final = _simulation("standing", hub_messages.ResumeState, "vhub", "supervisor", "with each ready")
-RESUME_GRANT: Final = _simulation("proceed", hub_messages.ResumeGrant, "supervisor", "the named one", "an answer")
+RESUME_STATE: Final = _simulation("resume_state", hub_messages.ResumeState, "vhub", "supervisor", "with each ready")
+RESUME_GRANT: Final = _simulation("resume_grant", hub_messages.ResumeGrant, "supervisor", "the named one", "an answer")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)

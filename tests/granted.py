@@ -24,7 +24,7 @@ def may_put(identity: str, key: str) -> bool:
             of_node = ("hello", "fetch", "ready", "part", "samples", "want", "heartbeat", "farewell")
             return key in {f"{S}/{what}/{name}" for what in of_node}
         case "vhub":
-            of_vhub = ("hello", "fetch", "ready", "standing", "want", "heartbeat", "farewell")
+            of_vhub = ("hello", "fetch", "ready", "resume_state", "want", "heartbeat", "farewell")
             return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
             asks = {f"{P}/request", f"{S}/request", f"{S}/inquiry", f"{S}/fetch"}
@@ -46,7 +46,7 @@ def may_hear(identity: str, key: str) -> bool:
             return key in to_all | to_it or key.startswith((f"{S}/part/", f"{S}/want/"))
         case "vhub":
             to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "watched", "end")}
-            to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "proceed", "commit")}
+            to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "resume_grant", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":
             to_it = {f"{S}/answer", f"{S}/piece", f"{P}/answer"}

@@ -315,8 +315,8 @@ def test_an_epoch_of_before_is_no_answer_to_a_supervisor_that_was_started_again(
     losses: list[int] = []
 
     def watch(traced: Traced) -> None:
-        is_standing = (traced.process, traced.what, traced.channel) == (channels.VHUB, "publish", "standing")
-        if is_standing and systems and systems[0].supervisor.state.is_resuming and not losses:
+        is_resuming = (traced.process, traced.what, traced.channel) == (channels.VHUB, "publish", "resume_state")
+        if is_resuming and systems and systems[0].supervisor.state.is_resuming and not losses:
             losses.append(traced.now_ns)
             bus, epoch = systems[0].bus, systems[0].supervisor.state.epoch_payload
             bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, epoch, bus.now_ns)

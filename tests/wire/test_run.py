@@ -108,9 +108,9 @@ def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None
     assert code == 3 and "no node 'rde' is declared; declared are blue, red, nearest is red" in err
     code, err = node("red", "--world", "chess")
     assert code == 3 and "world chess, this is table" in err
-    version_2 = "from foosim.common import limits; limits.PROTOCOL_VERSION = 2"
+    version_2 = "from foosim.common import limits; limits.PROTOCOL_VERSION = 1"
     code, err = altered_node(house, version_2, "red", address)
-    assert code == 3 and "protocol version 2, this is 1" in err
+    assert code == 3 and "protocol version 1, this is 2" in err
 
 
 def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
