@@ -251,10 +251,19 @@ def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.Monke
     """While it is stopped there is no timer, which is a thread of faulthandler's: so none is over when it goes on."""
     monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
     counts, told = os.pipe()
+    cancel = faulthandler.cancel_dump_traceback_later
+
+    def cancel_and_see_it_gone() -> None:
+        """The thread ends after it has let go of what `cancel` waits for; a stop in between keeps it."""
+        cancel()
+        while threads_of(os.getpid()) > 2:
+            os.sched_yield()
 
     def stops() -> None:
         before = threads_of(os.getpid())
+        monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel_and_see_it_gone)
         signal.raise_signal(signal.SIGTSTP)
+        monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel)
         os.write(told, bytes([before, threads_of(os.getpid())]))
 
     Hangs.how = stops
