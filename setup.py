@@ -13,6 +13,7 @@ import re
 import shutil
 import sys
 import time
+import tomllib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -121,25 +122,7 @@ only where compiled modules derive from its classes or read them, since of an in
 up by name. All are in one library, since they call each other. What starts a run, what people are told, and the types
 of msgspec, which are compiled already, are left out.
 """
-PACKAGES: Final = (
-    "analysis",
-    "capture",
-    "cli",
-    "client",
-    "common",
-    "console",
-    "deployment",
-    "launcher",
-    "node",
-    "players",
-    "protocol",
-    "rehearsal",
-    "replay",
-    "runtime",
-    "supervisor",
-    "vhub",
-    "world",
-)
+PACKAGES: Final = tuple(tomllib.loads(Path("pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"].values())
 TYPED: Final = Path("build", "typed")
 """Where the folders stand under the name that they are imported by, for mypyc."""
 MADE: Final = Path("build", "c")

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import threading
 import time
+import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -33,25 +34,8 @@ from foosim.rehearsal.system import Settings
 from foosim.replay.what_if import what_if
 from foosim.world.frame import Frame
 
-PACKAGES: Final = (
-    "analysis",
-    "capture",
-    "cli",
-    "client",
-    "common",
-    "console",
-    "deployment",
-    "launcher",
-    "node",
-    "players",
-    "protocol",
-    "rehearsal",
-    "replay",
-    "runtime",
-    "supervisor",
-    "vhub",
-    "world",
-)
+PYPROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PACKAGES: Final = tuple(PYPROJECT["tool"]["setuptools"]["package-dir"].values())
 LEAST: Final = 0.3
 """Per cent of a run: a module that has less in each of them is not shown."""
 WARM_TICKS: Final = 50

@@ -12,6 +12,7 @@ import json
 import re
 import shlex
 import sys
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -33,25 +34,8 @@ ROOT: Final = Path(__file__).parents[1]
 FRONT: Final = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
 PAGES: Final = [*FRONT, *sorted((ROOT / "docs").rglob("*.md"))]
 FIRST_PLAYER: Final = ROOT / "docs" / "tutorials" / "first_player.md"
-PACKAGES: Final = (
-    "analysis",
-    "capture",
-    "cli",
-    "client",
-    "common",
-    "console",
-    "deployment",
-    "launcher",
-    "node",
-    "players",
-    "protocol",
-    "rehearsal",
-    "replay",
-    "runtime",
-    "supervisor",
-    "vhub",
-    "world",
-)
+PYPROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PACKAGES: Final = tuple(PYPROJECT["tool"]["setuptools"]["package-dir"].values())
 OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only", "--slow-start", "--load"}
 """Options that belong to no command of ours, or to all."""
 
@@ -210,7 +194,7 @@ WAITS = ("acquire", "communicate", "join", "poll", "result", "select", "settimeo
 def test_no_wait_has_its_number_in_its_call() -> None:
     """It would be in no table: a constant with a name is, whose end is its unit."""
     found = []
-    for path in sorted(path for package in (*PACKAGES, "console") for path in (ROOT / package).rglob("*.py")):
+    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         for call in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)):
             named = [k.value for k in call.keywords if re.search(r"timeout|_n?s$|_ms$", k.arg or "")]
             is_wait = isinstance(call.func, ast.Attribute) and call.func.attr in WAITS

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import venv
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,25 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = (
-    "analysis",
-    "capture",
-    "cli",
-    "client",
-    "common",
-    "console",
-    "deployment",
-    "launcher",
-    "node",
-    "players",
-    "protocol",
-    "rehearsal",
-    "replay",
-    "runtime",
-    "supervisor",
-    "vhub",
-    "world",
-)
+PACKAGES = tuple(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"].values())
 INTERPRETED = Path(sys.executable).parent
 HAS_COMPILER = any(map(shutil.which, ("cc", "gcc", "clang")))
 AIR = "radios: {air: {preset: wifi_5_indoor}}, robots: {'*': [air]}, places: {'*': [0 m, 0 m, 1 m]}"

@@ -1,8 +1,8 @@
 """Bugs planted in the cores, one rule switched off each: the swarm must find every one of them.
 
-That a thousand seeds find nothing proves something only if they find these. To add one: a function in `node`,
-`supervisor`, `vhub` or `branch` that swaps what has to be swapped, with the rule that it breaks and the seed that finds
-it.
+A thousand seeds without a finding prove something only if they find these. To add one: a function in `node`,
+`supervisor` or `vhub` that swaps what has to be swapped, with the rule that it breaks and the seed that finds it. Bugs
+that no early seed finds are in `direct`, each with the test that does.
 """
 
 from __future__ import annotations

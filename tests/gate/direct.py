@@ -1,0 +1,114 @@
+"""Planted bugs that the swarm meets too rarely: a test of the cores finds each of them, directly.
+
+As a plugin of pytest, `-p tests.gate.direct`, this module plants the bug that FOOSIM_PLANTED_BUG names. To add one:
+as in `tests.gate.mutants`, with the id of the test that fails with the bug in place of a seed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from foosim.client.core import ClientCore
+from foosim.node.core import NodeCore
+from foosim.supervisor.failover import Failover
+from foosim.supervisor.state import RunState
+from foosim.vhub.sessions import Sessions
+from tests.gate.planting import Planting
+
+ROOT: Final = Path(__file__).parents[2]
+PLANTED: Final = "FOOSIM_PLANTED_BUG"
+"""The variable of the environment with the name of the bug."""
+
+
+@dataclass(frozen=True, slots=True)
+class DirectMutant:
+    """A planted bug: the rule that is switched off, and the id of the test that finds it."""
+
+    name: str
+    rule: str
+    test: str
+    plant: Callable[[Planting], None]
+
+    def run(self) -> subprocess.CompletedProcess[str]:
+        """Run the test with the bug planted, in a process of its own."""
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "-p", __name__, self.test]
+        environment = {**os.environ, PLANTED: self.name}
+        environment.pop("PYTEST_ADDOPTS", None)
+        return subprocess.run(
+            command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+        )
+
+
+def pytest_configure(config: Any) -> None:
+    """Plant the bug that the environment names."""
+    name = os.environ[PLANTED]
+    next(mutant for mutant in DIRECT if mutant.name == name).plant(Planting())
+
+
+def _epochs_fall(planting: Planting) -> None:
+    def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
+        if self.epoch > epoch.epoch and self.name in epoch.roster:
+            self.epoch = epoch.epoch - 1
+        before(self, epoch, payload, now_ns)
+
+    before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
+
+
+def _volatile(planting: Planting) -> None:
+    def restore(self: Any, history: Any) -> None:
+        before(self, history)
+        self.epoch = 0
+
+    def on_standing(self: Any, standing: Any, now_ns: int) -> bool:
+        self._standing = self._standing or standing
+        return True
+
+    before: Any = planting.swap(RunState, "restore", restore)
+    planting.swap(Failover, "on_standing", on_standing)
+
+
+def _unsent(planting: Planting) -> None:
+    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
+
+
+def _any_welcome(planting: Planting) -> None:
+    def on_welcome(self: Any, welcome: Any) -> None:
+        before(self, replace(welcome, returns=self._gone))
+
+    before: Any = planting.swap(ClientCore, "_on_welcome", on_welcome)
+
+
+DIRECT: Final = (
+    DirectMutant(
+        "node goes back to an old epoch",
+        "epochs only grow",
+        "tests/laws/test_hub_recovery_law.py::test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused",
+        _epochs_fall,
+    ),
+    DirectMutant(
+        "epochs are volatile",
+        "a restarted supervisor continues with a greater epoch",
+        "tests/laws/test_recovery_law.py::test_robots_go_back_also_when_the_supervisor_ends_amid_an_epoch[1-2]",
+        _volatile,
+    ),
+    DirectMutant(
+        "an unanswered Go is not sent again",
+        "the Go of a player that left owing is sent again after the record",
+        "tests/vhub/test_door.py::test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_unsaid",
+        _unsent,
+    ),
+    DirectMutant(
+        "client takes any welcome",
+        "a welcome answers one hello",
+        "tests/client/test_return.py::test_the_answer_to_a_hello_of_before_is_none",
+        _any_welcome,
+    ),
+)
