@@ -23,7 +23,7 @@ from foosim.node.inputs import Inputs, check_near
 from foosim.node.tick import Stepper, Work, moved_counters
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
+from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.handshake import Member
@@ -103,7 +103,7 @@ class NodeCore:
         self._held = Held()
         self._counters: list[int] = []
         self._barrier: Barrier | None = None
-        self._basis = b""
+        self._input_digest = b""
         self._sensed = False
         self._patience = Patience(now_ns)
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
@@ -162,7 +162,7 @@ class NodeCore:
             epoch=self.epoch,
             tick=work.tick + 1,
             node=self.name,
-            basis=self._basis,
+            input_digest=self._input_digest,
             solved=list(work.solved),
             solver_values=values[slots.solver(work.solved)].tobytes(),
             owner_values=values[slots.owner(self.name)].tobytes(),
@@ -265,7 +265,7 @@ class NodeCore:
         term = self._term
         share: Share = term.assignment.shares(numbers)[self.name]
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers)
-        self._basis = basis_of(frame.digest, edits, raw)
+        self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         entities = layout.entities
         islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
@@ -293,9 +293,9 @@ class NodeCore:
         return True
 
     def _take_part(self, barrier: Barrier, part: Part) -> None:
-        if part.basis != self._basis:
+        if part.input_digest != self._input_digest:
             self._diverged += 1
-            self.actions.append(Say("error", f"part {part.tick} of {part.node} has another basis than mine: held"))
+            self.actions.append(Say("error", f"part {part.tick} of {part.node} has another input digest: kept"))
             return
         try:
             barrier.add(part)

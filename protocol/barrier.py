@@ -1,7 +1,7 @@
 """Collecting the parts of one tick into the next frame: the node's last step and the supervisor's commit.
 
-A part counts if its epoch, its sender and its basis are one's own, and the parts together must hold each slot exactly
-once. Two parts that claim one slot are a bug of ours on the sender's side: both are named, neither is merged silently.
+A part is accepted if its epoch, sender and input digest match. The parts together must hold each slot exactly once. Two
+parts that claim one slot are a bug on the sender's side: both are named, and neither is merged.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def edits_content(edits: Sequence[Edit]) -> bytes:
     return encode(list(edits)) if edits else _NO_EDITS
 
 
-def basis_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> bytes:
+def input_digest_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> bytes:
     """Return the BLAKE2b of what tick k is computed from: D(k), the content of order k, the deliveries' bytes."""
     hasher = blake2b(digest, digest_size=32)
     content = edits_content(edits)

@@ -62,7 +62,7 @@ class Part(Message, frozen=True):
     epoch: Counter
     tick: Counter
     node: Name
-    basis: Digest
+    input_digest: Digest
     solved: Annotated[list[Counter], Meta(max_length=limits.ENTITIES_MAX)]
     solver_values: Numbers
     owner_values: Numbers

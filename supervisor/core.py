@@ -16,7 +16,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
+from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.hub_messages import ResumeState
@@ -305,11 +305,11 @@ class SupervisorCore:
         layout = layout_after(state.frame.layout, edits)
         slots = self._slots if layout is state.frame.layout else Slots(layout, state.owners)
         barrier = Barrier(tick + 1, state.members, slots)
-        basis = basis_of(state.frame.digest, edits, deliveries)
-        diverged = [part.node for part in parts if part.basis != basis]
+        digest = input_digest_of(state.frame.digest, edits, deliveries)
+        diverged = [part.node for part in parts if part.input_digest != digest]
         if diverged:
             self._diverged += len(diverged)
-            why = f"has diverged: its part {tick + 1} has another basis"
+            why = f"has diverged: its part {tick + 1} has another input digest"
             if len(diverged) == len(parts):
                 self.fail("; ".join(f"node {node} {why}" for node in diverged))
             else:

@@ -1,4 +1,4 @@
-"""The frame: the complete state of the world at a tick boundary, its digest, and the basis of the next.
+"""The frame: the complete state of the world at a tick boundary, and its digest.
 
 A frame is float64 numbers in the layout's order and the bounded outboxes of its robots. Nothing that matters lives
 elsewhere. Frames are values: what changes one makes another.

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.barrier import basis_of, edits_content
+from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
 from foosim.rehearsal.bus import Traced
@@ -115,7 +115,7 @@ class Laws:
                 self._chosen[robot] = record.owners[robot]
 
     def _commits_one(self, raw: bytes, commit: Commit) -> None:
-        """Law 3 and 4: one more tick, of the present epoch, from one part of each node in it, all from one basis."""
+        """Laws 3 and 4: the next tick, of the current epoch, from one part of each member, with one input digest."""
         tick, epoch = commit.tick, commit.epoch
         hold(tick == self.committed + 1, f"commit {tick} after {self.committed}")
         hold(epoch == self.epoch, f"commit {tick} of epoch {epoch} in epoch {self.epoch}")
@@ -129,9 +129,9 @@ class Laws:
         parts = self._parts.get((epoch, tick), {})
         hold(sorted(parts) == self._rosters[epoch], f"commit {tick}: parts of {sorted(parts)} in epoch {epoch}")
         hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that nobody ordered")
-        basis = self._basis(tick, commit.edits)
-        strange = [node for node, (_, part) in parts.items() if part.basis != basis]
-        hold(not strange, f"commit {tick} is made of parts of {strange}, from another basis")
+        digest = self._input_digest(tick, commit.edits)
+        strange = [node for node, (_, part) in parts.items() if part.input_digest != digest]
+        hold(not strange, f"commit {tick} is made of parts of {strange}, with another input digest")
         self._check_ahead(tick + 1)
         solved = sorted(index for _, part in parts.values() for index in part.solved)
         hold(solved == list(range(len(solved))), f"tick {tick}: entities {solved} are solved")
@@ -146,17 +146,18 @@ class Laws:
         if commit.recovered:
             self._told[commit.tick] = commit.recovered
 
-    def _basis(self, tick: int, edits: list[Edit]) -> bytes:
+    def _input_digest(self, tick: int, edits: list[Edit]) -> bytes:
         """Return what all parts of frame `tick` have to start from."""
         delivered = self.packets.said.get(tick - 1)
         hold(delivered is not None, f"frame {tick} before the deliveries of the tick before")
-        return basis_of(self._digests[tick - 1], edits, delivered or b"")
+        return input_digest_of(self._digests[tick - 1], edits, delivered or b"")
 
     def _check_ahead(self, tick: int) -> None:
         """Whoever runs ahead of the commits has the frame that is committed then, unless its memory was changed."""
         for each in [parts for (_, ahead), parts in self._parts.items() if ahead == tick]:
             for node, (_, part) in each.items():
-                right = node in self.flipped or part.basis == self._basis(tick, self._ordered.get(tick - 1, []))
+                expected = self._input_digest(tick, self._ordered.get(tick - 1, []))
+                right = node in self.flipped or part.input_digest == expected
                 hold(right, f"{node} goes on from another frame {tick - 1} than the committed one")
 
     def _begins(self, epoch: Epoch, raw: bytes) -> None:

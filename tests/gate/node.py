@@ -36,8 +36,8 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node does not compare bases", "a node collects parts with its own basis only", 217)
-def _any_basis(planting: Planting) -> None:
+@register("node does not compare input digests", "a node collects parts with its own input digest only", 217)
+def _any_digest(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
 

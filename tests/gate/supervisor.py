@@ -20,8 +20,8 @@ from tests.gate.planting import Mutant, Planting, Register
 register = Register()
 
 
-class _AnyBasis(bytes):
-    """Equals every basis."""
+class _AnyDigest(bytes):
+    """Equals every digest."""
 
     __slots__ = ()
 
@@ -43,10 +43,10 @@ def _old_epochs(planting: Planting) -> None:
     planting.swap(SupervisorCore, "_on_part", on_part)
 
 
-@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 4)
-def _any_basis(planting: Planting) -> None:
+@register("supervisor does not compare input digests", "a part counts if its input digest is the supervisor's", 4)
+def _any_digest(planting: Planting) -> None:
     before: Any = planting.swap(
-        core, "basis_of", lambda digest, edits, delivered: _AnyBasis(before(digest, edits, delivered))
+        core, "input_digest_of", lambda digest, edits, delivered: _AnyDigest(before(digest, edits, delivered))
     )
 
 

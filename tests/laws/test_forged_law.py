@@ -105,14 +105,14 @@ def test_a_spoiled_copy_that_comes_first_is_refused_and_the_true_one_counts(dist
     assert sum(counted.values()) >= len(said) or what == "samples of another frame", "that one leads to nothing"
 
 
-def test_a_part_with_another_basis_is_a_node_that_has_diverged_and_is_lost(disturbed: Disturbed) -> None:
+def test_a_part_with_another_input_digest_is_a_node_that_has_diverged_and_is_lost(disturbed: Disturbed) -> None:
     """It is a bug, never repaired silently: the run goes on without the node, which comes back as a newcomer."""
 
     def speak_first(traced: Traced) -> None:
         if (traced.what, traced.channel, traced.process) == ("publish", channels.PART.name, "n2"):
             part = decode(Part, traced.payload)
             if part.tick == 50:
-                forged = encode(replace(part, basis=bytes(32)))
+                forged = encode(replace(part, input_digest=bytes(32)))
                 disturbed.system.bus.put(NOBODY, channels.PART, "n2", forged, traced.now_ns)
 
     disturbed.settings.observer = speak_first
@@ -120,7 +120,7 @@ def test_a_part_with_another_basis_is_a_node_that_has_diverged_and_is_lost(distu
     assert result.digests == disturbed.undisturbed()[0].digests and not result.json["failed"]
     lost, *_ = result.json["recoveries"]
     assert (lost["what"], lost["name"], lost["tick"], lost["epoch"]) == ("node", "n2", 49, 2)
-    assert lost["reason"] == "has diverged: its part 50 has another basis"
+    assert lost["reason"] == "has diverged: its part 50 has another input digest"
 
 
 # --- well-formed messages --------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The frame is the truth: its digest sees every bit, tick, layout and outbox; bases and chains are exact functions."""
+"""A frame's digest depends on every bit, tick, layout and outbox; input digests and chains are exact functions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
-from foosim.protocol.barrier import basis_of, edits_content
+from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Order
 from foosim.world.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
@@ -131,27 +131,27 @@ def test_numbers_have_names() -> None:
     assert start.at("ball", "wait_ticks") == DEPLOYMENT.table.rules.kickoff_delay_ns // DEPLOYMENT.tick_ns
 
 
-# --- basis and chain -------------------------------------------------------------------------------------------------
+# --- input digest and chain --------------------------------------------------------------------------------------------
 
 
-def test_a_basis_is_of_digest_order_and_deliveries() -> None:
+def test_an_input_digest_is_of_digest_order_and_deliveries() -> None:
     push = [Push("ball", (0.0, 0.01, 0.0))]
-    one = basis_of(frame().digest, push, b"deliveries")
-    assert one == basis_of(frame().digest, list(push), b"deliveries")
+    one = input_digest_of(frame().digest, push, b"deliveries")
+    assert one == input_digest_of(frame().digest, list(push), b"deliveries")
     others = [
-        basis_of(frame(tick=6).digest, push, b"deliveries"),
-        basis_of(frame().digest, [], b"deliveries"),
-        basis_of(frame().digest, [Push("ball", (0.0, 0.02, 0.0))], b"deliveries"),
-        basis_of(frame().digest, [*push, *push], b"deliveries"),
-        basis_of(frame().digest, push, b"Deliveries"),
-        basis_of(frame().digest, push, b""),
+        input_digest_of(frame(tick=6).digest, push, b"deliveries"),
+        input_digest_of(frame().digest, [], b"deliveries"),
+        input_digest_of(frame().digest, [Push("ball", (0.0, 0.02, 0.0))], b"deliveries"),
+        input_digest_of(frame().digest, [*push, *push], b"deliveries"),
+        input_digest_of(frame().digest, push, b"Deliveries"),
+        input_digest_of(frame().digest, push, b""),
     ]
     assert len({one, *others}) == 7
 
 
-def test_where_an_order_ends_and_deliveries_begin_is_part_of_the_basis() -> None:
+def test_where_an_order_ends_and_deliveries_begin_is_part_of_the_input_digest() -> None:
     content = edits_content([Remove("b")])
-    assert basis_of(bytes(32), [], content) != basis_of(bytes(32), [Remove("b")], b"")
+    assert input_digest_of(bytes(32), [], content) != input_digest_of(bytes(32), [Remove("b")], b"")
 
 
 def test_the_content_of_an_order_has_no_epoch() -> None:
