@@ -131,7 +131,7 @@ def test_numbers_have_names() -> None:
     assert start.at("ball", "wait_ticks") == DEPLOYMENT.table.rules.kickoff_delay_ns // DEPLOYMENT.tick_ns
 
 
-# --- input digest and chain --------------------------------------------------------------------------------------------
+# --- input digest and chain -------------------------------------------------------------------------------------------
 
 
 def test_an_input_digest_is_of_digest_order_and_deliveries() -> None:
