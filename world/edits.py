@@ -153,7 +153,7 @@ def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None
 def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
     """Mark a robot as out of service or back in it; what it wants from now on is to be where it is, or to stand."""
     numbers[robot.offsets["down"]] = float(is_down)
-    wanted = robot.offsets.get("wanted")
-    if wanted is not None:
+    set_point = robot.offsets.get("set_point")
+    if set_point is not None:
         position = robot.offsets.get("joint_positions")
-        numbers[wanted : wanted + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]
+        numbers[set_point : set_point + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]

@@ -29,7 +29,7 @@ _SOLVER_FIELDS: Final[Mapping[str, tuple[tuple[str, int], ...]]] = {
         ("quarantined", 1),
         ("down", 1),
         _CONTACTS,
-        ("wanted", 2),
+        ("set_point", 2),
         ("refused", 1),
     ),
     "camera": (("down", 1), ("refused", 1)),
@@ -43,18 +43,18 @@ _SOLVER_FIELDS: Final[Mapping[str, tuple[tuple[str, int], ...]]] = {
         ("blocked", 1),
         ("quarantined", 1),
         ("down", 1),
-        ("wanted", 2),
+        ("set_point", 2),
         ("charge", 1),
         ("refused", 1),
     ),
     "station": (("down", 1), ("refused", 1)),
 }
 """The slots that the solver writes, by model. `contacts` is (count, impulse in N s, last substep or -1) of the tick;
-`wanted` is the actuator's memory (slide in m, spin in rad); `refused` counts packets that the robot refused;
-`still_ticks`, `out_ticks` and `wait_ticks` are the memory of the rules about dead balls, balls off the table and
-kick-off. A rover's `wanted` and `wheel_speeds` are those of the left and right wheel's rim (m/s), `wheel_travel` is how
-far they have turned (m), `blocked` whether it was kept from where it went in the tick, `charge` its energy in J.
-Orientations are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
+`set_point` is the actuator's (a rod's slide in m and spin in rad; rim speeds of a rover's left and right wheel in m/s);
+`refused` counts packets that the robot refused; `still_ticks`, `out_ticks` and `wait_ticks` are the memory of the rules
+about dead balls, balls off the table and kick-off. `wheel_speeds` are rim speeds (m/s), `wheel_travel` how far the
+wheels have turned (m), `blocked` whether an obstacle stopped it in the tick, `charge` its energy in J. Orientations
+are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
 
 BODIES: Final = frozenset({"ball", "rod", "rover"})
 ROBOTS: Final = frozenset({"rod", "camera", "rover", "station"})

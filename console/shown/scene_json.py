@@ -35,8 +35,8 @@ UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "wait_ticks": ("ticks",),
 }
 """Of a field's numbers; the last one stands for all behind it. What is not here has no unit."""
-WANTED_UNITS: Final[Mapping[str, tuple[str, ...]]] = {"rod": ("m", "rad"), "rover": ("m/s",)}
-"""Of `wanted`, which is the memory of an actuator, by model."""
+SET_POINT_UNITS: Final[Mapping[str, tuple[str, ...]]] = {"rod": ("m", "rad"), "rover": ("m/s",)}
+"""Units of `set_point`, by model."""
 READING_UNITS: Final[Mapping[str, str]] = {
     "encoder": "m, rad",
     "ball": "m",
@@ -126,7 +126,7 @@ def _fields(layout: Layout) -> list[dict[str, Any]]:
     for entity in layout.entities:
         ends = [*list(entity.offsets.values())[1:], entity.stop]
         for (name, start), end in zip(entity.offsets.items(), ends, strict=True):
-            units = WANTED_UNITS.get(entity.model, ("",)) if name == "wanted" else UNITS.get(name, ("",))
+            units = SET_POINT_UNITS.get(entity.model, ("",)) if name == "set_point" else UNITS.get(name, ("",))
             for place, count in _runs(end - start, len(units)):
                 fields.append(
                     {
@@ -146,9 +146,9 @@ def _commands(layout: Layout) -> list[dict[str, Any]]:
     for entity in layout.robots:
         if entity.model in COMMANDS:
             channel, command = COMMANDS[entity.model]
-            units = WANTED_UNITS[entity.model]
+            units = SET_POINT_UNITS[entity.model]
             for place, name in enumerate(command._fields):
-                unit, index = units[min(place, len(units) - 1)], entity.offsets["wanted"] + place
+                unit, index = units[min(place, len(units) - 1)], entity.offsets["set_point"] + place
                 found.append({"robot": entity.name, "channel": channel, "number": name, "unit": unit, "index": index})
     return found
 

@@ -79,7 +79,7 @@ class PureEngine:
                 self._quaternions[entity.name] = (state[at], state[at + 1], state[at + 2], state[at + 3])
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the wanted speed and the greatest force (SI units)."""
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units)."""
         for entity, (slide, spin) in zip(entities, commands, strict=True):
             self._rods[entity.name].drive(slide, spin)
 

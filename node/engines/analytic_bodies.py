@@ -128,7 +128,7 @@ class Rod:
         self.log = Log(False)
 
     def drive(self, slide: tuple[float, float], spin: tuple[float, float]) -> None:
-        """Set wanted speed and greatest force of both motors for this tick."""
+        """Set the target speed and greatest force of both motors for this tick."""
         self.slide_motor, self.slide_kick = slide[0], slide[1] * self.dt / self.mass
         self.spin_motor, self.spin_kick = spin[0], spin[1] * self.dt / self.inertia
 

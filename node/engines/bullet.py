@@ -389,7 +389,7 @@ class BulletEngine:
         self._loaded_balls.append(entity.name)
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the wanted speed and the greatest force (SI units).
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units).
 
         The two axes do not couple, so Bullet's unstable sorting of motors by island cannot reorder anything.
         """

@@ -21,7 +21,7 @@ class Engine(Protocol):
         """Wipe what the engine remembers and set these bodies (those with a body) to their state; park all others."""
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the wanted speed and the greatest force (SI units)."""
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units)."""
 
     def step(self, substeps: int) -> None:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""

@@ -1,6 +1,6 @@
 """The engine of a hall: rovers on two wheels, moved by kinematics, and their batteries.
 
-A wheel approaches its wanted speed with at most the drive's acceleration and rolls a little less far than it turns.
+A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
 From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a rover goes along an arc:
 in time t it turns by w t and moves by the arc's chord, v t sin(w t / 2) / (w t / 2), in the direction half-way between
 (Siegwart, Nourbakhsh, Scaramuzza, *Introduction to Autonomous Mobile Robots*, section 3.2). It goes as far of that as
@@ -40,7 +40,7 @@ class Loaded:
         self.left_travel = self.right_travel = 0.0
         self.charge = 0.0
         self.blocked = False
-        self.wanted: tuple[tuple[float, float], ...] = ((0.0, 0.0), (0.0, 0.0))
+        self.set_point: tuple[tuple[float, float], ...] = ((0.0, 0.0), (0.0, 0.0))
         self.cell: list[tuple[float, float, float]] = []
         """Half-planes that it stays in: x and y of a unit vector, and the greatest x * position along it."""
 
@@ -96,9 +96,9 @@ class RoverEngine:
         return cell
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the wheels of these rovers: for each the wanted speed (m/s) and the greatest acceleration (m/s2)."""
+        """Set the wheels of these rovers: for each the target speed (m/s) and the greatest acceleration (m/s2)."""
         for entity, wheels in zip(entities, commands, strict=True):
-            self._loaded[entity.index].wanted = tuple(wheels)
+            self._loaded[entity.index].set_point = tuple(wheels)
 
     def step(self, substeps: int) -> None:
         """Advance the loaded rovers by `substeps` substeps."""
@@ -110,7 +110,7 @@ class RoverEngine:
     def _advance(self, rover: Loaded) -> None:
         """Go on by one substep."""
         dt = self._dt
-        (left, left_rate), (right, right_rate) = rover.wanted
+        (left, left_rate), (right, right_rate) = rover.set_point
         if rover.charge <= 0.0:
             left = right = 0.0
         rover.left = _approach(rover.left, left, left_rate * dt)
@@ -195,6 +195,6 @@ def wheel_slips(deployment: Deployment, name: str) -> tuple[float, float]:
     return slip * unit_interval(words[0]), slip * unit_interval(words[1])
 
 
-def _approach(speed: float, wanted: float, step: float) -> float:
-    """Return a speed that is nearer to the wanted one, by at most `step`."""
-    return min(max(wanted, speed - step), speed + step)
+def _approach(speed: float, set_point: float, step: float) -> float:
+    """Return a speed that is nearer to the set-point, by at most `step`."""
+    return min(max(set_point, speed - step), speed + step)

@@ -143,7 +143,7 @@ class Comparison:
         """Let every rod follow the ball with its nearest figure, and kick every 100 ms."""
         ball = self.numbers[self.layout["ball"].offsets["position"] + 1]
         for rod in self.layout.rods:
-            start = rod.offsets["wanted"]
+            start = rod.offsets["set_point"]
             if tick % 10 == 0:
                 side = min((ball - y for y in self.figures[rod.name]), key=abs)
                 self.numbers[start] = min(max(side + draw(200 + rod.index, tick, -0.02, 0.02), -0.11), 0.11)

@@ -330,7 +330,7 @@ def test_spoiled_commands_are_refused_by_the_robot(fuzz: Fuzz, disturbed: Distur
             numbers = frame.numbers
             packet = Delivered(0, "x", number, 0, rng.choice((rod.name, "camera", "nobody", "")), channel, payload)
             stepper.deliver([packet], tuple(entity.index for entity in frame.layout.entities), numbers)
-            wanted = rod.offsets["wanted"]
+            wanted = rod.offsets["set_point"]
             assert all(abs(value) < 1e6 for value in numbers[wanted : wanted + 2]), payload.hex()
 
     fuzz.run(bring)

@@ -31,7 +31,7 @@ def packed(slide: float, spin: float) -> bytes:
 
 
 def wanted(numbers: list[float]) -> tuple[float, float]:
-    at = ROD.offsets["wanted"]
+    at = ROD.offsets["set_point"]
     return numbers[at], numbers[at + 1]
 
 
@@ -73,7 +73,7 @@ def test_a_command_within_reach_is_the_actuators_memory(slide: float, spin: floa
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     assert PositionActuator(DEPLOYMENT, ROD).accept(packed(slide, spin), numbers)
     assert wanted(numbers) == (slide, spin)
-    numbers[ROD.offsets["wanted"] : ROD.offsets["wanted"] + 2] = [0.0, 0.0]
+    numbers[ROD.offsets["set_point"] : ROD.offsets["set_point"] + 2] = [0.0, 0.0]
     assert numbers == initial_numbers(DEPLOYMENT, LAYOUT), "and nothing else changes"
 
 

@@ -146,7 +146,7 @@ def test_beyond_its_range_a_ray_sees_nothing_and_has_no_noise(fleet_text: Callab
 
 
 @pytest.mark.parametrize(
-    ("payload", "wanted"),
+    ("payload", "expected"),
     [
         (struct.pack("<2d", 0.5, -0.25), [0.5, -0.25]),
         (struct.pack("<2d", 7.0, -7.0), [1.2, -1.2]),
@@ -158,11 +158,11 @@ def test_beyond_its_range_a_ray_sees_nothing_and_has_no_noise(fleet_text: Callab
     ],
 )
 def test_the_drive_holds_speeds_within_its_own_and_refuses_the_rest(
-    fleet_text: Callable[..., str], payload: bytes, wanted: list[float] | None
+    fleet_text: Callable[..., str], payload: bytes, expected: list[float] | None
 ) -> None:
     fitted = Fitted(fleet_text(1, *PLACED))
-    actuator, at = DriveActuator(fitted.deployment, fitted.rover), fitted.rover.offsets["wanted"]
+    actuator, at = DriveActuator(fitted.deployment, fitted.rover), fitted.rover.offsets["set_point"]
     fitted.numbers[at : at + 2] = [0.1, 0.2]
-    assert actuator.accept(payload, fitted.numbers) is (wanted is not None)
-    assert fitted.numbers[at : at + 2] == (wanted or [0.1, 0.2])
+    assert actuator.accept(payload, fitted.numbers) is (expected is not None)
+    assert fitted.numbers[at : at + 2] == (expected or [0.1, 0.2])
     assert [speed for speed, _ in actuator.command(fitted.numbers)] == fitted.numbers[at : at + 2]

@@ -137,18 +137,18 @@ def test_deliveries_apply_in_their_order_so_that_the_last_command_counts() -> No
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     packets = [delivered("red.goal", command(0.01 * n, float(n)), sequence=n) for n in range(1, 5)]
     assert STEPPER.deliver(packets, EVERY, numbers) == {}
-    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.04, 4.0]
+    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.04, 4.0]
     assert slots(numbers, LAYOUT, "red.goal", "refused", 1) == [0.0]
     STEPPER.deliver(packets[::-1], EVERY, numbers)
-    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.01, 1.0]
+    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.01, 1.0]
 
 
 def test_a_node_applies_what_is_for_the_robots_that_it_solves() -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     packets = [delivered("red.goal", command(0.01, 0.0)), delivered("blue.goal", command(0.02, 0.0))]
     STEPPER.deliver(packets, [LAYOUT["blue.goal"].index], numbers)
-    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.0, 0.0]
-    assert slots(numbers, LAYOUT, "blue.goal", "wanted", 2) == [0.02, 0.0]
+    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.0, 0.0]
+    assert slots(numbers, LAYOUT, "blue.goal", "set_point", 2) == [0.02, 0.0]
 
 
 @pytest.mark.parametrize("destination", ["ball", "world", "nobody", "player-blue"])

@@ -18,4 +18,4 @@ class Actuator(Protocol):
         """Take a command into the actuator's memory, which is in the frame; False when it is refused."""
 
     def command(self, numbers: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return (wanted speed, greatest force or acceleration) of each of two motors, in SI units."""
+        """Return (target speed, greatest force or acceleration) of each of two motors, in SI units."""

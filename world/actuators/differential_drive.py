@@ -1,4 +1,4 @@
-"""A rover's drive: the wanted speeds of both wheels, which they approach as fast as their motors accelerate."""
+"""A rover's drive: the rims of both wheels approach their set-points of speed as fast as the motors accelerate."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _PAYLOAD = struct.Struct("<2d")
 
 
 class DriveActuator:
-    """One rover's actuator; its memory (the wanted speeds) is in the frame."""
+    """One rover's actuator; its set-points are in the frame."""
 
     channel = CHANNEL_DRIVE
 
     def __init__(self, spec: WorldSpec, entity: Entity) -> None:
         drive = spec.hall.rover.drive
-        self._wanted = entity.offsets["wanted"]
+        self._set_point = entity.offsets["set_point"]
         self._speed, self._acceleration = drive.speed, drive.acceleration
 
     def accept(self, payload: bytes, numbers: list[float]) -> bool:
@@ -30,11 +30,11 @@ class DriveActuator:
         left, right = _PAYLOAD.unpack(payload)
         if not (isfinite(left) and isfinite(right)):
             return False
-        numbers[self._wanted] = min(max(left, -self._speed), self._speed)
-        numbers[self._wanted + 1] = min(max(right, -self._speed), self._speed)
+        numbers[self._set_point] = min(max(left, -self._speed), self._speed)
+        numbers[self._set_point + 1] = min(max(right, -self._speed), self._speed)
         return True
 
     def command(self, numbers: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return (wanted speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
-        left, right = numbers[self._wanted], numbers[self._wanted + 1]
+        """Return (target speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
+        left, right = numbers[self._set_point], numbers[self._set_point + 1]
         return (left, self._acceleration), (right, self._acceleration)

@@ -1,6 +1,6 @@
-"""The rod's position actuator: a proportional loop from wanted position and angle to motor speeds, limited.
+"""The rod's position actuator: a proportional loop from set-points of position and angle to motor speeds, limited.
 
-Wanted speed = gain x error, at most the drive's speed; the motor reaches it with at most the drive's force. The loop is
+Target speed = gain x error, at most the drive's speed; the motor reaches it with at most the drive's force. The loop is
 the one of the original table (`docs/reference/table.md`); its gains and limits are in the deployment.
 """
 
@@ -20,7 +20,7 @@ _PAYLOAD = struct.Struct("<2d")
 
 
 class PositionActuator:
-    """One rod's actuator; its memory (the wanted position) is in the frame."""
+    """One rod's actuator; its set-point is in the frame."""
 
     channel = CHANNEL_POSITION
 
@@ -29,7 +29,7 @@ class PositionActuator:
         assert isinstance(robot, RodRobot)
         drive = spec.table.drive
         self._slide_m_max = spec.table.lines[robot.line].half_stroke
-        self._wanted = entity.offsets["wanted"]
+        self._set_point = entity.offsets["set_point"]
         self._position = entity.offsets["joint_positions"]
         self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
         self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)
@@ -43,14 +43,14 @@ class PositionActuator:
             return False
         if abs(slide_m) > self._slide_m_max or abs(spin_rad) > ANGLE_RAD_MAX:
             return False
-        numbers[self._wanted] = slide_m
-        numbers[self._wanted + 1] = spin_rad
+        numbers[self._set_point] = slide_m
+        numbers[self._set_point + 1] = spin_rad
         return True
 
     def command(self, numbers: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return (wanted speed, greatest force) of slide and spin, in SI units."""
+        """Return (target speed, greatest force) of slide and spin, in SI units."""
         gain, speed, force = self._slide
-        slide = gain * (numbers[self._wanted] - numbers[self._position])
+        slide = gain * (numbers[self._set_point] - numbers[self._position])
         spin_gain, spin_speed, torque = self._spin
-        spin = spin_gain * (numbers[self._wanted + 1] - numbers[self._position + 1])
+        spin = spin_gain * (numbers[self._set_point + 1] - numbers[self._position + 1])
         return (min(max(slide, -speed), speed), force), (min(max(spin, -spin_speed), spin_speed), torque)

@@ -133,7 +133,7 @@ class Line(SpecBase):
 
 
 class SlideAxis(SpecBase):
-    """A rod's motor along y: wanted speed = gain (1/s) x error, within +-speed, at no more than the force."""
+    """A rod's motor along y: target speed = gain (1/s) x error, within +-speed, at no more than the force."""
 
     speed: Speed
     force: Force
@@ -141,7 +141,7 @@ class SlideAxis(SpecBase):
 
 
 class SpinAxis(SpecBase):
-    """A rod's motor around y: wanted speed = gain (1/s) x error, within +-speed, at no more than the torque."""
+    """A rod's motor around y: target speed = gain (1/s) x error, within +-speed, at no more than the torque."""
 
     speed: Spin
     torque: Torque

@@ -29,8 +29,8 @@ class HallWorld:
     def stir(self, numbers: list[float]) -> None:
         """Let all rovers drive in curves of their own."""
         for number, rover in enumerate(self._layout.rovers):
-            wanted = rover.offsets["wanted"]
-            numbers[wanted : wanted + 2] = [0.3 + 0.01 * number, 0.4]
+            set_point = rover.offsets["set_point"]
+            numbers[set_point : set_point + 2] = [0.3 + 0.01 * number, 0.4]
 
     def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether a rover is in the hall, no farther away than its wheels can have taken it."""

@@ -55,7 +55,7 @@ class TableWorld:
         ball = self._layout[BALL].offsets["linear_velocity"]
         numbers[ball : ball + 3] = [1.0, 0.3, 0.0]
         for rod in self._layout.rods:
-            numbers[rod.offsets["wanted"] + 1] = 1.0
+            numbers[rod.offsets["set_point"] + 1] = 1.0
 
     def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether an entity's new, finite state is in the world, within its speed limit and its reach."""
