@@ -1,6 +1,6 @@
 # The commands of this repository. Each sets up what it needs (tools/environment.sh) and takes more arguments in ARGS:
 #     make up ARGS='--pace fast --for 20s'
-#     make test ARGS='tests/protocol -x'
+#     make test ARGS='tests/laws -x'
 
 PACKAGES := analysis capture cli client common console deployment launcher node players protocol rehearsal replay runtime supervisor vhub world
 PYTHON := .venv/bin/python

@@ -1,4 +1,4 @@
-"""What all tests share: how hypothesis chooses its examples, and which tests stay on one worker of pytest-xdist.
+"""Shared by all tests: hypothesis' choice of examples, the distribution over pytest-xdist's workers, commands as typed.
 
 Examples are the same in every run, so that a failure is a failure of the code and not of the day; what hypothesis
 measures in wall time is off, because the machines that run the tests are shared. To search new ground:
@@ -8,10 +8,11 @@ measures in wall time is off, because the machines that run the tests are shared
 import gc
 import os
 import subprocess
+import sys
 from collections.abc import Callable, Generator, Iterator
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -140,3 +141,35 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
     yield mount
     for place in mounted:
         subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+class Done(NamedTuple):
+    """Exit code and output of a command."""
+
+    code: object
+    out: str
+    err: str
+
+
+Command = Callable[..., Done]
+Typed = Callable[[str, Callable[[], None]], Command]
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Typed:
+    """Return a function that makes a command, by name and entry point; it runs in an empty folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.chdir(tmp_path)
+
+    def make(program: str, main: Callable[[], None]) -> Command:
+        def run(*arguments: str | Path) -> Done:
+            monkeypatch.setattr(sys, "argv", [program, *map(str, arguments)])
+            with pytest.raises(SystemExit) as ended:
+                main()
+            printed = capsys.readouterr()
+            return Done(ended.value.code, printed.out, printed.err)
+
+        return run
+
+    return make

@@ -35,7 +35,7 @@ from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, Wa
 from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
-from tests.supervisor.test_net_command import text_of
+from tests.cli.test_net import text_of
 
 TICKS: Final = 320
 LINK: Final = ("camera", "player-red")

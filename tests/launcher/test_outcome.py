@@ -34,7 +34,7 @@ from foosim.supervisor.main import SupervisorProcess
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.records import Record, fold
 from foosim.supervisor.status import UNFINISHED
-from tests.supervisor.conftest import Typed
+from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60

@@ -23,7 +23,7 @@ from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.overrides import nested
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from tests.supervisor.conftest import Command, Typed
+from tests.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NETWORK: Final[Mapping[str, Any]] = {

@@ -26,7 +26,7 @@ from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
 from foosim.supervisor.main import serve
-from tests.supervisor.conftest import Typed
+from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60

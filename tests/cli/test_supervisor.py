@@ -19,7 +19,7 @@ from foosim.node.main import main as run_node
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.run_folder import runs_folder
-from tests.supervisor.conftest import Command, Typed
+from tests.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 PROGRAMS: dict[str, str] = tomllib.loads((TABLE.parent.parent / "pyproject.toml").read_text())["project"]["scripts"]
