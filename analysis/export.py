@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, Protocol, TextIO
 
 from foosim.analysis.new_file import check_name, new_file
-from foosim.analysis.tables import COMMANDS_TABLE, Column, Kind, Table, table_of
-from foosim.capture.payload_hash import check_payloads
+from foosim.analysis.tables import Column, Kind, Table, table_of
 from foosim.capture.reader import Scan, deployment_of
 from foosim.common.errors import BadValue, Failed
 
@@ -62,12 +61,10 @@ def export_capture(path: Path, what: str, out: Path, form: Format | None = None)
         raise BadValue(f"--format: not one of {', '.join(FORMATS)}", form)
     if form == "parquet" and out == STANDARD_OUTPUT:
         raise BadValue("-o: a Parquet file is not written to standard output", str(out))
-    scan = Scan(path)
+    scan = Scan(path, earlier=True)
     messages = scan.messages()
     first = next(messages, None)
     deployment = deployment_of(scan.about)
-    if what == COMMANDS_TABLE:
-        check_payloads(str(path), deployment, f"the table {what}")
     table = table_of(what, deployment)
     rows = 0
     with _sink(table, out, form) as sink:

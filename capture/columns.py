@@ -30,8 +30,7 @@ class Packets:
     """All packets of a capture as columns, in the order of the closings that made their fates final, then of sending.
 
     Texts and payloads are object arrays (`packets.source == "camera"` gives a mask), the rest int64. `due_ns` and
-    `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None. Where
-    payloads are hashed `payload` is empty, else `payload_hash` is.
+    `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None.
     """
 
     source: Objects
@@ -51,7 +50,6 @@ class Packets:
     size: Integers
     payload: Objects
     wall_released_ns: Integers
-    payload_hash: Objects
 
     def __len__(self) -> int:
         return len(self.sequence)
@@ -111,10 +109,7 @@ def _objects(values: Sequence[Any]) -> Objects:
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index.
-
-    Outboxes whose payloads are hashed are not there.
-    """
+    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index."""
 
     layout: Layout
     ticks: Integers
@@ -206,7 +201,7 @@ def frames_of(layout: Layout, rows: Sequence[FrameRow]) -> Frames:
     """Return the rows of one layout's frames as arrays; their sizes are the layout's."""
     ticks = np.array([row.tick for row in rows], dtype=np.int64)
     values = np.frombuffer(b"".join(row.values for row in rows), dtype=np.float64).reshape(len(rows), layout.size)
-    outboxes = tuple({box.index: box.packets for box in row.outboxes if not box.packets_hash} for row in rows)
+    outboxes = tuple({box.index: box.packets for box in row.outboxes} for row in rows)
     return Frames(layout, ticks, values, outboxes)
 
 

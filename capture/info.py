@@ -51,8 +51,6 @@ class CaptureInfo:
     causes: Mapping[str, int]
     channels: Mapping[str, int]
     """Packets by channel."""
-    payloads: str
-    """`exact`, or `hashed`: then what needs them cannot be done."""
     payload_bytes: int
     recoveries: int
     files: Mapping[str, int]
@@ -74,7 +72,7 @@ PACKET_MARKS: Final = msgspec.json.Decoder(PacketMark)
 def capture_info(path: Path | str) -> CaptureInfo:
     """Return a capture in short, by one pass over the file."""
     path = Path(path)
-    scan = Scan(path)
+    scan = Scan(path, earlier=True)
     found = _Counts(scan)
     for message in scan.messages():
         found.take(message)
@@ -103,7 +101,6 @@ def capture_info(path: Path | str) -> CaptureInfo:
         {"offered": found.fates.total(), **{fate: found.fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
         dict(sorted(found.causes.items())),
         dict(sorted(found.channels.items())),
-        deployment.capture.payloads,
         found.payload_bytes,
         found.topics[RECOVERIES],
         {name: len(content) for name, content in sorted(about.files.items())},

@@ -11,6 +11,7 @@ from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -37,6 +38,7 @@ from foosim.capture.parts import (
 )
 from foosim.capture.rows import (
     CLIENTS,
+    EARLIER_FORMATS,
     EPOCHS,
     FORMAT,
     FRAME,
@@ -63,7 +65,7 @@ from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import decode_json
 from foosim.common.names import nearest_name
 from foosim.common.struct_types import Counter
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import load_deployment, load_earlier
 from foosim.deployment.schema import Deployment
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
@@ -121,6 +123,8 @@ class About:
     versions: dict[str, str] = field(default_factory=dict)
     finished: bool = False
     unfinished_bytes: int = 0
+    earlier: bool = False
+    """Whether its format is an earlier one."""
     start_ns: int = 0
     end_ns: int = 0
     """Simulated times of the first and the last message, once the file was read to its end."""
@@ -135,11 +139,15 @@ class About:
 class Scan:
     """One pass over a file: it yields the messages of some topics and gathers what stands beside them (`about`)."""
 
-    def __init__(self, path: Path, since_ns: int = 0) -> None:
-        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`)."""
+    def __init__(self, path: Path, since_ns: int = 0, *, earlier: bool = False) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`).
+
+        `earlier`: captures of earlier formats are read, too.
+        """
         self.about = About(path)
         self._path = path
         self._since_ns = since_ns
+        self._earlier = earlier
 
     def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
         """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
@@ -176,13 +184,24 @@ class Scan:
         """Refuse what is no capture, or one of another version, before its rows are looked at."""
         if file.profile != PROFILE or not self.about.metadata:
             raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
-        version = self.about.metadata.get("format", "")
-        if version != str(FORMAT):
-            raise CaptureError(f"{self._path}: format {version!r} of a capture, this reads {FORMAT}")
+        self._check_format(self.about.metadata.get("format", ""))
         if not self.about.deployment_text or "deployment" not in self.about.metadata:
             raise CaptureError(f"{self._path}: the capture has no deployment")
         if not file.is_checked:
             raise CaptureError(f"{self._path}: the capture lacks its metadata {CHECKS!r}")
+
+    def _check_format(self, found: str) -> None:
+        self.about.earlier = found in EARLIER_FORMATS
+        if found == str(FORMAT) or (self.about.earlier and self._earlier):
+            return
+        if not self.about.earlier:
+            raise CaptureError(f"{self._path}: format {found!r} of a capture, this reads {FORMAT}")
+        writer = f"foosim {self.about.versions.get('foosim', 'of an unknown version')}"
+        raise CaptureError(
+            f"{self._path}: a capture of format {found}, written by {writer}: this needs a foosim whose captures have "
+            f"format {found}; foosim {version('foosim')} has format {FORMAT}, and reads earlier ones by `info` and "
+            "`export` alone"
+        )
 
     def _take(self, content: records.Metadata | records.Attachment) -> None:
         about = self.about
@@ -321,7 +340,8 @@ def read_about(path: Path) -> About:
 def deployment_of(about: About) -> Deployment:
     """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
     try:
-        return load_deployment(about.deployment_text, about.deployment_name).with_assets(about.files)
+        load = load_earlier if about.earlier else load_deployment
+        return load(about.deployment_text, about.deployment_name).with_assets(about.files)
     except Refused as error:
         raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
 

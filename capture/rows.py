@@ -20,8 +20,10 @@ from foosim.common.struct_types import Counter
 from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
 from foosim.world.robot_packets import Delivered
 
-FORMAT: Final = 2
-"""Version of the rows and of the capture's metadata; a reader refuses another one."""
+FORMAT: Final = 3
+"""Version of the rows and of the capture's metadata."""
+EARLIER_FORMATS: Final = frozenset({"2"})
+"""Versions before, which `info` and `export` read and all else refuses."""
 PROFILE: Final = "foosim"
 
 CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
@@ -34,8 +36,8 @@ WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^
 Fate = Literal["delivered", "dropped", "in_flight"]
 
 
-class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
-    """What every row shares: an object with all its fields, none unknown."""
+class Row(msgspec.Struct, frozen=True, gc=False):
+    """What every row shares: an object with all its fields. Other fields, which earlier formats have, are ignored."""
 
 
 class EditRow(Row, frozen=True):
@@ -61,7 +63,6 @@ class DeliveredRow(Row, frozen=True, omit_defaults=True):
     destination: str
     channel: str
     payload: bytes
-    payload_hash: bytes = b""
 
 
 class TickRow(Row, frozen=True):
@@ -108,7 +109,6 @@ class OutboxRow(Row, frozen=True, omit_defaults=True):
 
     index: Counter
     packets: bytes
-    packets_hash: bytes = b""
 
 
 class FrameRow(Row, frozen=True):
@@ -151,7 +151,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     Levels are hundredths of a dB or dBm. What no stage looked at has its default and is left out of the file.
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
     in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
-    for its receiver, 0 when it did not. Where payloads are hashed `payload` is empty and `payload_hash` is there.
+    for its receiver, 0 when it did not.
     """
 
     source: str
@@ -199,7 +199,6 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     contenders: Counter = 0
     retries: Counter = 0
     decided_by: DecidedRow = NOTHING_MORE
-    payload_hash: bytes = b""
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -339,9 +338,7 @@ def edit_of(row: EditRow) -> Edit:
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:
-    """Return the delivery that a row tells. Raises CaptureError for one whose payload is hashed."""
-    if row.payload_hash:
-        raise CaptureError(f"{row.source} {row.sequence} to {row.destination}: its payload is hashed")
+    """Return the delivery that a row tells."""
     return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
 
 

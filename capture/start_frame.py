@@ -80,8 +80,6 @@ def read_branch(text: str, deployment: Deployment) -> Branch:
 def _frame_of(path: Path, found: _Found) -> tuple[Layout, Frame]:
     row = found.frame
     layout = layout_of(path, found.deployment, found.layout)
-    if any(outbox.packets_hash for outbox in row.outboxes):
-        raise CaptureError(f"{path}: frame {row.tick} has outboxes whose payloads are hashed; begin with another")
     outboxes = [Outbox(outbox.index, outbox.packets) for outbox in row.outboxes]
     try:
         frame = frame_from_bytes(row.tick, layout, row.values, outboxes)

@@ -16,7 +16,6 @@ from foosim.capture.damage import Damage, damage_of
 from foosim.capture.info import CaptureInfo, capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import FAILED_RUN, NEXT
-from foosim.capture.payload_hash import HASHED
 from foosim.cli import replay_export, replay_play, replay_report, replay_view, replay_whatif
 from foosim.cli.options import Capture, Json, reading
 from foosim.common import limits
@@ -48,12 +47,6 @@ def info(capture: Capture, json: Json = False) -> None:
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
 
-HASHED_TEXT: Final = (
-    "  PAYLOADS ARE HASHED: in their place stands BLAKE2b of 16 bytes; it cannot be simulated again, nor its packets "
-    "played"
-)
-
-
 def _describe(found: CaptureInfo) -> str:
     if NEXT in found.end:
         state = f"it goes on in {found.end[NEXT]}, which is not here"
@@ -63,7 +56,6 @@ def _describe(found: CaptureInfo) -> str:
         state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
-        *([HASHED_TEXT] if found.payloads == HASHED else []),
         *([f"  {len(found.parts)} files: {found.parts[0]} to {found.parts[-1]}"] if len(found.parts) > 1 else []),
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
         f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
@@ -75,7 +67,7 @@ def _describe(found: CaptureInfo) -> str:
         f"  packets {_counted(found.packets)}",
         *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
         *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
-        f"  payloads {found.payload_bytes / 1e6:.1f} MB, {found.payloads}",
+        f"  payloads {found.payload_bytes / 1e6:.1f} MB",
         f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),

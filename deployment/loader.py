@@ -54,6 +54,8 @@ DEPLOYMENTS_KEPT: Final = 32
 The swarm's worlds are 25 texts."""
 TREES_KEPT: Final = 4
 """Files that are not read again when other settings are placed in them."""
+EARLIER_SETTINGS: Final = (("capture", "payloads"),)
+"""Section and key of settings that captures of earlier formats may have in their deployments."""
 
 _kept: dict[tuple[str, str], Deployment] = {}
 """By text and name, the one that was not asked for longest first."""
@@ -71,6 +73,16 @@ def load_deployment(text: str, name: str) -> Deployment:
 def read_deployment(text: str, name: str) -> Deployment:
     """What `load_deployment` returns, read from the text whatever is kept."""
     return _check(*read_tree(text, locate_in(name)))
+
+
+def load_earlier(text: str, name: str) -> Deployment:
+    """What `load_deployment` returns of a text with settings that an earlier version had; they are left out."""
+    tree, problems = read_tree(text, locate_in(name))
+    for section, key in EARLIER_SETTINGS:
+        fields = tree.values.get(section) if isinstance(tree, Fields) else None
+        if isinstance(fields, Fields):
+            fields.values.pop(key, None)
+    return _check(tree, problems)
 
 
 def _keep(text: str, name: str, deployment: Deployment) -> Deployment:

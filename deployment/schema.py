@@ -97,8 +97,6 @@ class Capture(SpecBase):
     """Another file is begun, with the next captured frame, when one has so many bytes, or so much simulated time."""
     last_ns: Span | None = Field(default=None, alias="last")
     """Of a capture that is split, files are removed that hold nothing of so much simulated time."""
-    payloads: Literal["exact", "hashed"] = "exact"
-    """`hashed`: a hash of 16 bytes stands for each payload, and what needs payloads cannot be done with the capture."""
 
     @property
     def is_split(self) -> bool:

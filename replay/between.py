@@ -1,14 +1,13 @@
 """The frames between those that a capture has, computed again from its orders and deliveries: a step to the tick.
 
 Each is compared with the digest that the capture has of its tick, so what is given is what was, to the last bit, or
-nothing. Neighbour: `replica` computes.
+nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from foosim.capture.payload_hash import check_payloads
 from foosim.capture.reader import About, CapturedTick
 from foosim.deployment.loader import load_deployment
 from foosim.node.engines.mesh_trial import check_models
@@ -28,7 +27,7 @@ class Between:
     def __call__(self, frame: Frame, inputs: Iterable[CapturedTick]) -> Frame | None:
         """Return the frame that inputs lead to from a captured one; None where it is not what the capture had.
 
-        Raises Refused where the capture cannot be computed again: its payloads are hashed, or its files do not fit.
+        Raises Refused where the capture cannot be computed again: its files do not fit.
         """
         replica = self._at(frame)
         for captured in inputs:
@@ -47,7 +46,6 @@ class Between:
         about = self._about
         text = with_nodes(about.deployment_text, about.deployment_name, 1)
         deployment = load_deployment(text, about.deployment_name).with_assets(about.files)
-        check_payloads(str(about.path), deployment, "a step between captured frames")
         check_models(deployment, about.deployment_name, text)
         start: Start = start_with(frame, about.path.name, CHAIN_START, added_to(deployment, frame.layout))
         self._replica = Replica(text, about.deployment_name, deployment, start=start)

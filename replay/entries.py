@@ -23,7 +23,6 @@ from foosim.capture.foxglove import SCENE as SCENE_TOPIC
 from foosim.capture.foxglove import VIEW_TYPES
 from foosim.capture.foxglove_reader import read_log, read_poses, renamed_scene
 from foosim.capture.mcap.format import Message
-from foosim.capture.payload_hash import keeps_hashes
 from foosim.capture.rows import CLIENTS, FRAME, ROW_TYPES, TICK, ClientRow, PacketRow
 from foosim.common import limits
 from foosim.common.errors import BadValue, show
@@ -102,16 +101,13 @@ def make_selection(
 ) -> Selection:
     """Return a selection as people write it. Raises BadValue, which names the option.
 
-    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel. Packets whose payloads are hashed are
-    not played.
+    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel.
     """
     for topic in topics:
         if not any(topic == known or topic.startswith(f"{known}/") for known in TOPICS):
             nearest = nearest_name(topic, TOPICS)
             what = f"--topic: not one of {', '.join(TOPICS)}, nor below one"
             raise BadValue(what, topic, None if nearest is None else show(nearest))
-        if topic.startswith(capture_rows.PACKETS) and keeps_hashes(deployment):
-            raise BadValue("--topic: payloads of this capture are hashed, its packets cannot be played", topic)
     names, channels = _renamed(deployment, remaps)
     return Selection(tuple(topics), _compile("--regex", regexes), _compile("--exclude", excluded), names, channels)
 
@@ -174,8 +170,7 @@ class Entries:
         self.has_scene: Final = SCENE_TOPIC in self._views
         """Whether a listener is to know what holds where a replay begins."""
         named = [topic for topic in selection.topics if topic.startswith(capture_rows.PACKETS)]
-        asked = bool(named or selection.regexes or not selection.topics)
-        self._packets = asked and not keeps_hashes(deployment)
+        self._packets = bool(named or selection.regexes or not selection.topics)
         self._topics = {topic for topic in ROW_TYPES if topic != capture_rows.PACKETS and selection.has(topic)}
         self._links: dict[str, str] = {}
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from foosim.capture.payload_hash import keeps_hashes
 from foosim.capture.reader import About, deployment_of
 from foosim.common import limits
 from foosim.common.addresses import Address, check_listen, parse_address
@@ -136,8 +135,6 @@ def play_capture(path: Path, options: PlayOptions, lines: Lines, stopper: Stoppe
         lines.say(f"{path}: {span.first_ns / 1e9:g} s to {span.last_ns / 1e9:g} s, listening at {session.locator}")
         if not about.finished:
             lines.say("the capture is not finished: it is played up to its last whole chunk")
-        if keeps_hashes(deployment):
-            lines.say("its payloads are hashed: packets are not played")
         if keys.are_read:
             lines.say(KEYS_TEXT)
         return _Play(path, session, inbox, playback, reader, requests, lines, stopper, options.clock_ns).run()

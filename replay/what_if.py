@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-import msgspec
 import numpy as np
 
 from foosim.analysis.age_tallies import AgeAtUse, AgeTallies
@@ -218,8 +217,6 @@ class _Compared:
             return  # its row is behind the end of a part: another receiver's says that it was sent
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
-        if before is not None and before.payload_hash:
-            after = msgspec.structs.replace(after, payload=before.payload, payload_hash=before.payload_hash)
         if after != before:
             if before is None or _verdict(after) != _verdict(before):
                 self._note(key, before, after)

@@ -16,7 +16,6 @@ from typing import Final, Literal
 
 from foosim.capture.contents import CUT_REASON, CUT_TICK
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.payload_hash import check_payloads
 from foosim.capture.reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
 from foosim.capture.rows import AGES, CLIENTS, PACKETS, TICK, AgeRow, ClientRow, EditRow, PacketRow, TickRow
 from foosim.protocol.messages import Sent
@@ -154,7 +153,7 @@ class Offers:
             what = f"a packet of {source} that was sent at tick {tick} stands behind what was sent later"
             raise CaptureError(f"{self._capture.path}: {what}")
         to = "" if row.published else row.destination
-        payload = row.payload or bytes(row.size)  # of one that is hashed the size is all that a fate depends on
+        payload = row.payload
         offered = self._at(tick)
         if source in self._robots:
             offered.robots[source, sequence] = RobotPacket(source, sequence & _INDEX, to, row.channel, payload)
@@ -179,7 +178,6 @@ def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered
             raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
         yield lambda offered: _later(first, offered)
     else:
-        check_payloads(str(capture.path), capture.deployment, "a world that is computed again")
         about = capture.about
         replica = Replica(about.deployment_text, about.deployment_name, capture.deployment, start=start_of(capture))
         try:

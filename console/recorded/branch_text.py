@@ -18,15 +18,13 @@ def branch_answer(recording: Recording, tick: int) -> Answered:
     """Return the command that goes on from a tick; its tick is that of the captured frame that the run begins with.
 
     Behind a `#` it says where the deployment's file is not the captured one. Raises BadValue for a tick without a frame
-    before it, CaptureError, Refused for a frame whose payloads are hashed.
+    before it, CaptureError.
     """
     number = recording.index.places[FRAME].newest(tick * recording.tick_ns)
     if number < 0:
         first, last = recording.span
         raise BadValue(f"branch: no captured frame at or before this tick; there are ticks {first} to {last}", tick)
     row = recording.row(FRAME, number)
-    if any(outbox.packets_hash for outbox in row.outboxes):
-        raise Refused(f"frame {row.tick} has outboxes whose payloads are hashed: no run can begin with it")
     name = recording.about.deployment_name
     time = format_ns(row.tick * recording.tick_ns).replace(" ", "")
     command = ["foosim-supervisor", "up", name, "--from", f"{_near(recording.path)}@{time}"]

@@ -30,11 +30,10 @@ from foosim.protocol.replay_messages import (
     PlayedRow,
     PlayedScene,
 )
-from foosim.rehearsal.run import rehearse
 from foosim.replay.core import Reading, Span
 from foosim.replay.entries import Entries, Entry, Selection, make_selection
 from foosim.replay.reader import Read, ReadAhead, read_span
-from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
+from tests.replay.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000
 
@@ -143,13 +142,6 @@ def scene_of(update: bytes) -> Any:
     decoder = DecoderFactory().decoder_for("protobuf", Schema(1, schema.data, schema.encoding, schema.name))
     assert decoder is not None
     return decoder(update)
-
-
-def test_packets_without_payloads_are_not_played(tmp_path: Path) -> None:
-    path = tmp_path / "hashed.mcap"
-    rehearse(TABLE.read_text(), TABLE.name, 50, 1, ["engine=pure", "capture.payloads=hashed"], capture=path)
-    found = selected(path)
-    assert found["/tf"] > 2 and not any(topic.startswith("/packets") for topic in found)
 
 
 def test_what_is_selected_is_played_and_nothing_else(run: Path) -> None:

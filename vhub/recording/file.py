@@ -33,8 +33,7 @@ from foosim.capture.mcap.format import Book, Message
 from foosim.capture.mcap.repair import Scanned, read_messages
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, part_path, parts_at
-from foosim.capture.payload_hash import hashed_row, keeps_hashes
-from foosim.capture.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, Row
+from foosim.capture.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE
 from foosim.capture.state_at import HOLDING
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
@@ -89,7 +88,6 @@ class CaptureFile:
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
         self._encode = msgspec.json.Encoder().encode
-        self._kept = hashed_row if keeps_hashes(described.deployment) else None
         self._reserve = capture.reserve_bytes
         self._bytes_max = capture.bytes_max
         self._split = Split(path, capture, self._plan.tick_ns) if capture.is_split else None
@@ -138,12 +136,12 @@ class CaptureFile:
         return True
 
     def _write_closing(self, closing: Closing) -> None:
-        encode, kept, done, tick = self._encode, self._kept, self.done, closing.frame.tick
+        encode, done, tick = self._encode, self.done, closing.frame.tick
         for topic, log_ns, publish_ns, sequence, row in world_rows(closing, self._plan, self._known):
-            self._add(Message(topic, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row))))
+            self._add(Message(topic, log_ns, publish_ns, sequence, encode(row)))
             if topic == FRAME:
                 done.frame = tick
-        add_packets(self.mcap, self._channels[PACKETS], closing.fates, encode, kept)
+        add_packets(self.mcap, self._channels[PACKETS], closing.fates, encode)
         self._write_views(closing.frame)
         self._known = closing.frame
         done.tick = tick
@@ -208,8 +206,7 @@ class CaptureFile:
         """
         frame = self._known
         if frame is not None and self.done.frame < frame.tick == self.done.tick:
-            row: Row = frame_row(frame)
-            self._write_view(FRAME, frame.tick, self._encode(row if self._kept is None else self._kept(row)))
+            self._write_view(FRAME, frame.tick, self._encode(frame_row(frame)))
         self._end(metadata)
 
     def _end(self, metadata: Mapping[str, str]) -> None:

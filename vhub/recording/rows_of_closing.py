@@ -108,20 +108,14 @@ def _age_entry(age: Age, tick_ns: int) -> Entry:
     return AGES, age.tick * tick_ns, age.tick * tick_ns, age.tick & 0xFFFF_FFFF, row
 
 
-def add_packets(
-    mcap: McapWriter,
-    channel: int,
-    flights: list[Flight],
-    encode: Callable[[Row], bytes],
-    kept: Callable[[Row], Row] | None,
-) -> None:
+def add_packets(mcap: McapWriter, channel: int, flights: list[Flight], encode: Callable[[Row], bytes]) -> None:
     """Add the rows of one closing's packets to a file in the order of their log times, as `encode` writes them.
 
-    `kept` makes of a row what is kept of it. The hot path: see the bench before changing it.
+    The hot path: see the bench before changing it.
     """
     for flight in sorted(flights, key=_log_time):
         _, log_ns, publish_ns, sequence, row = packet_entry(flight)
-        mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
+        mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row))
 
 
 def _log_time(flight: Flight) -> int:
