@@ -1,11 +1,10 @@
-"""Access control: who may put, hear and be present on which key of a plane. Generated from the deployment and the
-table of channels, which alone spells the keys.
+"""Access control: which identity may put, subscribe and be present on which key of a plane. Generated from the
+deployment and the table of channels, the only place with the keys.
 
-A node writes and hears what nodes do, under its own name; a client writes its own transmit key and hears its own
-receive key; an operator writes requests and hears their answers, looks at the run, and hears replays; a viewer looks at
-the run. What is not granted is denied.
-The routers of the planes enforce it, each for those who connect to it, so it says nothing of a router's own messages.
-Zenoh tells nobody what it denies.
+A node puts and receives the messages of nodes, under its own name. A client puts on its own transmit key and receives
+its own receive key. An operator puts requests and receives their answers, commits for display, and replays. A viewer
+receives commits for display. Everything else is denied. The routers of the planes enforce the grants for the sessions
+that connect to them; a router's own messages are not checked. Zenoh reports no denial to the denied.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ from foosim.protocol.channels import ALIVE, CHANNELS, REPLAY, SUPERVISOR, VHUB, 
 Reads = Sequence[tuple[Channel, bool]]
 
 EVERYBODY: Final = "all"
-"""As the table of channels says it of a channel that all processes of the simulation plane write."""
+"""The value of `Channel.writers` of a channel that all processes of the simulation plane write."""
 ROUTERS: Final = {Plane.SIMULATION: SUPERVISOR, Plane.RADIO: VHUB, Plane.REPLAY: REPLAY}
-"""Whose session is the router of a plane."""
+"""The role whose session is the router of a plane."""
 _READS: Final[dict[str, Reads]] = {
     "node": channels.NODE_READS,
     VHUB: channels.VHUB_READS,
@@ -40,33 +39,33 @@ _PLANES: Final = {
     "viewer": (Plane.SIMULATION,),
     "client": (Plane.RADIO,),
 }
-"""Who connects to which planes' routers. A replay has everybody's packets, so it is for operators."""
+"""The roles that connect to the router of each plane. A replay has all packets, so it is for operators."""
 
 PEOPLE: Final = ("operator", "viewer")
-"""Each has many sessions at once, with ends of their own to the name, behind a dot, and is never present."""
+"""Roles with several sessions at once, named NAME.RANDOM, and without presence."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What one identity may do on a plane, as key expressions."""
+    """The grants of one identity on a plane, as key expressions."""
 
     identity: str
     name: str
     writes: tuple[str, ...]
-    """It may put here."""
+    """Keys on which it may put."""
     reads: tuple[str, ...]
-    """It may subscribe to these and hears what is put on them."""
+    """Keys to which it may subscribe."""
     interests: tuple[str, ...]
-    """It is told that others subscribe to these: what nobody hears, Zenoh does not send."""
+    """Keys whose subscribers it learns of: Zenoh sends nothing that has no subscriber."""
     alive: str
-    """It may be present here; empty when it never is."""
+    """The key of its presence; empty without one."""
     watches: str
-    """It hears whether this one, its router, is present."""
+    """The key of its router's presence, which it may read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Everybody's grants on one plane. `uses_passwords`: they prove who they are by user and password."""
+    """All grants on one plane. With `uses_passwords` sessions authenticate by user and password."""
 
     plane: Plane
     grants: tuple[Grant, ...]
@@ -74,14 +73,14 @@ class Access:
 
 
 def access_to(plane: Plane, deployment: Deployment) -> Access:
-    """Return who may do what on a plane of a run."""
+    """Return the grants of all identities on a plane of a run."""
     roles = [role for role, its in _PLANES.items() if plane in its]
     grants = [grant(who, plane) for who in identity.identities_of(deployment) if _role(who) in roles]
     return Access(plane, tuple(grants), plane is Plane.RADIO and deployment.access.radio == "password")
 
 
 def grant(who: str, plane: Plane) -> Grant:
-    """Return what an identity may do on a plane to which it connects."""
+    """Return the grants of an identity on a plane to which it connects."""
     role, name = identity.parse_identity(who)
     key_name = f"{name}.$*" if role in PEOPLE else name
     written = [channel for channel in CHANNELS if channel.plane is plane and _writes(role, channel)]
@@ -108,7 +107,7 @@ def _writes(role: str, channel: Channel) -> bool:
 
 
 def _declared(channel: Channel, name: str) -> str:
-    """Return what covers all that a reader declares: a key, also with what would lie below it (`Session.receive`)."""
+    """Return a key expression that covers all declarations of a reader: a key and keys below it (`Session.receive`)."""
     return f"{channel.key_for(name).removesuffix('/*')}/**"
 
 
@@ -117,16 +116,16 @@ def _each(reads: Reads, plane: Plane, expression: Callable[[Channel, bool], str]
 
 
 def _readers(channel: Channel, writer: str) -> set[str]:
-    """Return the key expressions by which a writer may learn that somebody hears it: as a reader declares them, and
-    the writer's own key, as which a router may give their sum."""
+    """Return the key expressions by which a writer may learn of subscribers: as a reader declares them, and its own key,
+    as which a router may announce their union."""
     heard = any(channel is read and not own for reads in _READS.values() for read, own in reads)
     return {_declared(channel, "*"), channel.key_for(writer)} if heard else {channel.key_for(writer)}
 
 
-# --- as Zenoh takes it -----------------------------------------------------------------------------------------------
+# --- Zenoh's configuration -------------------------------------------------------------------------------------------
 
 _FLOWS: Final = (
-    # what, flow, messages of Zenoh, field of the grant: ingress is from the one who connected
+    # right, flow, messages of Zenoh, field of the grant: ingress is from the connected session
     ("write", "ingress", ("put",), "writes"),
     ("read", "ingress", ("declare_subscriber",), "reads"),
     ("hear", "egress", ("put",), "reads"),

@@ -1,7 +1,7 @@
-"""What a core asks its shell to do, in order: journal, publish, say.
+"""The actions that a core asks its shell to perform: journal, publish, log.
 
-A core appends actions to its list while it takes a message or the time; the shell performs them in that order, so that
-what must be written before it is spoken is.
+A core appends actions to its list while it handles a message or the time. The shell performs them in that order, so a
+record is written before the messages that depend on it are published.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Journal:
 
 @dataclass(frozen=True)
 class Say:
-    """Something for people: a line of the log. `level` is info, warning or error."""
+    """Write a line to the log; `level` is info, warning or error."""
 
     level: str
     text: str

@@ -1,8 +1,8 @@
-"""How the files that a deployment refers to travel: the handshake's answer to who has to build the world.
+"""Transfers the files that a deployment refers to, as part of the handshake.
 
-The deployment's text names each file by its digest. Who lacks one asks for it piece by piece, each as soon as the one
-before has come, and again after a while; so there is one piece on its way at a time, whatever the link, and nobody has
-to remember how far anybody is. What has come is taken if its digest is the one in the text.
+The deployment's text names each file by its digest. A process requests a missing file piece by piece, each as soon as
+the one before has arrived, and again after a while; so one piece is in flight at a time, and the sender keeps no state.
+A file is accepted if its digest is the one in the text.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from foosim.world.mesh import digest_of
 
 
 class Fetching:
-    """The files that one build needs, and how far they have come."""
+    """The files that one build needs, and the progress of their transfer."""
 
     def __init__(self, deployment: Deployment, files: Mapping[str, bytes]) -> None:
-        """`files` are those, by digest, that an earlier build brought. Raises Malformed for one without a digest."""
+        """`files` are those of earlier builds, by digest. Raises Malformed for a file without a digest."""
         self._digests: dict[str, str] = {}
         for path, digest in deployment.files().items():
             if digest is None:
                 raise Malformed(f"a build whose file {path} has no digest")
             self._digests[path] = digest
         self.files = {digest: files[digest] for digest in self._digests.values() if digest in files}
-        """Contents that are whole, by digest."""
+        """Complete contents, by digest."""
         self._bytes = bytearray()
-        """What there is of the first that is not."""
+        """The received part of the first incomplete file."""
 
     @property
     def lacking(self) -> tuple[str, int] | None:
@@ -38,7 +38,7 @@ class Fetching:
         return None if digest is None else (digest, len(self._bytes))
 
     def take(self, piece: Piece) -> bool:
-        """Take the piece that is lacking; False for any other one. Raises Malformed when it cannot be what it says."""
+        """Accept the missing piece; False for any other one. Raises Malformed when size or digest do not fit."""
         if self.lacking != (piece.digest.hex(), piece.offset):
             return False
         end = piece.offset + len(piece.content)
@@ -54,12 +54,12 @@ class Fetching:
         return True
 
     def contents(self) -> dict[str, bytes]:
-        """The files by path, when all are there."""
+        """The files by path, when all have arrived."""
         return {path: self.files[digest] for path, digest in self._digests.items()}
 
 
 def piece_of(deployment: Deployment, fetch: Fetch) -> Piece:
-    """Return the piece that is asked for of a deployment's files; raises Malformed when there is none."""
+    """Return the requested piece of a deployment's files; raises Malformed when there is none."""
     content = deployment.file_with(fetch.digest.hex())
     if content is None:
         raise Malformed(f"a fetch of a file that the deployment does not have, {fetch.digest.hex()[:16]}")

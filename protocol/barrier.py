@@ -36,7 +36,7 @@ def edits_content(edits: Sequence[Edit]) -> bytes:
 
 
 def input_digest_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> bytes:
-    """Return the BLAKE2b of what tick k is computed from: D(k), the content of order k, the deliveries' bytes."""
+    """Return the BLAKE2b of the inputs of tick k: D(k), the content of order k, the deliveries' bytes."""
     hasher = blake2b(digest, digest_size=32)
     content = edits_content(edits)
     hasher.update(_TICK.pack(len(content)) + content)
@@ -45,7 +45,7 @@ def input_digest_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> 
 
 
 class BadParts(Malformed):
-    """Parts that cannot be those of one frame; `nodes` sent them."""
+    """Parts that do not fit together into one frame; `nodes` sent them."""
 
     def __init__(self, what: str, nodes: Sequence[str]) -> None:
         super().__init__(what)
@@ -85,8 +85,7 @@ class Slots:
     def whole(self, shares: tuple[tuple[str, tuple[int, ...]], ...]) -> Indices:
         """Return the positions of all numbers of these nodes' parts, solver's before owner's for each node.
 
-        Raises `BadParts` unless the nodes' solved entities are each entity of the layout once; when one is nobody's,
-        all are named.
+        Raises `BadParts` unless the nodes solved each entity of the layout once; if one is unsolved, all are named.
         """
         indices = self._whole.get(shares)
         if indices is None:
@@ -116,11 +115,11 @@ class Barrier:
 
     @property
     def missing(self) -> list[str]:
-        """Nodes whose part has not come, in name order."""
+        """Nodes whose part is missing, in name order."""
         return [node for node in self.roster if node not in self.parts]
 
     def add(self, part: Part) -> None:
-        """Take one node's part, or raise `BadParts` when it does not fit the layout. A repeat is ignored."""
+        """Add one node's part, or raise `BadParts` when it does not fit the layout. A duplicate is ignored."""
         assert part.tick == self.tick
         if part.node in self.parts:
             return
@@ -131,7 +130,7 @@ class Barrier:
         self.parts[part.node] = part
 
     def add_all(self, parts: Iterable[Part]) -> None:
-        """Take parts of several nodes, or raise one `BadParts` for all that do not fit."""
+        """Add parts of several nodes, or raise one `BadParts` for all that do not fit."""
         bad: list[BadParts] = []
         for part in parts:
             try:
@@ -152,12 +151,12 @@ class Barrier:
             self._check_outboxes(part)
 
     def drop(self, nodes: Iterable[str]) -> None:
-        """Forget the parts of these nodes: they are missing again."""
+        """Remove the parts of these nodes: they are missing again."""
         for node in nodes:
             self.parts.pop(node, None)
 
     def _check_outboxes(self, part: Part) -> None:
-        """Every reader of the next frame takes outboxes as they are: one that cannot be read must not get there."""
+        """Raise unless the outboxes can be decoded, because readers of the next frame do not check them."""
         entities = self.slots.layout.entities
         indices = [outbox.index for outbox in part.outboxes]
         if indices != sorted(set(indices)) or not set(indices) <= set(part.solved):
@@ -185,7 +184,7 @@ class Barrier:
             b"".join([raw for part in parts for raw in (part.solver_values, part.owner_values)])
         )
         frame = Frame(self.tick, layout, values, {o.index: o.packets for part in parts for o in part.outboxes})
-        # A sum is finite only if all numbers are; it is the quick way to see that they are.
+        # A sum is finite only if all numbers are, and checking it is faster.
         if not isfinite(sum(frame.numbers)) and not all(map(isfinite, frame.numbers)):
             nodes = [part.node for part in parts if not _is_finite(part)]
             raise BadParts(f"tick {self.tick}: numbers of {', '.join(nodes)} that are not finite", nodes)

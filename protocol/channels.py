@@ -1,8 +1,7 @@
 """The table of channels: key, message, direction, plane, service, whether the journal or capture has it.
 
-Nothing else in the code spells a key. `{name}` stands for the sender where many write, and for the receiver where one
-is addressed; a message that names its sender must come on that sender's key. Who may write and read what is derived
-from here, too.
+No other code spells a key. `{name}` is the sender where many write, and the receiver where one is addressed; a message
+that names its sender must arrive on that sender's key. Permissions are derived from this table as well.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from foosim.protocol.codec import decode
 
 
 class Plane(Enum):
-    """A session's worth of channels: what is said on one is never heard on another."""
+    """A separate network of channels: no message passes from one plane to another."""
 
     SIMULATION = 1
     RADIO = 2
@@ -27,9 +26,9 @@ class Plane(Enum):
 
 @dataclass(frozen=True)
 class Channel:
-    """One row of the table. `express` channels are sent at once, unbatched.
+    """One row of the table. Messages of an `express` channel are sent at once, unbatched.
 
-    One that is `blocking` holds its writer when a reader is slow; of another, what a reader does not take is lost.
+    A `blocking` channel holds its writer when a reader is slow; another one drops the messages that a reader does not take.
     """
 
     name: str
@@ -181,11 +180,11 @@ _NAMES: Final = {
     for field in ("sender", "node", "name")
     if field in kind.__struct_fields__
 }
-"""The field of each channel's messages that names whom the key names."""
+"""The field of each channel's messages with the name in the key."""
 
 
 def read(channel: Channel, name: str, payload: bytes) -> Any:
-    """Return the message that came on the key of `name`, or raise `Malformed`: also when it names another one."""
+    """Return the message that arrived on the key of `name`; raise `Malformed` also when it has another name."""
     message = decode(channel.message, payload, channel.bytes_max)
     field = _NAMES.get(channel.key)
     if field is not None and getattr(message, field) != name:
@@ -212,23 +211,23 @@ OPERATOR_READS: Final[Reads] = ((ANSWER, True), (PIECE, True))
 VIEW_READS: Final[Reads] = ((VIEW, False),)
 REPLAY_READS: Final[Reads] = ((REPLAY_REQUEST, False),)
 LISTENER_READS: Final[Reads] = ((PLAYED, False), (REPLAY_ANSWER, True))
-"""What each role reads: (channel, whether only what is addressed to it by name)."""
+"""The channels that each role reads: (channel, whether only messages addressed to it by name)."""
 
 NODE_WAITS: Final[tuple[Channel, ...]] = (ORDER, PART, DELIVERIES)
 SUPERVISOR_WAITS: Final[tuple[Channel, ...]] = (PART, DELIVERIES)
 VHUB_WAITS: Final[tuple[Channel, ...]] = (COMMIT, SAMPLES, UP)
 CLIENT_WAITS: Final[tuple[Channel, ...]] = (DOWN,)
-"""What every tick brings to each role: it waits for these itself, in the queue of the one that it lacks."""
+"""The channels with messages at every tick, by role: it waits in the queue of the one that it lacks."""
 
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",
     Plane.RADIO: "foosim/radio/alive/{name}",
     Plane.REPLAY: "foosim/replay/alive/{name}",
 }
-"""Liveliness tokens: presence, which says that a process and its link are up, not that it advances."""
+"""Liveliness tokens: presence shows that a process and its link are up, not that it advances."""
 
 VHUB: Final = "vhub"
-"""The name under which the vHub takes part in the simulation plane; no node may have it."""
+"""The vHub's name on the simulation plane; no node may have it."""
 SUPERVISOR: Final = "supervisor"
 REPLAY: Final = "replay"
 """The name under which a replay is present on its plane."""

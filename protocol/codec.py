@@ -54,7 +54,7 @@ def decode_any(kind: Any, payload: bytes) -> Any:
 
 
 def _reason(payload: bytes, error: Exception) -> str:
-    """Say what is wrong; a message of another protocol version is named as that."""
+    """Describe the defect; a message of another protocol version is named as such."""
     try:
         content = _anything.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

@@ -1,7 +1,7 @@
-"""The arithmetic fingerprint: what tells whether another machine computes the same bits.
+"""The arithmetic fingerprint, which shows whether another machine computes the same bits.
 
-Part one is here: a digest of values of the mathematical library, which differ between CPU classes (glibc picks
-routines with or without fused multiply-add). Part two is a node's: the digest of a fixed small run of its engine
+The first part is a digest of values of the mathematical library, which differ between CPU classes (glibc picks
+routines with or without fused multiply-add). The second part is a node's digest of a fixed short run of its engine
 (`node.solver`). Both are compared in the handshake and kept in the capture.
 """
 
@@ -30,5 +30,5 @@ def library_fingerprint() -> bytes:
 
 
 def is_compiled() -> bool:
-    """Whether the hot path runs compiled (setup.py) on this machine: it computes the same bits, sooner."""
+    """Whether the hot path runs compiled (setup.py) on this machine: it computes the same bits, faster."""
     return not keyed_random.__file__.endswith(".py")

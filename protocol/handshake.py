@@ -1,8 +1,8 @@
 """The handshake of a process with the supervisor, as the process sees it: hello, build, ready, and the heartbeat.
 
-Hello and ready are said again until they are answered, since declaring a subscriber does not mean that the other side
-knows of it. A supervisor that was started again recalls who takes part: hello, build and ready once more, while all
-that the process has computed stays. Shared by node and vHub.
+Hello and ready are repeated until they are answered, because a declared subscriber may not be known to the other side
+yet. A restarted supervisor recalls the members: hello, build and ready once more, while a process keeps what it has
+computed. Shared by node and vHub.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ AGAIN_NS: Final = 200_000_000
 
 
 class Member:
-    """The state of one process's membership. What it has to say goes to `actions`."""
+    """The state of one process's membership. Messages to send go to `actions`."""
 
     def __init__(
         self,
@@ -45,34 +45,34 @@ class Member:
         self.build: Build | None = None
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
-        """Of the world as it was when the build was said."""
+        """The layout of the world at the build."""
         self.layouts: list[Layout] = []
         self.deadline_ns = now_ns
         self.is_ready = False
         self.simulation = b""
-        """A node's digest of a fixed small run of its engine, once it has one."""
+        """A node's digest of a fixed short run of its engine, once it has one."""
         self._fingerprint = fingerprint
         self._world = world
         self._actions = actions
         self._said_ready: Layout | None = None
         self._built: set[bytes] = set()
-        """Digests of the layouts that were said to be ready."""
+        """Digests of the layouts that were reported ready."""
         self._entered = False
         self._entered_by = ""
-        """Boot of the supervisor in one of whose epochs it was the last time."""
+        """Boot of the supervisor of the last epoch with this process."""
         self._coming: tuple[Build, Deployment, Fetching] | None = None
-        """A build whose files are on their way."""
+        """A build whose files are being fetched."""
         self._files: dict[str, bytes] = {}
-        """Files that an earlier build brought, by digest."""
+        """Files of earlier builds, by digest."""
         self._recalled_by = ""
         """Boot of a supervisor that has recalled this process and not answered its hello yet."""
         self.standing: Callable[[], Action] | None = None
-        """Gives what is said before each ready (the vHub's)."""
+        """Returns the message to publish before each ready (vHub)."""
 
     def take_build(self, build: Build | Piece) -> bool:
-        """Take the supervisor's answer to hello, and then the files that it refers to; True when all is there.
+        """Accept the supervisor's answer to hello, and then the files that it refers to; True when all have arrived.
 
-        False also for what is for another boot, or a repeat.
+        False also for a message to another boot, or a duplicate.
         """
         if build.boot != self.boot:
             return False
@@ -90,7 +90,7 @@ class Member:
 
     @property
     def is_fetching(self) -> bool:
-        """Whether files of the build are on their way."""
+        """Whether files of the build are being fetched."""
         return self._coming is not None
 
     def _begin_build(self, build: Build) -> None:
@@ -111,11 +111,11 @@ class Member:
         self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self.deployment = deployment
         self.build = build
-        self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
+        self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
 
     def _fetch(self, fetching: Fetching) -> None:
-        """Ask for what is lacking."""
+        """Request the next missing piece."""
         assert fetching.lacking is not None
         digest, offset = fetching.lacking
         fetch = Fetch(self.name, self.boot, bytes.fromhex(digest), offset)
@@ -123,11 +123,11 @@ class Member:
 
     @property
     def first_tick(self) -> int:
-        """The tick of the frame that the run began with."""
+        """The tick of the run's first frame."""
         return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
 
     def _take_again(self, known: Build, build: Build) -> bool:
-        """Take the answer of the supervisor that has recalled this process, if it is about the same run."""
+        """Accept the answer of the supervisor that has recalled this process, if it is of the same run."""
         if not self._recalled_by or self.deployment is None:
             return False
         if (build.run, build.deployment) != (known.run, known.deployment):
@@ -141,17 +141,17 @@ class Member:
         return True
 
     def recall(self, recall: Recall) -> bool:
-        """A supervisor does not know this process: say hello to it, unless it is the one that is known."""
+        """Send a hello to a supervisor that does not know this process, unless it is the known one."""
         if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
             return False
-        self._actions.append(Say("warning", "recalled by a supervisor that was started again"))
+        self._actions.append(Say("warning", "recalled by a restarted supervisor"))
         self._recalled_by = recall.boot
         self._entered = False
         self.deadline_ns = 0
         return True
 
     def refuse(self, refusal: Refusal) -> bool:
-        """Take a refusal; False when it is meant for another boot."""
+        """Accept a refusal; False when it is addressed to another boot."""
         if refusal.boot != self.boot:
             return False
         self.refusal = refusal.reason
@@ -159,7 +159,7 @@ class Member:
         return True
 
     def check_epoch(self, epoch: Epoch) -> None:
-        """Raise `Malformed` unless every robot has one owner, who takes part, and the added entities make a layout."""
+        """Raise `Malformed` unless every robot has one owner that is a member, and the added entities make a layout."""
         assert self.deployment is not None
         owners, roster = dict(epoch.owners), set(epoch.roster)
         if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
@@ -169,14 +169,14 @@ class Member:
         build_layout(self.deployment, [(entity.name, entity.model) for entity in epoch.added])
 
     def want_layout(self, layout: Layout) -> None:
-        """Ask the shell for what this layout needs (a node: an engine)."""
+        """Ask the shell for the engine of this layout (node)."""
         if all(layout.digest != wanted.digest for wanted in self.layouts):
             self.layouts.append(layout)
         elif layout.digest in self._built:
             self.ready(layout)
 
     def ready(self, layout: Layout) -> None:
-        """Say that this layout is built."""
+        """Report that this layout is built."""
         self.is_ready = True
         self._said_ready = layout
         self._built.add(layout.digest)
@@ -186,27 +186,27 @@ class Member:
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:
-        """An epoch with this process in it has begun: nothing is to be said again."""
+        """An epoch with this process has begun: nothing is repeated."""
         self._entered = True
         self._entered_by = "" if self.build is None else self.build.supervisor
 
     def repeated(self, is_present: bool) -> None:
-        """An epoch came again; the present one answers a ready that was said again.
+        """Handle a duplicate of an epoch; the current one answers a repeated ready.
 
-        Not to a supervisor that has recalled this process: it begins an epoch of its own, this is one of before.
+        A supervisor that has recalled this process begins a new epoch, so a duplicate is of an earlier one.
         """
         is_known = self.build is not None and self.build.supervisor == self._entered_by and not self._recalled_by
         self._entered = self._entered or (is_present and is_known)
 
     def begin_anew(self) -> None:
-        """The run goes on without this process: come back by the handshake. What is built stays."""
+        """Begin the handshake again, because the run continues without this process. Built layouts stay."""
         self.build = self.layout = self._said_ready = self._coming = None
         self.is_ready = self._entered = False
         self._recalled_by = ""
         self.deadline_ns = 0
 
     def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
-        """Say hello or ready again and the heartbeat, each when it is due."""
+        """Send hello or ready again and the heartbeat, each when it is due."""
         if now_ns < self.deadline_ns:
             return
         if self.refusal:

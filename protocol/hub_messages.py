@@ -1,4 +1,4 @@
-"""The messages by which a vHub that was started again and the supervisor agree on where the run stands."""
+"""The messages by which a restarted vHub and the supervisor agree on the position from which the run continues."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from foosim.world.initial_state import Added
 
 
 class ResumeState(Message, frozen=True):
-    """How far the vHub has come: the highest epoch that it knows, its last commit as it came (empty before the first),
-    the chain over the frames up to it, its layout beside the deployment's, and the last tick whose deliveries are
-    `final`.
+    """The vHub's position: the highest epoch that it knows, the bytes of its last commit (empty before the first), the
+    chain over the frames up to it, the entities added to the deployment's layout, and the last tick whose deliveries
+    are `final`.
 
-    It is for the supervisor that was started as `supervisor`. A vHub that `waits` goes on from a journal, and closes
-    nothing until it has its `ResumeGrant`. The journal of one that `lost_machine` was written before its machine was
-    started the last time: what came last may not have reached the disk. `capture` is its capture, empty without one.
+    `supervisor` is the boot of the supervisor that it answers. A vHub that `waits` continues from a journal, and closes
+    no tick before its `ResumeGrant`. With `lost_machine` its machine was booted after its journal was begun: the last
+    records may not have reached the disk. `capture` is the path of its capture, empty without one.
     """
 
     name: Name
@@ -30,7 +30,7 @@ class ResumeState(Message, frozen=True):
 
 
 class ResumeGrant(Message, frozen=True):
-    """The supervisor knows where the vHub that was started as `boot` stands: it goes on, in `epoch` or a later one."""
+    """The supervisor lets the vHub of this `boot` continue, in `epoch` or a later one."""
 
     name: Name
     boot: Name

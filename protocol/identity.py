@@ -1,5 +1,5 @@
-"""Identities: what a certificate says that its holder is. `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players
-too), `operator.NAME` (a person or a script that controls the run), `viewer.NAME` (one that only looks at it).
+"""Identities, which certificates carry: `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players too),
+`operator.NAME` (a person or a script that controls the run), `viewer.NAME` (one that only watches it).
 
 An identity is the common name of a certificate and the stem of its files.
 """
@@ -49,7 +49,7 @@ def parse_identity(text: str) -> tuple[str, str]:
 
 
 def identities_of(deployment: Deployment) -> list[str]:
-    """Return everybody who takes part in a run, controls it or looks at it: servers first, others by role and name."""
+    """Return all identities of a run: servers first, others by role and name."""
     return [
         SUPERVISOR,
         VHUB,

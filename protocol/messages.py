@@ -22,7 +22,7 @@ from foosim.world.robot_packets import Delivered, Outboxes, RobotPacket
 
 
 class Order(Message, frozen=True):
-    """Permission to compute `tick`, with what changes the world at it, and the `following` ticks, without edits."""
+    """Permission to compute `tick`, with its edits, and the `following` ticks, without edits."""
 
     epoch: Counter
     tick: Counter
@@ -42,12 +42,12 @@ class Deliveries(Message, frozen=True):
 
     @property
     def last(self) -> int:
-        """The last tick that it is about."""
+        """The last tick that the message covers."""
         return self.tick + self.following
 
 
 class Samples(Message, frozen=True):
-    """What the robots of `node` send at `tick`, from the frame with digest `digest`; `robots` are those it covers."""
+    """The packets of robots of `node` at `tick`, from the frame with digest `digest`; `robots` are those covered."""
 
     tick: Counter
     digest: Digest
@@ -70,8 +70,8 @@ class Part(Message, frozen=True):
 
 
 class Recovered(Item, frozen=True):
-    """A loss or a return that is over: `what` (node, join, supervisor, vhub, player, return) of `name`, behind frame
-    `tick`, with `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
+    """A completed loss or return: `what` (node, join, supervisor, vhub, player, return) of `name`, after frame `tick`;
+    `epoch` is the first without or with it, `outage_ns` the supervisor's wall time without a commit."""
 
     what: Name
     name: Name
@@ -87,7 +87,7 @@ Recoveries = Annotated[list[Recovered], Meta(max_length=limits.RECOVERIES_PER_CO
 class Commit(Message, frozen=True):
     """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0).
 
-    `last` says that the run ends with this frame: its tick is not closed. `recovered` is what ends with this frame.
+    With `last` the run ends with this frame, and its tick is not closed. `recovered` are the losses that end with it.
     """
 
     epoch: Counter
@@ -101,7 +101,7 @@ class Commit(Message, frozen=True):
 
 
 class Want(Message, frozen=True):
-    """Ask again for `kind` (a channel's name) of `tick` in `epoch`; `of` are the nodes that are asked, none for all."""
+    """Request `kind` (a channel's name) of `tick` in `epoch` again, of the nodes `of`, or of all where it is empty."""
 
     sender: Name
     kind: Name
@@ -114,15 +114,15 @@ DONE_OF: Final = "Done of "
 SAMPLES_OF: Final = "samples of "
 JOIN_OF: Final = "join of "
 CAPTURE: Final = "capture"
-"""How a heartbeat of the vHub says whom it waits for: names follow, joined by a comma and a space. `CAPTURE`
-says that its run has ended and that it closes the capture."""
+"""Prefixes of `Heartbeat.waiting_for` of the vHub: names follow, joined by a comma and a space. `CAPTURE` means that
+the run has ended and that the vHub closes the capture."""
 
 
 class Heartbeat(Message, frozen=True):
-    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` says why the
-    run cannot go on (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` is the reason why the
+    run cannot continue (vHub), `busy` is its load (0 to 1), `report` is JSON for display.
 
-    Without a report it is the vHub's word, before late deliveries, on whom they waited for."""
+    The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 
     sender: Name
     tick: Counter
@@ -133,11 +133,11 @@ class Heartbeat(Message, frozen=True):
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
 
 
-# --- simulation plane: who takes part --------------------------------------------------------------------------------
+# --- simulation plane: membership -----------------------------------------------------------------------------------
 
 
 class Hello(Message, frozen=True, tag="hello"):
-    """A process asks to take part. `world` is empty when it takes whatever world it finds."""
+    """A process asks for membership. An empty `world` accepts any world."""
 
     role: Name
     name: Name
@@ -148,15 +148,15 @@ class Hello(Message, frozen=True, tag="hello"):
 
 
 class Recall(Message, frozen=True):
-    """The supervisor, started as `boot`, does not know a process that takes part: who knows another one says hello."""
+    """The supervisor of this `boot` does not know a member: a process that knows another supervisor sends its hello."""
 
     boot: Name
 
 
 class Build(Message, frozen=True):
-    """Everything that a process needs to build the world: one address was all that it had to know.
+    """Everything that a process needs to build the world.
 
-    `supervisor` is the boot of the supervisor that says it.
+    `supervisor` is the boot of the supervisor that sends it.
     """
 
     name: Name
@@ -171,7 +171,7 @@ class Build(Message, frozen=True):
 
 
 class Refusal(Message, frozen=True, tag="refusal"):
-    """The supervisor will not have this process, and why."""
+    """The supervisor refuses this process; `reason` is a sentence."""
 
     name: Name
     boot: Name
@@ -179,9 +179,9 @@ class Refusal(Message, frozen=True, tag="refusal"):
 
 
 class Ready(Message, frozen=True):
-    """The process has built the layout with this digest (and, a vHub, heard from all declared lockstep clients).
+    """The process has built the layout with this digest; of the vHub, all declared lockstep clients have joined too.
 
-    A node's `fingerprint` is the digest of a fixed small run of its engine: equal ones compute equal worlds.
+    A node's `fingerprint` is the digest of a fixed short run of its engine: equal fingerprints compute equal worlds.
     """
 
     name: Name
@@ -191,15 +191,15 @@ class Ready(Message, frozen=True):
 
 
 class Prepare(Message, frozen=True):
-    """Build an engine for the layout with these added entities, and say when it is ready."""
+    """Build an engine for the layout with these added entities, and answer `Ready`."""
 
     added: Added
 
 
 class Epoch(Message, frozen=True):
-    """Who does what from tick `tick` on: `owners` is (robot, node) for every robot.
+    """Members and owners from tick `tick` on: `owners` is (robot, node) for every robot.
 
-    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in.
+    `arithmetic` is the digest of the nodes' fixed short run; empty where different ones are admitted.
     """
 
     epoch: Counter
@@ -212,7 +212,7 @@ class Epoch(Message, frozen=True):
 
 
 class Tempo(Message, frozen=True):
-    """The pace that the supervisor keeps (`realtime`, `fast`, `2x`): the vHub releases by it."""
+    """The supervisor's pace (`realtime`, `fast`, `2x`), by which the vHub releases packets."""
 
     pace: Name
     paused: bool
@@ -234,7 +234,7 @@ class Farewell(Message, frozen=True):
 
 
 class Request(Message, frozen=True):
-    """What a person or a script asks of the supervisor: `verb` with JSON `arguments`. The same id, the same answer."""
+    """A request of an operator: `verb` with JSON `arguments`. A request repeated with its id gets the same answer."""
 
     sender: Name
     id: Name
@@ -261,7 +261,7 @@ class Answer(Message, frozen=True):
 
 
 class Fetch(Message, frozen=True):
-    """A process that builds the world asks for the file with this digest, from the byte at `offset` on."""
+    """A process that builds the world requests the file with this digest, from the byte at `offset` on."""
 
     name: Name
     boot: Name
@@ -280,13 +280,13 @@ class Piece(Message, frozen=True):
     content: Annotated[bytes, Meta(max_length=limits.ASSET_PIECE_BYTES)]
 
 
-# --- simulation plane: what people look at ----------------------------------------------------------------------------
+# --- simulation plane: viewing ----------------------------------------------------------------------------------------
 
 Pairs = Annotated[list[tuple[Name, Name]], Meta(max_length=limits.WATCHED_MAX)]
 
 
 class Watched(Message, frozen=True):
-    """The links (source, destination) and readings (robot, channel) that somebody looks at; all others nobody does."""
+    """The links (source, destination) and readings (robot, channel) that viewers watch, all of them."""
 
     links: Pairs
     readings: Pairs
@@ -296,15 +296,15 @@ class Watched(Message, frozen=True):
 
 
 class Subscription(Item, frozen=True):
-    """A channel of an endpoint (a robot, player or client) that a client wants to hear."""
+    """A channel of an endpoint (a robot, player or client) that a client subscribes to."""
 
     source: Name
     channel: Name
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number that it has. It goes on with its own numbers
-    when it had been let in and has lost the vHub: `returns` is how often."""
+    """A client asks for admission. `received` is the last downlink number up to which it has all. `returns` counts how
+    often it has lost the vHub after a welcome; its own numbers then continue."""
 
     name: Name
     boot: Name
@@ -315,9 +315,8 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
 
 
 class ClientWelcome(Message, frozen=True):
-    """The vHub accepts a client, as an answer to its hello with the same `returns`: numbers go on from `sequence`, the
-    next downlink is `downlink` + 1. Everything up to `sequence` is recorded, nothing behind it is: who comes back sends
-    that again."""
+    """The vHub admits a client, in answer to its hello with the same `returns`: numbers continue from `sequence`, the
+    next downlink is `downlink` + 1. Packets up to `sequence` are recorded; a client sends later ones again."""
 
     name: Name
     boot: Name
@@ -331,7 +330,10 @@ class ClientWelcome(Message, frozen=True):
 
 
 class Sent(Item, frozen=True):
-    """One packet of a client: to all subscribers without a `destination`. `stamp_ns`, its own clock, is not judged."""
+    """One packet of a client: to all subscribers without a `destination`.
+
+    `stamp_ns` is of the client's own clock and affects no fate.
+    """
 
     sequence: Counter
     destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
@@ -345,9 +347,9 @@ Subscriptions = Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MA
 
 
 class Join(Message, frozen=True):
-    """A client takes part: with period and offset in ticks (0: free-running), or when a packet of `arrivals` comes.
+    """A client joins: with period and offset in ticks (0: free-running), or due when a packet of `arrivals` arrives.
 
-    `hub` is the vHub's process whose welcome it answers; where it is empty, any.
+    `hub` is the boot of the vHub whose welcome it answers; empty for any.
     """
 
     name: Name
@@ -360,7 +362,7 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
+    """Packets of a free-running client, numbered without gaps; the vHub accepts none after a gap."""
 
     name: Name
     boot: Name
@@ -368,7 +370,7 @@ class Up(Message, frozen=True):
 
 
 class Done(Message, frozen=True):
-    """A lockstep client's answer to `Go(tick)`: what it sends at that tick."""
+    """A lockstep client's answer to `Go(tick)`: the packets that it sends at that tick."""
 
     name: Name
     boot: Name
@@ -398,7 +400,7 @@ class Go(Message, frozen=True):
 
 
 class Down(Message, frozen=True):
-    """Downlink `number` to a free-running client, or (a lockstep client too) the news that the run is over."""
+    """Downlink `number` to a free-running client, or, to any client, the end of the run."""
 
     number: Counter
     tick: Counter
@@ -408,16 +410,16 @@ class Down(Message, frozen=True):
 
 
 class Heard(Message, frozen=True):
-    """The vHub has recorded what a free-running client sent up to the number `acknowledged`.
+    """The vHub has recorded the packets of a free-running client up to the number `acknowledged`.
 
-    Downlinks say the same; this is for a client that gets none.
+    Downlinks carry the same number; this is for a client that receives none.
     """
 
     acknowledged: Counter
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
-    """The vHub will not have this client, and why. `joins`: it answers a Join of one that was welcomed, not a hello."""
+    """The vHub refuses this client; with `joins` it answers the Join of a welcomed client instead of a hello."""
 
     name: Name
     boot: Name
@@ -426,7 +428,7 @@ class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
 
 
 class Failure(Message, frozen=True):
-    """A player's own code has failed: its process ends, and no other one would do better. `reason` is a sentence."""
+    """A player's own code has raised: its process ends and is not restarted. `reason` is a sentence."""
 
     name: Name
     boot: Name

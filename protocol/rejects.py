@@ -1,9 +1,9 @@
-"""What comes from outside is read here or refused, and refusals are counted by whom.
+"""Decodes messages from outside, and counts refusals by sender.
 
-Each refusal is counted by channel and sender; the first few of each are logged with their first bytes, for whoever has
-to find out. A stranger, under a name that the deployment does not declare, who is refused more than 100 times in a
-second is in quarantine for a while: what comes under that name is not even decoded. A declared name is not, since
-whoever may write under it could otherwise silence its owner; it is named as an error instead.
+Each refusal is counted by channel and sender; the first few of each are logged with their first bytes. A sender with a
+name that the deployment does not declare is quarantined after more than 100 refusals in a second: its messages are not
+decoded. A declared name is not quarantined, because another process that may write under it could silence its owner;
+it is logged as an error instead.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 TOLD_EACH: Final = 3
 """How many refusals of a sender on a channel are logged."""
 TOLD_MAX: Final = 100
-"""How many are logged in all."""
+"""How many refusals are logged in all."""
 BYTES_TOLD: Final = 32
 WINDOW_NS: Final = 1_000_000_000
 REFUSALS_MAX: Final = 100
-"""In one window, from one sender."""
+"""Refusals of one sender in one window, above which it is quarantined."""
 QUARANTINE_NS: Final = 10_000_000_000
 OTHERS: Final = "others"
-"""Under what senders are counted when there are too many of them to count each."""
+"""The name for all senders beyond those that are counted separately."""
 
 
 @dataclass(slots=True)
 class _Sender:
-    """What one sender was refused lately."""
+    """The recent refusals of one sender."""
 
     since_ns: int
     count: int = 0
@@ -44,14 +44,14 @@ class _Sender:
 
 
 class Quarantined(Malformed):
-    """It was not looked at: too much that came under this name was refused."""
+    """The message was not decoded, because its sender is in quarantine."""
 
 
 class Refusals:
-    """Reads what comes, and keeps the account of what is refused."""
+    """Decodes messages, and counts refusals."""
 
     def __init__(self, say: Callable[[Say], object], deployment: Callable[[], Deployment | None]) -> None:
-        """`deployment` declares who is no stranger; before there is one, everybody may be declared."""
+        """`deployment` returns the deployment, which declares names; while it is None, every name counts as declared."""
         self.counts: dict[tuple[str, str], int] = {}
         """Refusals by channel and sender."""
         self._say = say
@@ -60,7 +60,7 @@ class Refusals:
         self._deployment = deployment
 
     def read(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> Any:
-        """Return the message that came on a channel's key of `name`, or raise `Malformed`."""
+        """Return the message that arrived on a channel's key of `name`, or raise `Malformed`."""
         if self._senders:
             sender = self._senders.get(name)
             if sender is not None and now_ns < sender.until_ns:
@@ -68,7 +68,7 @@ class Refusals:
         return channels.read(channel, name, payload)
 
     def refuse(self, channel: Channel, name: str, payload: bytes, error: Refused, now_ns: int) -> None:
-        """Count a refusal; log it if it is one of the first; see whether it was one too many."""
+        """Count a refusal, log it if it is one of the first, and quarantine its sender if it is one too many."""
         key = channel.name, name
         if key not in self.counts and len(self.counts) >= limits.CLIENTS_MAX:
             key = channel.name, OTHERS
@@ -83,11 +83,11 @@ class Refusals:
         self._watch(name, now_ns)
 
     def _watch(self, name: str, now_ns: int) -> None:
-        """Put a stranger with too many refusals into quarantine, name anybody else."""
+        """Quarantine an undeclared sender with too many refusals; log a declared one."""
         sender = self._senders.get(name)
         if sender is None:
             if len(self._senders) >= limits.CLIENTS_MAX:
-                self._senders.pop(next(iter(self._senders)))  # the one that was first
+                self._senders.pop(next(iter(self._senders)))  # the oldest one
             sender = self._senders[name] = _Sender(now_ns)
         if now_ns - sender.since_ns >= WINDOW_NS:
             sender.since_ns, sender.count = now_ns, 0
@@ -105,10 +105,10 @@ class Refusals:
             self._say(Say("error", much))
 
     def by_sender(self) -> dict[str, int]:
-        """Return the counts by `channel sender`, for people."""
+        """Return the counts by `channel sender`, for display."""
         return {f"{channel} {show_name(name)}": count for (channel, name), count in sorted(self.counts.items())}
 
 
 def show_name(name: str) -> str:
-    """A name from a key as it may stand in a log: keys are not checked for what stands in them."""
+    """Return a name from a key, escaped and shortened for a log: keys are not checked."""
     return name if name.isascii() and name.isprintable() and len(name) <= limits.NAME_LENGTH_MAX else show(name)

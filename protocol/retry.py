@@ -1,4 +1,4 @@
-"""How long a core waits before it asks again for what it lacks: max(20 ms, 2 T), then doubled up to 1 s."""
+"""The back-off of a core that requests missing messages: max(20 ms, 2 T), then doubled up to 1 s."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from foosim.common import limits
 
 
 class Patience:
-    """When to ask again. `at_ns` is the next time."""
+    """The time of the next request, `at_ns`."""
 
     def __init__(self, now_ns: int) -> None:
         self.at_ns = now_ns
         self._after_ns = limits.WANT_AFTER_NS
 
     def progress(self, tick_ns: int, now_ns: int) -> None:
-        """Something went on: wait anew."""
+        """Restart the back-off, because there was progress."""
         self._after_ns = max(limits.WANT_AFTER_NS, 2 * tick_ns)
         self.at_ns = now_ns + self._after_ns
 
@@ -21,6 +21,6 @@ class Patience:
         return now_ns >= self.at_ns
 
     def asked(self, now_ns: int) -> None:
-        """It was asked for again: wait twice as long for the next time."""
+        """Double the back-off, after a request."""
         self._after_ns = min(2 * self._after_ns, limits.WANT_EVERY_NS_MAX)
         self.at_ns = now_ns + self._after_ns
