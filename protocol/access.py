@@ -116,7 +116,7 @@ def _each(reads: Reads, plane: Plane, expression: Callable[[Channel, bool], str]
 
 
 def _readers(channel: Channel, writer: str) -> set[str]:
-    """Return the key expressions by which a writer may learn of subscribers: as a reader declares them, and its own key,
+    """Return the key expressions by which a writer may learn of subscribers: as readers declare them, and its own key,
     as which a router may announce their union."""
     heard = any(channel is read and not own for reads in _READS.values() for read, own in reads)
     return {_declared(channel, "*"), channel.key_for(writer)} if heard else {channel.key_for(writer)}

@@ -28,7 +28,7 @@ class Plane(Enum):
 class Channel:
     """One row of the table. Messages of an `express` channel are sent at once, unbatched.
 
-    A `blocking` channel holds its writer when a reader is slow; another one drops the messages that a reader does not take.
+    A `blocking` channel holds its writer when a reader is slow; another one drops what a slow reader does not take.
     """
 
     name: str

@@ -51,7 +51,7 @@ class Refusals:
     """Decodes messages, and counts refusals."""
 
     def __init__(self, say: Callable[[Say], object], deployment: Callable[[], Deployment | None]) -> None:
-        """`deployment` returns the deployment, which declares names; while it is None, every name counts as declared."""
+        """`deployment` returns the deployment, which declares names; without one, every name counts as declared."""
         self.counts: dict[tuple[str, str], int] = {}
         """Refusals by channel and sender."""
         self._say = say
