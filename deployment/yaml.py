@@ -1,9 +1,9 @@
-"""YAML from outside, read into a small tree that knows where everything stands, and written back.
+"""YAML from outside, read into a small tree with the place of each node, and written back.
 
-Only the events of PyYAML's pure-Python parser are used: no object is constructed by PyYAML, nothing recurses, and the
-C loader (which crashes on deep nesting) is never called. Anchors, aliases, tags and merge keys are refused, as are
-texts that are too big, too deep or too numerous; all of them are reported together. Scalars mean what YAML 1.2's core
-schema says: `on`, `no` and `12:30:45` are text, `1e5` is a number. Keys are always text.
+PyYAML composes the nodes, by its pure-Python parser: the C loader crashes on deep nesting. Anchors, aliases, tags and
+merge keys, and texts that are too large, too deep or too numerous, are refused before they are composed; all problems
+are reported together. No object is constructed by PyYAML. Scalars have the values of YAML 1.2's core schema: `on`, `no`
+and `12:30:45` are text, `1e5` is a number. Keys are always text.
 """
 
 import math
@@ -30,7 +30,7 @@ _BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
 
 @dataclass(frozen=True, slots=True, order=True)
 class Place:
-    """Where something stands: counted from 1, columns in characters. `rank` orders files, the deployment first."""
+    """A place in a file: line and column from 1, in characters. `rank` orders files, the deployment first."""
 
     rank: int
     line: int
@@ -73,7 +73,7 @@ class Items:
 
 @dataclass(slots=True)
 class Fields:
-    """A mapping: each key's value, and where the key stands."""
+    """A mapping: the value and the place of each key."""
 
     place: Place
     values: "dict[str, Tree]" = field(default_factory=dict)
@@ -83,159 +83,132 @@ class Fields:
 Tree = Leaf | Items | Fields
 
 Locate = Callable[[int, int, int], Place]
-"""From what PyYAML counts from 0, the index in the text, the line and the column, to a place."""
+"""From index in the text, line and column, which PyYAML counts from 0, to a place."""
 
 
 class _Stop(Exception):
-    """The rest of the text is not worth reading, or not readable."""
+    """The rest of the text is not read."""
 
 
 def locate_in(file: str) -> Locate:
-    """Places in a file of that name."""
+    """Return the function that gives places in a file of that name."""
     return lambda index, line, column: Place(0, line + 1, column + 1, file)
 
 
 def read_tree(text: str, locate: Locate) -> tuple[Tree | None, list[Problem]]:
-    """The tree of the one document in `text`, and every problem. The tree is None unless the text is harmless.
+    """Return the tree of the one document in `text`, and every problem. The tree is None where anything is refused.
 
-    Duplicate keys are a problem too, but leave a tree (with the first value), so that the schema's problems can be
-    reported in the same breath.
+    A duplicate key is a problem that leaves a tree, with the first value, so that the schema's problems can be reported
+    together with it.
     """
-    reader = _Reader(locate)
-    harmless = reader.read(text)
-    return (reader.root if harmless else None), sorted(set(reader.problems))
+    start = locate(0, 0, 0)
+    if (size := len(text.encode("utf-8", "surrogatepass"))) > limits.DEPLOYMENT_BYTES_MAX:
+        return None, [Problem(start, describe(f"more than {limits.DEPLOYMENT_BYTES_MAX} bytes", size))]
+    try:
+        composer = _Composer(text, locate)
+    except yaml.reader.ReaderError as error:
+        before = text[: error.position]
+        place = locate(len(before), before.count("\n"), len(before) - before.rfind("\n") - 1)
+        return None, [Problem(place, describe("a character that YAML does not allow", text[error.position]))]
+    tree = None
+    try:
+        if not composer.check_node():
+            return None, [Problem(start, describe("no YAML document", text[:40]))]
+        tree = composer.tree(composer.get_node())
+        if composer.check_node():
+            second = composer.peek_event()  # type: ignore[no-untyped-call]
+            composer.refuse(second, "more than one YAML document", "---")
+    except _Stop:
+        pass
+    except yaml.MarkedYAMLError as error:
+        what = ", ".join(part for part in (error.problem, error.context) if part)
+        place = start if error.problem_mark is None else composer.place(error.problem_mark)
+        composer.refusals.append(Problem(place, f"not valid YAML, {what}"))
+    except (ValueError, OverflowError):
+        # PyYAML's scanner passes absurd escapes and versions to chr() and int(), and their errors on.
+        what = describe("not valid YAML", "a number out of range")
+        composer.refusals.append(Problem(composer.place(composer.get_mark()), what))
+    finally:
+        composer.dispose()
+    return (None if composer.refusals else tree), sorted({*composer.refusals, *composer.duplicates})
 
 
-class _Reader:
-    """Builds the tree from parser events with a stack of its own."""
+class _Composer(yaml.SafeLoader):
+    """PyYAML's composer, with refusals and bounds that are checked before it descends."""
 
-    def __init__(self, locate: Locate) -> None:
-        self.root: Tree | None = None
-        self.problems: list[Problem] = []
+    def __init__(self, text: str, locate: Locate) -> None:
+        super().__init__(text)
+        self.refusals: list[Problem] = []
+        self.duplicates: list[Problem] = []
         self._locate = locate
-        self._stack: list[Items | Fields] = []
-        # For each open collection the key whose value comes next: None where a key comes next, and in sequences.
-        self._keys: list[tuple[str, Place] | None] = []
-        self._nodes = 0
-        self._documents = 0
-        self._harmless = True
+        self._depth = self._count = 0
 
-    def read(self, text: str) -> bool:
-        size = len(text.encode("utf-8", "surrogatepass"))
-        try:
-            if size > limits.DEPLOYMENT_BYTES_MAX:
-                raise self._stop(self._locate(0, 0, 0), f"more than {limits.DEPLOYMENT_BYTES_MAX} bytes", size)
-            self._read_events(text)
-        except _Stop:
-            return False
-        if self._documents == 0:
-            self._refuse(self._locate(0, 0, 0), "no YAML document", text[:40])
-        return self._harmless
+    def place(self, mark: Any) -> Place:
+        return self._locate(mark.index, mark.line, mark.column)
 
-    def _read_events(self, text: str) -> None:
-        try:
-            loader = yaml.SafeLoader(text)
-        except yaml.reader.ReaderError as error:
-            before = text[: error.position]
-            line_start = before.rfind("\n") + 1
-            place = self._locate(len(before), before.count("\n"), len(before) - line_start)
-            raise self._stop(place, "a character that YAML does not allow", text[error.position]) from None
-        try:
-            while loader.check_event():
-                self._take(loader.get_event())  # type: ignore[no-untyped-call]
-        except yaml.MarkedYAMLError as error:
-            what = ", ".join(part for part in (error.problem, error.context) if part)
-            self.problems.append(Problem(self._at(error.problem_mark), f"not valid YAML, {what}"))
-            raise _Stop from None
-        except (ValueError, OverflowError):
-            # PyYAML's scanner passes absurd escapes and versions to chr() and int(), and their errors on.
-            raise self._stop(self._at(loader.get_mark()), "not valid YAML", "a number out of range") from None
-        finally:
-            loader.dispose()
+    def refuse(self, at: yaml.Event | yaml.Node, what: str, value: object) -> None:
+        self.refusals.append(Problem(self.place(at.start_mark), describe(what, value)))
 
-    def _at(self, mark: Any) -> Place:
-        return self._locate(0, 0, 0) if mark is None else self._locate(mark.index, mark.line, mark.column)
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        self._count += 1
+        if isinstance(event, yaml.AliasEvent):
+            self.refuse(event, _refused("aliases", "*"), f"*{event.anchor}")
+        elif event.anchor is not None:
+            self.refuse(event, _refused("anchors", "&"), f"&{event.anchor}")
+        if getattr(event, "tag", None) is not None:
+            self.refuse(event, _refused("tags", "!"), event.tag)
+        if isinstance(parent, yaml.MappingNode) and index is None and not isinstance(event, yaml.ScalarEvent):
+            self._stop(event, "a key is a text", "a collection or an alias")
+        is_collection = isinstance(event, yaml.CollectionStartEvent)
+        if self._count > NODES_MAX:
+            self._stop(event, f"more than {NODES_MAX} nodes", self._count)
+        if is_collection and self._depth == DEPTH_MAX:
+            self._stop(event, f"nested more than {DEPTH_MAX} deep", DEPTH_MAX + 1)
+        if isinstance(event, yaml.AliasEvent):
+            self.get_event()  # type: ignore[no-untyped-call]
+            return yaml.ScalarNode("", "", event.start_mark, event.end_mark)
+        event.anchor = None  # refused already: a second one of the name would end the reading
+        self._depth += is_collection
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._depth -= is_collection
+        return node
 
-    def _take(self, event: yaml.Event) -> None:
-        place = self._at(event.start_mark)
-        if isinstance(event, yaml.DocumentStartEvent):
-            self._documents += 1
-            if self._documents > 1:
-                raise self._stop(place, "more than one YAML document", "---")
-        elif isinstance(event, yaml.AliasEvent):
-            self._count(place)
-            self._refuse(place, _refused("aliases", "*"), f"*{event.anchor}")
-            self._add(Leaf(place, None))
-        elif isinstance(event, yaml.ScalarEvent):
-            self._open(event, place)
-            self._scalar(event, place)
-        elif isinstance(event, yaml.CollectionStartEvent):
-            self._open(event, place)
-            node = Items(place) if isinstance(event, yaml.SequenceStartEvent) else Fields(place)
-            self._add(node)
-            self._stack.append(node)
-            self._keys.append(None)
-            if len(self._stack) > DEPTH_MAX:
-                raise self._stop(place, f"nested more than {DEPTH_MAX} deep", len(self._stack))
-        elif isinstance(event, yaml.CollectionEndEvent):
-            self._stack.pop()
-            self._keys.pop()
+    def _stop(self, at: yaml.Event, what: str, value: object) -> None:
+        self.refuse(at, what, value)
+        raise _Stop
 
-    def _open(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent, place: Place) -> None:
-        self._count(place)
-        if event.anchor is not None:
-            self._refuse(place, _refused("anchors", "&"), f"&{event.anchor}")
-        if event.tag is not None:
-            self._refuse(place, _refused("tags", "!"), event.tag)
+    def tree(self, node: Any) -> Tree:
+        """Return the tree of a node, whose depth is bounded."""
+        place = self.place(node.start_mark)
+        if isinstance(node, yaml.ScalarNode):
+            return Leaf(place, self._scalar(node))
+        if isinstance(node, yaml.SequenceNode):
+            return Items(place, [self.tree(item) for item in node.value])
+        fields = Fields(place)
+        for key, value in node.value:
+            name, at, child = self._text(key), self.place(key.start_mark), self.tree(value)
+            if name == "<<" and key.style is None:
+                self.refuse(key, "merge keys are refused", name)
+            if (first := fields.keys.get(name)) is not None:
+                self.duplicates.append(Problem(at, describe(f"duplicate key (first in line {first.line})", name)))
+                continue
+            fields.values[name], fields.keys[name] = child, at
+        return fields
 
-    def _count(self, place: Place) -> None:
-        self._nodes += 1
-        if self._nodes > NODES_MAX:
-            raise self._stop(place, f"more than {NODES_MAX} nodes", self._nodes)
-
-    def _scalar(self, event: yaml.ScalarEvent, place: Place) -> None:
-        text = event.value
+    def _text(self, node: yaml.ScalarNode) -> str:
+        text: str = node.value
         if any("\ud800" <= character <= "\udfff" for character in text):
-            self._refuse(place, "half a character (a lone surrogate)", text)
-        if self._stack and isinstance(self._stack[-1], Fields) and self._keys[-1] is None:
-            if text == "<<" and event.implicit[0]:
-                self._refuse(place, "merge keys are refused", text)
-            self._keys[-1] = (text, place)
-            return
-        value: Scalar = text
-        if event.implicit[0] and event.tag is None:
-            try:
-                value = resolve(text)
-            except ValueError as error:
-                self._refuse(place, str(error), text)
-        self._add(Leaf(place, value))
+            self.refuse(node, "half a character (a lone surrogate)", text)
+        return text
 
-    def _add(self, node: Tree) -> None:
-        if not self._stack:
-            self.root = node
-            return
-        parent = self._stack[-1]
-        if isinstance(parent, Items):
-            parent.items.append(node)
-            return
-        if self._keys[-1] is None:
-            raise self._stop(node.place, "a key is a text", "a collection or an alias")
-        name, place = self._keys[-1]
-        self._keys[-1] = None
-        if name in parent.values:
-            first = parent.keys[name]
-            self.problems.append(Problem(place, describe(f"duplicate key (first in line {first.line})", name)))
-        else:
-            parent.values[name] = node
-            parent.keys[name] = place
-
-    def _refuse(self, place: Place, what: str, value: object) -> None:
-        self._harmless = False
-        self.problems.append(Problem(place, describe(what, value)))
-
-    def _stop(self, place: Place, what: str, value: object) -> _Stop:
-        self._refuse(place, what, value)
-        return _Stop()
+    def _scalar(self, node: yaml.ScalarNode) -> Scalar:
+        text = self._text(node)
+        try:
+            return text if node.style else resolve(text)
+        except ValueError as error:
+            self.refuse(node, str(error), text)
+            return None
 
 
 def _refused(what: str, sign: str) -> str:
@@ -243,7 +216,7 @@ def _refused(what: str, sign: str) -> str:
 
 
 def resolve(text: str) -> Scalar:
-    """What a plain scalar means by YAML 1.2's core schema; ValueError if it is a number that is not usable."""
+    """Return the value of a plain scalar by YAML 1.2's core schema; raises ValueError for a number out of bounds."""
     if _NULL.fullmatch(text):
         return None
     if _BOOL.fullmatch(text):
@@ -267,7 +240,7 @@ def _integer(text: str) -> int:
 
 
 def plain(tree: Tree) -> Any:
-    """The tree as dicts, lists and scalars, all fresh."""
+    """Return the tree as new dicts, lists and scalars."""
     if isinstance(tree, Leaf):
         return tree.value
     if isinstance(tree, Items):
@@ -276,7 +249,7 @@ def plain(tree: Tree) -> Any:
 
 
 def copied(tree: Tree) -> Tree:
-    """The tree with collections of its own: changing them leaves the other as it is. Scalars are shared."""
+    """Return a copy of the tree; scalars are shared."""
     if isinstance(tree, Items):
         return Items(tree.place, [copied(item) for item in tree.items])
     if isinstance(tree, Fields):
@@ -285,7 +258,7 @@ def copied(tree: Tree) -> Tree:
 
 
 def measure(tree: Tree) -> tuple[int, int]:
-    """Depth of nesting and number of nodes (keys too), as the reader counts them."""
+    """Return depth of nesting and number of nodes, keys included, as the reader counts them."""
     if isinstance(tree, Leaf):
         return 0, 1
     children = tree.items if isinstance(tree, Items) else list(tree.values.values())
@@ -295,7 +268,7 @@ def measure(tree: Tree) -> tuple[int, int]:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes so that `resolve` reads the same back: quotes what YAML 1.2 needs quoted beside what YAML 1.1 does."""
+    """Quotes the scalars that YAML 1.2 or YAML 1.1 would read as another value."""
 
 
 for _tag, _pattern, _first in (
@@ -308,7 +281,7 @@ for _tag, _pattern, _first in (
 
 
 def write_yaml(data: Any) -> str:
-    """Plain data as block style YAML, in the order given, without comments; `read_tree` reads the same data back."""
+    """Return plain data as block style YAML, in its order, without comments; `read_tree` reads the same data back."""
     text = yaml.dump(
         data, Dumper=_Dumper, default_flow_style=False, sort_keys=False, allow_unicode=True, width=1_000_000
     )
