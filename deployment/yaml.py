@@ -152,7 +152,8 @@ class _Composer(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         self._count += 1
-        if isinstance(event, yaml.AliasEvent):
+        is_alias = isinstance(event, yaml.AliasEvent)
+        if is_alias:
             self.refuse(event, _refused("aliases", "*"), f"*{event.anchor}")
         elif event.anchor is not None:
             self.refuse(event, _refused("anchors", "&"), f"&{event.anchor}")
@@ -165,7 +166,7 @@ class _Composer(yaml.SafeLoader):
             self._stop(event, f"more than {NODES_MAX} nodes", self._count)
         if is_collection and self._depth == DEPTH_MAX:
             self._stop(event, f"nested more than {DEPTH_MAX} deep", DEPTH_MAX + 1)
-        if isinstance(event, yaml.AliasEvent):
+        if is_alias:
             self.get_event()  # type: ignore[no-untyped-call]
             return yaml.ScalarNode("", "", event.start_mark, event.end_mark)
         event.anchor = None  # refused already: a second one of the name would end the reading
