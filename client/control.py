@@ -6,16 +6,15 @@ which names the tick at which the request takes effect; a refusal raises `Reques
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Literal, Self, TypeVar
+from typing import Any, Final, Literal, Self
 
-from foosim.common.errors import BadValue, Failed, Malformed, Refused
+from foosim.client.asking import Take, Taken, answer_to, ask
+from foosim.common.errors import BadValue, Failed, Refused
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.struct_types import Vector
 from foosim.common.units import parse_pace
@@ -23,7 +22,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.channels import Channel, Plane
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import encode
 from foosim.protocol.messages import Answer, Fetch, Inquiry, Request
 from foosim.runtime.command import PKI_VARIABLE
 from foosim.runtime.loop import Wire
@@ -35,12 +34,9 @@ from foosim.runtime.transport.settings import Security
 
 ANSWER_S: Final = 30.0
 """How long an answer is waited for: adding waits until every node has built an engine."""
-AGAIN_S: Final = 0.1
 CONNECT_S: Final = 5.0
 WAITING_MAX: Final = 256
 Role = Literal["operator", "viewer"]
-Taken = TypeVar("Taken")
-Take = Callable[[str, bytes], Taken | None]
 _ASKED_BY: Final[dict[str, tuple[type[Request], Channel]]] = {
     "operator": (Request, channels.REQUEST),
     "viewer": (Inquiry, channels.INQUIRY),
@@ -103,7 +99,7 @@ class Control:
         identity = f"{self._name[-7:]}-{self._requests}"
         kind, channel = _ASKED_BY[self._role]
         payload = encode(kind(self._name, identity, verb, encode_json(arguments)))
-        answer = self._say(channel, payload, answer_to(identity), timeout_s, give_up)
+        answer = self._ask(channel, payload, answer_to(channels.ANSWER, identity), timeout_s, give_up)
         if answer is None:
             raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{self._hint()}")
         if not answer.accepted:
@@ -140,54 +136,21 @@ class Control:
             digest, offset = lacking
             payload = encode(Fetch(self._name, self._name, bytes.fromhex(digest), offset))
 
-            def take(key: str, content: bytes) -> bool | None:
+            def take(key: str, name: str, content: bytes) -> bool | None:
                 is_piece = key == channels.PIECE.key
                 return (is_piece and fetching.take(channels.read(channels.PIECE, self._name, content))) or None
 
-            if not self._say(channels.FETCH, payload, take, timeout_s, give_up):
+            if not self._ask(channels.FETCH, payload, take, timeout_s, give_up):
                 raise NoAnswer(f"no piece of a file of the deployment within {timeout_s:g} s{self._hint()}")
         return fetching.contents()
 
-    def _say(
-        self,
-        channel: Channel,
-        payload: bytes,
-        take: Take[Taken],
-        timeout_s: float,
-        give_up: Callable[[], bool],
+    def _ask(
+        self, channel: Channel, payload: bytes, take: Take[Taken], timeout_s: float, give_up: Callable[[], bool]
     ) -> Taken | None:
-        """Say something until `take` makes something of what comes (a channel's key, the payload); None at the end."""
-        deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
-            self._wire.put(channel, self._name, payload)
-            taken = self._hear(take, min(left_s, AGAIN_S))
-            if taken is not None:
-                return taken
-        return None
-
-    def _hear(self, take: Take[Taken], timeout_s: float) -> Taken | None:
-        """Return what `take` makes of something that comes in time."""
-        deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            for key, _, content in self._inbox.take(left_s):
-                with contextlib.suppress(Malformed):
-                    taken = take(key, content)
-                    if taken is not None:
-                        return taken
-        return None
+        return ask(self._wire, self._inbox, channel, self._name, payload, take, timeout_s, give_up)
 
     def _hint(self) -> str:
         return "" if self._credentials is None else f"; is {self._credentials.identity} {_MAY[self._role]} of this run?"
-
-
-def answer_to(identity: str) -> Take[Answer]:
-    """Return what takes the answer to a request, of all that comes."""
-
-    def take(key: str, content: bytes) -> Answer | None:
-        answer = decode(Answer, content, channels.ANSWER.bytes_max) if key == channels.ANSWER.key else None
-        return answer if answer is not None and answer.id == identity else None
-
-    return take
 
 
 def connect(run: str | None = None, role: Role = "operator", give_up: Callable[[], bool] = lambda: False) -> Control:

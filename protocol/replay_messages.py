@@ -1,7 +1,7 @@
-"""The messages of a replay: what a capture is played as, to whoever listens on the replay plane.
+"""The messages of a replay on the replay plane.
 
-Times are the capture's simulated ns. All of it travels on one channel, whose keys end in what it is (`STREAMS`): who
-reads them all has one order. Requests and answers are those of `messages`.
+Times are the capture's simulated ns. They share one channel, whose keys end in the stream: a reader of all streams
+receives one order. Requests and answers are those of `messages`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from foosim.common.struct_types import Counter, Item, Message, Name, Numbers, Pa
 
 PACKETS, POSES, SCENE, LOG, ROWS, CLOCK = "packets", "poses", "scene", "log", "rows", "clock"
 STREAMS: Final = (PACKETS, POSES, SCENE, LOG, ROWS, CLOCK)
-"""What a played message is: the last part of its key."""
+"""The streams: the last part of a message's key."""
 LinkName = Annotated[str, Meta(min_length=1, max_length=2 * limits.NAME_LENGTH_MAX + 1)]
 """A body and its link, as `red.goal/slide`."""
 
@@ -35,7 +35,7 @@ class PlayedPacket(Message, frozen=True):
 
 
 class PlayedPose(Item, frozen=True):
-    """Where a link is: m, and a quaternion x, y, z, w, in the world frame."""
+    """The pose of a link in the world frame: position in m, orientation as a quaternion x, y, z, w."""
 
     link: LinkName
     position: Vector
@@ -50,9 +50,9 @@ class PlayedPoses(Message, frozen=True):
 
 
 class PlayedScene(Message, frozen=True):
-    """What there is to see and where it hangs: a Foxglove SceneUpdate, as Protobuf has it.
+    """The scene from this time on: a Foxglove SceneUpdate as Protobuf.
 
-    It stands where it was captured; at a time from which is played it is the one that holds there.
+    Its time is that of its capture; at the beginning of a replay or after a seek it is the newest one before.
     """
 
     time_ns: Counter
@@ -68,7 +68,7 @@ class PlayedLine(Message, frozen=True):
 
 
 class PlayedRow(Message, frozen=True):
-    """A row of any other kind, as the capture has it: JSON."""
+    """A row of any other topic (without its `/`), as JSON."""
 
     time_ns: Counter
     topic: Name
@@ -76,10 +76,10 @@ class PlayedRow(Message, frozen=True):
 
 
 class ReplayClock(Message, frozen=True):
-    """Where a replay is. `jumps` counts seeks and rounds of a loop: with it time goes on from elsewhere.
+    """The time and state of a replay. `jumps` counts seeks and rounds of a loop.
 
-    `state` is `playing`, `paused`, `waiting` (for its beginning) or `ended`, which is the last message of each stream;
-    `rate` is as people write it.
+    `state` is `playing`, `paused` or `ended`, which is the last message of each stream; `rate` is `realtime`, `fast` or
+    a factor such as `2x`.
     """
 
     time_ns: Counter

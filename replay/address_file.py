@@ -1,6 +1,6 @@
-"""Where the replays of this user listen, so that `foosim-replay control` finds the newest without an address.
+"""The addresses of this user's replays, so that `foosim-replay control` finds the newest without an address.
 
-A replay holds a lock on its file as long as it lives, so one that is over is never taken for a live one.
+A replay holds a lock on its file as long as it lives.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ import platformdirs
 
 from foosim.common import wall_clock
 from foosim.common.errors import Failed
+from foosim.runtime.run_folder import is_locked
 
 
 class NoReplay(Failed):
-    """No replay runs."""
+    """No replay is running."""
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a replay listens, since when, what it plays, and the folder with its certificates, if it has any."""
+    """The address of a replay, when it began, its capture, and the folder with its certificates, if it has any."""
 
     address: str
     started: str
@@ -38,13 +39,13 @@ def places_folder() -> Path:
 
 @contextmanager
 def noted(address: str, capture: Path, pki: Path | None) -> Iterator[None]:
-    """Let this replay be found as long as the context lasts. Where no file can be written, it needs its address."""
+    """Publish the address of this replay while the context lasts; nothing where no file can be written."""
     path = places_folder() / f"{os.getpid()}-{os.urandom(4).hex()}.json"
     content = Place(address, wall_clock.now_text(), str(capture.absolute()), "" if pki is None else str(pki.absolute()))
     lock = -1
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = path.with_suffix(".new")  # under its own name it is locked and whole
+        fresh = path.with_suffix(".new")  # it is locked and complete under its final name
         lock = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
         fcntl.flock(lock, fcntl.LOCK_EX)
         os.write(lock, msgspec.json.encode(content))
@@ -59,27 +60,15 @@ def noted(address: str, capture: Path, pki: Path | None) -> Iterator[None]:
 
 
 def newest_place() -> Place:
-    """Return where the newest live replay listens; what others left behind goes. Raises NoReplay."""
+    """Return the newest live replay, and remove the files of others that have ended. Raises NoReplay."""
     found = []
     folder = places_folder()
     for path in sorted(folder.glob("*.json")) if folder.is_dir() else ():
         with suppress(OSError, msgspec.DecodeError):
-            if _is_live(path):
+            if is_locked(path):
                 found.append(msgspec.json.decode(path.read_bytes(), type=Place))
             else:
                 path.unlink(missing_ok=True)
     if not found:
-        raise NoReplay("no replay runs here: foosim-replay play CAPTURE starts one, --address says where another is")
+        raise NoReplay("no replay runs here: foosim-replay play CAPTURE starts one, --address names one elsewhere")
     return max(found, key=lambda place: place.started)
-
-
-def _is_live(path: Path) -> bool:
-    """Whether a replay holds a file."""
-    lock = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(lock)
-    return False

@@ -1,14 +1,12 @@
-"""What of a capture is played, and when: its messages become entries in the order of their times, selected and renamed.
+"""The entries of a replay: the messages of a capture, in the order of their times, selected and renamed.
 
 A packet is played when it reached its receiver: a robot, or a client in lockstep, at its tick; a free-running client at
-the packet's due time. Rows of packets stand where their fates became final, at most a tick away from that, so entries
-are put in order over two ticks. Poses, scenes, log and all other rows are played at the times at which they stand.
-Pure: the reader of the file is `play_reader`, the clock is in `playing`.
+the packet's due time. Rows of packets are in the file where their fates became final, at most a tick away from that, so
+entries are sorted over two ticks. Poses, scenes, log and all other rows are played at their captured times.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
@@ -46,19 +44,19 @@ from foosim.vhub.network.packet import DELIVERED
 from foosim.world.layout import BALL
 
 TOPICS: Final = (*ROW_TYPES, *VIEW_TYPES)
-"""What can be played."""
+"""The topics that can be played."""
 BIG: Final = frozenset({TICK, FRAME})
-"""What only a re-simulation is fed with; it is played when it is asked for."""
+"""The topics that only a re-simulation needs, played when they are selected."""
 
 WAITING_MAX: Final = 100_000
-"""How many entries are held to be put in order: more than two ticks bring, whatever a file holds."""
+"""How many entries are held for sorting, whatever a file holds."""
 
 Decode = Callable[[msgspec.json.Decoder[Any], Message], Any]
-"""Gives the row that a message holds, or says which message of which file is damaged."""
+"""Returns the row of a message; raises CaptureError, which names file and message."""
 
 
 class Entry(NamedTuple):
-    """One message to publish: at which simulated time, in which stream, what it is called, and its bytes."""
+    """One message to publish: its captured time, stream, captured name and bytes."""
 
     time_ns: int
     stream: str
@@ -68,38 +66,26 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What is played and under which names. A name is `/packets/SOURCE/DESTINATION/CHANNEL`, `/tf`, `/clients`, ...
+    """The names to play, and new names. A name is `/packets/SOURCE/DESTINATION/CHANNEL`, `/tf`, `/clients`, ...
 
-    `topics` selects names at or below them, `regexes` those in which one is found; without either all is played but
-    /tick and /frame. What one of `excluded` is found in is left out. They are asked about the names of the capture.
+    `topics` selects captured names at or below them; without any, all are played but /tick and /frame.
     """
 
     topics: tuple[str, ...] = ()
-    regexes: tuple[re.Pattern[str], ...] = ()
-    excluded: tuple[re.Pattern[str], ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     """New names of endpoints and bodies."""
     channels: Mapping[str, str] = field(default_factory=dict)
     """New names of channels."""
 
     def has(self, name: str) -> bool:
-        """Whether something of this name is played."""
-        if any(pattern.search(name) for pattern in self.excluded):
-            return False
-        if not self.topics and not self.regexes:
+        """Whether this name is played."""
+        if not self.topics:
             return name not in BIG
-        by_topic = any(name == topic or name.startswith(f"{topic}/") for topic in self.topics)
-        return by_topic or any(pattern.search(name) for pattern in self.regexes)
+        return any(name == topic or name.startswith(f"{topic}/") for topic in self.topics)
 
 
-def make_selection(
-    deployment: Deployment,
-    topics: Sequence[str] = (),
-    regexes: Sequence[str] = (),
-    excluded: Sequence[str] = (),
-    remaps: Sequence[str] = (),
-) -> Selection:
-    """Return a selection as people write it. Raises BadValue, which names the option.
+def make_selection(deployment: Deployment, topics: Sequence[str] = (), remaps: Sequence[str] = ()) -> Selection:
+    """Return a selection from the options of a command. Raises BadValue, which names the option.
 
     A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel.
     """
@@ -108,8 +94,7 @@ def make_selection(
             nearest = nearest_name(topic, TOPICS)
             what = f"--topic: not one of {', '.join(TOPICS)}, nor below one"
             raise BadValue(what, topic, None if nearest is None else show(nearest))
-    names, channels = _renamed(deployment, remaps)
-    return Selection(tuple(topics), _compile("--regex", regexes), _compile("--exclude", excluded), names, channels)
+    return Selection(tuple(topics), *_renamed(deployment, remaps))
 
 
 def _renamed(deployment: Deployment, remaps: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -135,16 +120,6 @@ def _renamed(deployment: Deployment, remaps: Iterable[str]) -> tuple[dict[str, s
     return names, channels
 
 
-def _compile(option: str, texts: Iterable[str]) -> tuple[re.Pattern[str], ...]:
-    patterns = []
-    for text in texts:
-        try:
-            patterns.append(re.compile(text))
-        except re.error as error:
-            raise BadValue(f"{option}: not a regular expression ({error})", text) from None
-    return tuple(patterns)
-
-
 def _parse_remap(text: str) -> tuple[str, str]:
     old, separator, new = text.partition(":=")
     is_channel = old.startswith("/") and new.startswith("/")
@@ -155,32 +130,31 @@ def _parse_remap(text: str) -> tuple[str, str]:
 
 
 class Entries:
-    """Turns the messages of a capture into entries. `too_large` counts rows that no message holds."""
+    """The entries of one capture. `too_large` counts rows that do not fit into a message."""
 
     def __init__(self, deployment: Deployment, selection: Selection) -> None:
         self.too_large = 0
+        self.tick_ns: Final = deployment.tick_ns
         self._selection = selection
-        self._tick_ns = deployment.tick_ns
         self._robots = frozenset(deployment.robots)
         self._lockstep = {name: player.lockstep for name, player in deployment.players.items()}
         self._lockstep |= {name: client.lockstep for name, client in deployment.clients.items()}
-        """As declared, until a row of /clients says how it took part."""
+        """As declared, until a row of /clients has how the client joined."""
         self._decoders = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
         self._views = {topic for topic in VIEW_TYPES if selection.has(topic)}
         self.has_scene: Final = SCENE_TOPIC in self._views
-        """Whether a listener is to know what holds where a replay begins."""
         named = [topic for topic in selection.topics if topic.startswith(capture_rows.PACKETS)]
-        self._packets = bool(named or selection.regexes or not selection.topics)
+        self._packets = bool(named or not selection.topics)
         self._topics = {topic for topic in ROW_TYPES if topic != capture_rows.PACKETS and selection.has(topic)}
         self._links: dict[str, str] = {}
 
     def of(self, messages: Iterable[Message], decode: Decode) -> Iterator[Entry]:
-        """Yield the entries of messages that stand in the order of a capture, by time."""
+        """Yield the entries of messages that are in the order of a capture, by time."""
         waiting: list[tuple[int, int, Entry]] = []
         number = 0
         for message in messages:
             if message.topic == TICK:
-                while waiting and waiting[0][0] <= message.log_ns - self._tick_ns:
+                while waiting and waiting[0][0] <= message.log_ns - self.tick_ns:
                     yield heappop(waiting)[2]
             if len(waiting) >= WAITING_MAX:
                 yield heappop(waiting)[2]
@@ -202,7 +176,7 @@ class Entries:
             self._lockstep[row.client] = row.period > 0
         if topic not in self._topics:
             return None
-        decode(self._decoders[topic], message)  # what is damaged is refused here, not by who hears it
+        decode(self._decoders[topic], message)  # a damaged row is refused here, not by listeners
         row_played = PlayedRow(message.log_ns, topic.removeprefix("/"), message.data)
         return self._unless_too_large(Entry(message.log_ns, ROWS, topic, encode(row_played)))
 
@@ -227,14 +201,14 @@ class Entries:
         return Entry(time_ns, PACKETS, topic, payload)
 
     def _released_ns(self, row: PacketRow) -> int:
-        arrival_ns = row.arrival_tick * self._tick_ns
+        arrival_ns = row.arrival_tick * self.tick_ns
         at_tick = row.destination in self._robots or self._lockstep.get(row.destination, False)
-        if at_tick or arrival_ns - row.due_ns >= self._tick_ns:
+        if at_tick or arrival_ns - row.due_ns >= self.tick_ns:
             return arrival_ns
         return row.due_ns
 
     def view(self, message: Message, at_ns: int | None = None) -> Entry | None:
-        """Return the entry of poses, a line of the log or a scene; a scene may hold at a later time than its own."""
+        """Return the entry of poses, a line of the log or a scene; a scene may be shown later than it was captured."""
         time_ns = message.log_ns if at_ns is None else at_ns
         if message.topic == TF:
             return self._pose(message)

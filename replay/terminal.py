@@ -1,7 +1,7 @@
-"""What a person sees of a replay and the keys that it takes: on a terminal one line that lives, elsewhere plain lines.
+"""The terminal of a replay: single keys without Enter, and one line of progress that is written over.
 
-Keys come one by one without Enter, so the terminal is in another mode meanwhile; it gets its own back whatever ends the
-replay, and while it is stopped (Ctrl-Z). A replay in the background leaves the terminal alone.
+Keys need another mode of the terminal. The terminal gets its own mode back at the end of the replay, and the shell sets
+its own while the replay is stopped (Ctrl-Z). A replay in the background does not touch the terminal.
 """
 
 from __future__ import annotations
@@ -13,138 +13,113 @@ import sys
 import termios
 import threading
 import tty
-from collections.abc import Callable
-from types import FrameType, TracebackType
-from typing import Any, Final, Self, TextIO
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final, TextIO
 
-SHOW_NS_LIVE: Final = 100_000_000
-SHOW_NS_PLAIN: Final = 1_000_000_000
 _ESCAPED: Final = {"\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left"}
-_BEGINNINGS: Final = ("\x1b", "\x1b[", "\x1bO")
 LOOK_S: Final = 0.2
-"""How soon the thread notices that it is to end."""
+"""The interval at which the thread checks whether it has to end."""
 
 
 def split_keys(text: str) -> tuple[list[str], str]:
-    """Return the keys in what a terminal sent, and the beginning of one that is not complete."""
+    """Return the keys in the text of a terminal, and the beginning of an incomplete one."""
     keys: list[str] = []
-    while text:
-        if text in _BEGINNINGS:
-            return keys, text
-        if text[:3] in _ESCAPED:
-            keys.append(_ESCAPED[text[:3]])
-            text = text[3:]
-        elif text[:2] == "\x1bO":  # as some terminals send arrows
-            text = f"\x1b[{text[2:]}"
-        else:
-            keys.append(text[0])
-            text = text[1:]
-    return keys, ""
+    text = text.replace("\x1bO", "\x1b[")  # some terminals send arrows so
+    while text and text not in ("\x1b", "\x1b["):
+        length = 3 if text[:3] in _ESCAPED else 1
+        keys.append(_ESCAPED.get(text[:3], text[0]))
+        text = text[length:]
+    return keys, text
 
 
-class Keys:
-    """Reads keys from a terminal in a thread, and hands each to `pressed`. Without a terminal it does nothing."""
+@contextmanager
+def keys_of_terminal(pressed: Callable[[str], object]) -> Iterator[bool]:
+    """Pass each key to `pressed`, from a thread, while the context lasts; gives False where there is no terminal."""
+    stream = sys.stdin
+    if stream is None or stream.closed or not stream.isatty() or not _is_foreground(stream.fileno()):
+        yield False
+        return
+    file, ended = stream.fileno(), threading.Event()
+    saved = termios.tcgetattr(file)
 
-    def __init__(self, pressed: Callable[[str], None], stream: TextIO | None = None) -> None:
-        self._pressed = pressed
-        self._file = -1
-        self._saved: list[Any] = []
-        self._ended = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._before: Any = None
-        stream = sys.stdin if stream is None else stream
-        if stream is not None and not stream.closed and stream.isatty():
-            self._file = stream.fileno()
+    def set_mode(*_: object) -> None:
+        if _is_foreground(file):
+            tty.setcbreak(file, termios.TCSADRAIN)
 
-    @property
-    def are_read(self) -> bool:
-        return self._thread is not None
+    before = signal.signal(signal.SIGCONT, set_mode)
+    set_mode()
+    thread = threading.Thread(target=_read, args=(file, pressed, ended), name="keys", daemon=True)
+    thread.start()
+    try:
+        yield True
+    finally:
+        ended.set()
+        thread.join()
+        signal.signal(signal.SIGCONT, before)
+        if _is_foreground(file):
+            termios.tcsetattr(file, termios.TCSADRAIN, saved)
 
-    def __enter__(self) -> Self:
-        if self._file >= 0 and self._is_ours():
-            self._saved = termios.tcgetattr(self._file)
-            self._before = signal.signal(signal.SIGCONT, self._go_on)
-            tty.setcbreak(self._file, termios.TCSADRAIN)
-            self._thread = threading.Thread(target=self._run, name="keys", daemon=True)
-            self._thread.start()
-        return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._thread is None:
-            return
-        self._ended.set()
-        self._thread.join()
-        signal.signal(signal.SIGCONT, self._before)
-        if self._is_ours():
-            termios.tcsetattr(self._file, termios.TCSADRAIN, self._saved)
+def _is_foreground(file: int) -> bool:
+    """Whether this process may touch the terminal: the kernel stops background processes that do."""
+    try:
+        return os.tcgetpgrp(file) == os.getpgrp()
+    except OSError:
+        return False
 
-    def _is_ours(self) -> bool:
-        """Whether this process is in the foreground: the terminal stops others that touch it."""
+
+def _read(file: int, pressed: Callable[[str], object], ended: threading.Event) -> None:
+    rest = ""
+    while not ended.is_set():
+        if not _is_foreground(file):
+            ended.wait(LOOK_S)
+            continue
+        if not select.select([file], [], [], LOOK_S)[0]:
+            rest = ""
+            continue
         try:
-            return os.tcgetpgrp(self._file) == os.getpgrp()
+            data = os.read(file, 64)
         except OSError:
-            return False
-
-    def _go_on(self, number: int, frame: FrameType | None) -> None:
-        """After a stop the shell has set the terminal to its own mode."""
-        if self._is_ours():
-            tty.setcbreak(self._file, termios.TCSADRAIN)
-
-    def _run(self) -> None:
-        rest = ""
-        while not self._ended.is_set():
-            ready, _, _ = select.select([self._file], [], [], LOOK_S)
-            if not ready:
-                rest = ""
-                continue
-            if not self._is_ours():
-                self._ended.wait(LOOK_S)
-                continue
-            try:
-                data = os.read(self._file, 64)
-            except OSError:
-                return
-            if not data:
-                return
-            keys, rest = split_keys(rest + data.decode(errors="ignore"))
-            for key in keys:
-                self._pressed(key)
+            return
+        if not data:
+            return
+        keys, rest = split_keys(rest + data.decode(errors="ignore"))
+        for key in keys:
+            pressed(key)
 
 
 class Lines:
-    """Shows what happens: lines that stay, and on a terminal one at the end that is written over."""
+    """Lines of output; on a terminal the progress is one line that is written over."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._live = ""
-        self.is_live = stream.isatty()
-        self.every_ns = SHOW_NS_LIVE if self.is_live else SHOW_NS_PLAIN
+        self._is_live = stream.isatty()
+        self._progress = ""
+        self.every_ns: Final = 100_000_000 if self._is_live else 1_000_000_000
 
-    def say(self, line: str) -> None:
-        """Show a line that stays."""
-        self._write(f"{self._clear()}{line}\n{self._live}")
+    def print(self, line: str) -> None:
+        """Write a line that stays."""
+        self._write(f"{self._erased()}{line}\n{self._progress}")
 
     def show(self, line: str) -> None:
-        """Show where it is: in the same line, or as a line of its own where there is no terminal."""
-        if not self.is_live:
-            self._write(f"{line}\n")
-            return
-        start = self._clear()
-        self._live = line
-        self._write(f"{start}{line}")
+        """Write the progress."""
+        erased = self._erased()
+        self._progress = line if self._is_live else ""
+        self._write(f"{erased}{line}{'' if self._is_live else chr(10)}")
 
     def end(self) -> None:
-        """Leave the last line as it is."""
-        if self._live:
-            self._live = ""
+        """Keep the last progress."""
+        if self._progress:
+            self._progress = ""
             self._write("\n")
 
-    def _clear(self) -> str:
-        return "\r\x1b[K" if self._live else ""
+    def _erased(self) -> str:
+        return "\r\x1b[K" if self._progress else ""
 
     def _write(self, text: str) -> None:
         try:
             self._stream.write(text)
             self._stream.flush()
-        except (BrokenPipeError, ValueError):  # nobody reads it: the replay goes on
+        except (BrokenPipeError, ValueError):  # the replay continues without its reader
             self._stream = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # as long as the process lives

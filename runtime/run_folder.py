@@ -130,7 +130,7 @@ class RunFolder:
 
     def is_left(self) -> bool:
         """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
-        return (self.path / LAUNCHER_FILE).exists() and not self._is_locked(LAUNCHER_FILE) and not self.is_live()
+        return (self.path / LAUNCHER_FILE).exists() and not is_locked(self.path / LAUNCHER_FILE) and not self.is_live()
 
     def release(self) -> None:
         """Give the lock back: the run is over."""
@@ -140,20 +140,7 @@ class RunFolder:
 
     def is_live(self) -> bool:
         """Whether a supervisor holds the folder."""
-        return self._is_locked(LOCK_FILE)
-
-    def _is_locked(self, name: str) -> bool:
-        try:
-            lock = os.open(self.path / name, os.O_RDONLY | os.O_CLOEXEC)
-        except FileNotFoundError:
-            return False
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        finally:
-            os.close(lock)
-        return False
+        return is_locked(self.path / LOCK_FILE)
 
     def write_info(self, info: RunInfo) -> None:
         """Write the run file; a reader sees the old one or the new one."""
@@ -178,6 +165,21 @@ class RunFolder:
         except UNREADABLE:
             return None
         return content if isinstance(content, dict) else None
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a live process holds the lock of a file; False for a file that does not exist."""
+    try:
+        lock = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -20,6 +20,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import messages
 from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
+from foosim.protocol.kept_answers import KeptAnswers
 from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.edits import Disrupt, Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
@@ -225,7 +226,7 @@ class History:
     chain: bytes = CHAIN_START
     edits: dict[int, list[Edit]] = field(default_factory=dict)
     """Edits of ticks that are not committed yet."""
-    answers: dict[tuple[str, str], Answer] = field(default_factory=dict)
+    answers: KeptAnswers = field(default_factory=lambda: KeptAnswers(ANSWERS_KEPT))
     """By sender and id of the request."""
     lags: Lags = field(default_factory=Lags)
     recovered: list[Recovered] = field(default_factory=list)
@@ -294,7 +295,7 @@ def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
         commits={decode(Commit, raw).tick: raw for raw in first.commits},
         chain=first.chain,
         edits={tick: list(edits) for tick, edits in first.edits},
-        answers={(answer.sender, answer.id): answer for answer in first.answers},
+        answers=KeptAnswers(ANSWERS_KEPT, first.answers),
         lags=first.lags,
         recovered=first.recovered,
         started_ns=first.started_ns,
@@ -315,7 +316,7 @@ def _apply(history: History, record: Change) -> None:
         history.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
         history.epoch, history.owners = record, owners
     elif isinstance(record, RequestRecord):
-        history.answers[record.answer.sender, record.answer.id] = record.answer
+        history.answers.keep(record.answer)
         history.asked = [*history.asked, asked(record.verb, record.answer)][-ASKED_KEPT:]
         history.control, history.owners = record.control, record.owners
         _order(history, record)

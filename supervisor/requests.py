@@ -144,7 +144,7 @@ class Requests:
         """Journal an answer and what is added to the order of `tick`; keep it for when the request is repeated."""
         self._state.journal(RequestRecord(tick, edits, answer, self._state.control(), owners, verb))
         self._state.asked.append(asked(verb, answer))
-        self._state.keep_answer(answer)
+        self._state.answers.keep(answer)
         return answer
 
     def end(self) -> None:

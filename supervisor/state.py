@@ -20,7 +20,8 @@ from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
-from foosim.protocol.messages import Answer, Commit, Deliveries, End, Epoch, Part, Prepare, Tempo
+from foosim.protocol.kept_answers import KeptAnswers
+from foosim.protocol.messages import Commit, Deliveries, End, Epoch, Part, Prepare, Tempo
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import (
     ANSWERS_KEPT,
@@ -135,7 +136,7 @@ class RunState:
 
     coming_edits: dict[int, list[Edit]]
     """Edits of ticks that are not released yet."""
-    answers: dict[tuple[str, str], Answer]
+    answers: KeptAnswers
     """By sender and id of the request."""
     asked: deque[Asked]
     """The last requests that change something, for people."""
@@ -191,7 +192,7 @@ class RunState:
         self.orders, self.commits = {}, {}
 
         self.coming_edits, self.disruptions, self.last_disruptions = {}, 0, deque(maxlen=DISRUPTIONS_KEPT)
-        self.answers, self.asked = {}, deque(maxlen=ASKED_KEPT)
+        self.answers, self.asked = KeptAnswers(ANSWERS_KEPT), deque(maxlen=ASKED_KEPT)
 
         self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
         self.recovered, self.returns = [], {}
@@ -314,12 +315,6 @@ class RunState:
         """Keep the network events among the edits of a tick for the status."""
         self.last_disruptions.extend(disruptions_of(tick, edits))
 
-    def keep_answer(self, answer: Answer) -> None:
-        """Keep an answer for a request that is repeated."""
-        self.answers[answer.sender, answer.id] = answer
-        if len(self.answers) > ANSWERS_KEPT:
-            self.answers.pop(next(iter(self.answers)))
-
     # --- the start of a run ------------------------------------------------------------------------------------------
 
     @property
@@ -400,10 +395,10 @@ class RunState:
         self.asked.extend(history.asked)
 
     def restore_requests(self, history: History) -> None:
-        """Restore what requests have asked for, and the last answers, as many as are kept."""
+        """Restore the effects of requests, and the last answers."""
         self.coming_edits, self.disruptions = history.edits, history.control.disruptions
         self.last_disruptions.extend(history.disruptions)
-        self.answers = dict(list(history.answers.items())[-ANSWERS_KEPT:])
+        self.answers = history.answers
 
     def catch_up(self, frame: Frame, chain: bytes, commit: bytes) -> None:
         """Put the state at a committed frame after the last one in the journal, which begins anew with it."""

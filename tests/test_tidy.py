@@ -50,6 +50,7 @@ ONLY_IN = {
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
 SHELLS = {
+    "client/asking.py",
     "client/class_check.py",
     "client/client.py",
     "client/main.py",
@@ -98,7 +99,6 @@ SHELLS = {
     "replay/main.py",
     "cli/replay_play.py",
     "replay/address_file.py",
-    "replay/reader.py",
     "replay/terminal.py",
     "rehearsal/run.py",
     "cli/rehearse.py",

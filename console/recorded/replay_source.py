@@ -1,7 +1,7 @@
-"""A replay that somebody plays on the replay plane (`foosim-replay play`) as a source of the page.
+"""A replay on the replay plane (`foosim-replay play`) as a source of the page.
 
-Its connection belongs to a thread, which hears and asks; what it hears is told in the event loop. Poses come with names
-of links, so the scene is that of the captured deployment with what these names say was added.
+Its connection belongs to a thread, which passes messages on to the event loop. Poses have names of links, so the scene
+is that of the captured deployment with the entities that these names add.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.client.replay_listener import Replay, ReplayedLine, ReplayedPoses, ReplayedRow, ReplayGone, ReplayTime
+from foosim.client.replay_listener import Replay, ReplayGone
 from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import decode_json
 from foosim.console.clock.deck import Known, checked, needed
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.deployment.schema import Deployment
+from foosim.protocol.replay_messages import PlayedLine, PlayedPoses, PlayedRow, ReplayClock
 from foosim.world.layout import ADDABLE, build_layout
 
 ARGUMENTS: Final[Known] = {
@@ -34,12 +36,12 @@ ARGUMENTS: Final[Known] = {
 }
 STREAMS: Final = ("poses", "clock", "log", "rows")
 HEAR_S: Final = 0.02
-"""How long the thread listens before it looks whether something is asked."""
+"""How long the thread waits for messages before it looks for requests."""
 ROW_MARKS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
-    "/epochs": lambda row: f"epoch {row['epoch']}",
-    "/recoveries": lambda row: f"{row['what']} {row['name']}: {row['reason']}",
+    "epochs": lambda row: f"epoch {row['epoch']}",
+    "recoveries": lambda row: f"{row['what']} {row['name']}: {row['reason']}",
 }
-"""Rows that are marks, and what they say."""
+"""The texts of rows that are marks."""
 Ask = tuple[str, Mapping[str, Any], "Future[dict[str, Any]]"]
 
 
@@ -118,20 +120,21 @@ class PlayedSource:
     # --- heard -------------------------------------------------------------------------------------------------------
 
     def _tell(self, feed: Feed, item: Any) -> None:
-        if isinstance(item, ReplayedPoses):
+        if isinstance(item, PlayedPoses):
             self._show(feed, item)
-        elif isinstance(item, ReplayTime):
+        elif isinstance(item, ReplayClock):
             self._tell_status(feed, item)
-        elif isinstance(item, ReplayedLine) and item.level != "info":
+        elif isinstance(item, PlayedLine) and item.level != "info":
             self._mark(feed, item.time_ns, item.level, item.text)
-        elif isinstance(item, ReplayedRow) and item.topic in ROW_MARKS:
-            self._mark(feed, item.time_ns, item.topic.strip("/").removesuffix("s"), ROW_MARKS[item.topic](item.row))
+        elif isinstance(item, PlayedRow) and item.topic in ROW_MARKS:
+            text = ROW_MARKS[item.topic](decode_json(item.row))
+            self._mark(feed, item.time_ns, item.topic.removesuffix("s"), text)
 
     def _mark(self, feed: Feed, time_ns: int, kind: str, text: str) -> None:
         feed.tell({"type": "marks", "marks": [{"tick": time_ns // self.tick_ns, "kind": kind, "text": text}]})
 
-    def _show(self, feed: Feed, heard: ReplayedPoses) -> None:
-        named = {self._replay.captured_link(link): pose for link, pose in heard.poses.items()}
+    def _show(self, feed: Feed, heard: PlayedPoses) -> None:
+        named = {self._replay.captured_link(pose.link): pose for pose in heard.poses}
         if self._drawing is None or named.keys() != self._places.keys():
             self._turn_to(feed, named)
         poses = np.zeros((len(self._places), 7), np.float32)
@@ -161,7 +164,7 @@ class PlayedSource:
         self._places = {name: place for place, name in enumerate(names)}
         feed.describe(self.about, self._drawing.content())
 
-    def _tell_status(self, feed: Feed, clock: ReplayTime) -> None:
+    def _tell_status(self, feed: Feed, clock: ReplayClock) -> None:
         tick = clock.time_ns // self.tick_ns
         assert self.about.span is not None
         first, last = self.about.span

@@ -1,8 +1,7 @@
-"""What of a capture is played: the order of release, selections, names; and the reader that reads it ahead."""
+"""The entries of a replay: the order of release, selections, names, parts of a capture."""
 
 from __future__ import annotations
 
-import threading
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from foxglove.messages import SceneUpdate
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
+from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import Scan, deployment_of, open_capture, read_about
 from foosim.capture.rows import PacketRow
 from foosim.common.errors import BadValue
@@ -30,18 +30,16 @@ from foosim.protocol.replay_messages import (
     PlayedRow,
     PlayedScene,
 )
-from foosim.replay.core import Reading, Span
+from foosim.replay.core import Span
 from foosim.replay.entries import Entries, Entry, Selection, make_selection
-from foosim.replay.reader import Read, ReadAhead, read_span
+from foosim.replay.main import entries_at, read_span
 from tests.replay.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000
 
 
 def played(path: Path, selection: Selection | None = None) -> list[Entry]:
-    scan = Scan(path)
-    entries = Entries(deployment_of(read_about(path)), selection or Selection())
-    return list(entries.of(scan.messages(), scan.decode))
+    return list(entries_at(path, Entries(deployment_of(read_about(path)), selection or Selection()), 0))
 
 
 def selected(path: Path, **options: list[str]) -> Counter[str]:
@@ -151,12 +149,8 @@ def test_what_is_selected_is_played_and_nothing_else(run: Path) -> None:
     camera = selected(run, topics=["/packets/camera"])
     assert set(camera) == {"/packets/camera/player-blue/ball", "/packets/camera/player-red/ball"}
     assert camera["/packets/camera/player-red/ball"] == everything["/packets/camera/player-red/ball"]
-    to_red = selected(run, regexes=[r"^/packets/[^/]+/red\."])
-    assert set(to_red) == {f"/packets/player-red/red.{line}/position" for line in LINE_NAMES}
-    both = selected(run, topics=["/tf"], regexes=["/red.goal/position$"])
-    assert set(both) == {"/tf", "/packets/player-red/red.goal/position"}
-    less = selected(run, excluded=["encoder", "^/tf$"])
-    assert set(less) == {topic for topic in everything if "encoder" not in topic and topic != "/tf"}
+    from_red = selected(run, topics=["/packets/player-red", "/tf"])
+    assert set(from_red) == {"/tf", *(f"/packets/player-red/red.{line}/position" for line in LINE_NAMES)}
     assert selected(run, topics=["/packets/cam"]) == {}, "names are whole"
 
 
@@ -180,8 +174,6 @@ def test_names_are_changed_in_packets_and_poses(run: Path) -> None:
         ({"topics": ["/packet"]}, r"--topic: not one of .*, '/packet', nearest is '/packets'"),
         ({"topics": ["packets"]}, r"--topic: .*nearest is '/packets'"),
         ({"topics": ["/scenes"]}, r"--topic: not one of .*, '/scenes', nearest is '/scene'"),
-        ({"regexes": ["("]}, r"--regex: not a regular expression \(.*\), '\('"),
-        ({"excluded": ["*"]}, r"--exclude: not a regular expression"),
         ({"remaps": ["camera"]}, r"--remap: not OLD:=NEW"),
         ({"remaps": ["camera:=Eye"]}, r"--remap: not OLD:=NEW"),
         ({"remaps": ["/ball:=seen"]}, r"--remap: not OLD:=NEW"),
@@ -201,70 +193,27 @@ def test_two_names_may_change_places(run: Path) -> None:
     assert selection.names == {"camera": "red.goal", "red.goal": "camera"}
 
 
-# --- the reader ------------------------------------------------------------------------------------------------------
-
-
-class Reader:
-    """A read-ahead of the run, taken until it has no more."""
-
-    def __init__(self, path: Path, span: Span, entries_max: int = 1000) -> None:
-        self.woken = threading.Event()
-        self.ahead = ReadAhead(path, deployment_of(read_about(path)), Selection(), span, entries_max, self.woken.set)
-
-    def take(self) -> Read:
-        while (read := self.ahead.take()) is None:
-            assert self.woken.wait(900)
-            self.woken.clear()
-        return read
-
-    def take_all(self) -> list[Entry]:
-        entries: list[Entry] = []
-        while True:
-            read = self.take()
-            entries += read.entries
-            if read.is_last:
-                assert not read.problem
-                return entries
+# --- parts of a capture ----------------------------------------------------------------------------------------------
 
 
 def test_any_part_is_read_as_a_part_of_the_whole(run: Path) -> None:
-    """Also where chunks before it are passed by: nothing is left out at its beginning."""
+    """Also where chunks before it are skipped: nothing is left out at its beginning."""
     everything = played(run)
     end_ns = TICKS * TICK_NS
-    reader = Reader(run, Span(0, end_ns), entries_max=7)
-    try:
-        for number, from_ns in enumerate((0, 1, 100 * MS, 254 * MS + 1, 599 * MS, end_ns, 3 * MS)):
-            reader.ahead.ask(Reading(number, from_ns))
-            found = reader.take_all()
-            if from_ns:
-                standing = [entry for entry in everything if entry.stream == SCENE and entry.time_ns < from_ns][-1]
-                update = decode(PlayedScene, standing.payload).update
-                assert decode(PlayedScene, found.pop(0).payload) == PlayedScene(from_ns, update), "what holds there"
-            assert found == [entry for entry in everything if entry.time_ns >= from_ns]
-    finally:
-        reader.ahead.close()
-    reader = Reader(run, Span(0, 200 * MS))
-    reader.ahead.ask(Reading(0, 0))
-    assert reader.take_all() == [entry for entry in everything if entry.time_ns <= 200 * MS]
-    reader.ahead.close()
-
-
-def test_what_is_held_is_bounded_and_a_new_wish_ends_an_old_one(run: Path) -> None:
-    reader = Reader(run, Span(0, TICKS * TICK_NS), entries_max=5)
-    reader.ahead.ask(Reading(0, 0))
-    first = reader.take()
-    assert 1 <= len(first.entries) <= 5 and not first.is_last
-    reader.ahead.ask(Reading(1, 590 * MS))
-    second = reader.take()
-    assert second.number == 1 and second.entries[0].time_ns >= 590 * MS
-    reader.ahead.close()  # while it waits for room
+    entries = Entries(deployment_of(read_about(run)), Selection())
+    for from_ns in (0, 1, 100 * MS, 254 * MS + 1, 599 * MS, end_ns, 3 * MS):
+        found = list(entries_at(run, entries, from_ns))
+        if from_ns:
+            shown = [entry for entry in everything if entry.stream == SCENE and entry.time_ns < from_ns][-1]
+            update = decode(PlayedScene, shown.payload).update
+            assert decode(PlayedScene, found.pop(0).payload) == PlayedScene(from_ns, update), "the scene at that time"
+        assert found == [entry for entry in everything if entry.time_ns >= from_ns]
 
 
 def test_the_span_is_read_from_heads_of_chunks(run: Path, tmp_path: Path) -> None:
     span, about = read_span(run)
     assert (span.first_ns, span.last_ns, about.finished) == (0, TICKS * TICK_NS, True)
-    assert read_span(run, 100 * MS, None, 50 * MS)[0] == Span(100 * MS, 150 * MS)
-    assert read_span(run, 100 * MS, 120 * MS, 50 * MS)[0] == Span(100 * MS, 120 * MS)
+    assert read_span(run, 100 * MS, 120 * MS)[0] == Span(100 * MS, 120 * MS)
     assert read_span(run, None, 10_000 * MS)[0] == Span(0, TICKS * TICK_NS)
     left = tmp_path / "left.mcap"
     left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
@@ -276,14 +225,10 @@ def test_the_span_is_read_from_heads_of_chunks(run: Path, tmp_path: Path) -> Non
         read_span(run, 100 * MS, 50 * MS)
 
 
-def test_what_is_damaged_is_told_behind_what_was_read(run: Path, tmp_path: Path) -> None:
-    damaged(run, tmp_path / "damaged.mcap")
-    reader = Reader(tmp_path / "damaged.mcap", Span(0, TICKS * TICK_NS))
-    reader.ahead.ask(Reading(0, 0))
+def test_damage_is_reported_after_the_entries_before_it(run: Path, tmp_path: Path) -> None:
+    path = damaged(run, tmp_path / "damaged.mcap")
     entries: list[Entry] = []
-    while not (read := reader.take()).is_last:
-        entries += read.entries
-    entries += read.entries
-    reader.ahead.close()
-    assert "damaged.mcap: byte " in read.problem
+    with pytest.raises(CaptureError, match=r"damaged.mcap: byte "):
+        for entry in entries_at(path, Entries(deployment_of(read_about(run)), Selection()), 0):
+            entries.append(entry)  # what came before the error counts
     assert entries and entries == played(run)[: len(entries)]

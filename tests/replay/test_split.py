@@ -14,7 +14,7 @@ from foosim.capture.start_frame import read_branch
 from foosim.console.report.collect import gather
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
-from foosim.replay.reader import read_span
+from foosim.replay.main import read_span
 from foosim.replay.what_if import what_if
 from tests.replay.conftest import SETS, TABLE, TICKS, disturb, replay
 

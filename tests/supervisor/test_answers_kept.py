@@ -9,6 +9,8 @@ from tests.supervisor.test_requests import Run
 def test_after_a_take_over_no_more_answers_are_kept_than_before() -> None:
     state = Run().system.supervisor.state
     history = fold(state.deployment, [encode(state.run_record)])
-    history.answers = {("one", f"r{n}"): Answer("one", f"r{n}", True, n, "", b"") for n in range(ANSWERS_KEPT + 50)}
+    answers = [Answer("one", f"r{n}", True, n, "", b"") for n in range(ANSWERS_KEPT + 50)]
+    for answer in answers:
+        history.answers.keep(answer)
     state.restore(history)
-    assert list(state.answers.values()) == list(history.answers.values())[-ANSWERS_KEPT:]
+    assert list(state.answers.values()) == answers[-ANSWERS_KEPT:]

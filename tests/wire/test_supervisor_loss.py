@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foosim.capture.reader import open_capture
-from foosim.client.control import Control, answer_to
+from foosim.client.asking import answer_to, ask
+from foosim.client.control import Control
 from foosim.common.json_text import encode_json
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
@@ -48,9 +49,10 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
         assert status["state"] == "paused"
         house.wait_for("what was released", lambda: control.status()["ticks"] == paused.tick)
         for answer in (moved, paused):  # the same request, the same answer, by whoever gives it
-            again = Request(answer.sender, answer.id, "status", encode_json({}))
-            control._wire.put(channels.REQUEST, answer.sender, encode(again))
-            assert control._hear(answer_to(answer.id), LIMIT_S) == answer
+            again = encode(Request(answer.sender, answer.id, "status", encode_json({})))
+            take = answer_to(channels.ANSWER, answer.id)
+            wire, inbox = control._wire, control._inbox
+            assert ask(wire, inbox, channels.REQUEST, answer.sender, again, take, LIMIT_S) == answer
         control.ask("resume")
         house.ticking(paused.tick + 100)
         control.ask("down")
