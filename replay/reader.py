@@ -16,7 +16,7 @@ from typing import Final
 from foosim.capture.foxglove import SCENE
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import About, Scan
-from foosim.capture.state_at import LatchedTopics
+from foosim.capture.state_at import LatchedTopic
 from foosim.common.errors import BadValue
 from foosim.common.limits import COUNTER_MAX
 from foosim.common.units import format_ns
@@ -78,7 +78,7 @@ class ReadAhead:
         self._span = span
         self._entries_max = entries_max
         self._wake = wake
-        self._scenes: LatchedTopics | None = None
+        self._scenes: LatchedTopic | None = None
         self._changed = threading.Condition()
         """Guards what follows; notified at each change that is waited for."""
         self._asked: Reading | None = None
@@ -152,7 +152,7 @@ class ReadAhead:
         if not self.entries.has_scene or not time_ns:
             return None
         if self._scenes is None:
-            self._scenes = LatchedTopics(self._path, {SCENE})
+            self._scenes = LatchedTopic(self._path, SCENE)
         message = self._scenes.before(time_ns)
         return None if message is None else self.entries.view(message, time_ns)
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from io import BytesIO
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, Protocol
 from zlib import crc32
 
 import msgspec
@@ -86,6 +86,14 @@ class Message(msgspec.Struct, frozen=True, gc=False):
 
 
 Content = Message | records.Metadata | records.Attachment
+
+
+class ByteSource(Protocol):
+    """A file that is open for reading, or a map of one."""
+
+    def seek(self, place: int, /) -> object: ...
+
+    def read(self, size: int, /) -> bytes: ...
 
 
 class McapFile:
@@ -326,7 +334,7 @@ def unpack_chunk(content: bytes, place: str) -> bytes:
     return data
 
 
-def next_chunk(stream: BinaryIO, start: int, stop: int) -> int | None:
+def next_chunk(stream: ByteSource, start: int, stop: int) -> int | None:
     """Return where the first whole chunk stands between two places of a file, by its checksum; None where none does.
 
     The place in the file is somewhere else behind this.
@@ -347,7 +355,7 @@ def next_chunk(stream: BinaryIO, start: int, stop: int) -> int | None:
     return None
 
 
-def _is_chunk(stream: BinaryIO, at: int, stop: int) -> bool:
+def _is_chunk(stream: ByteSource, at: int, stop: int) -> bool:
     stream.seek(at)
     opcode, length = RECORD.unpack(stream.read(RECORD.size))
     if opcode != Opcode.CHUNK or not CHUNK_FIELDS.size <= length <= min(CHUNK_BYTES_MAX, stop - at - RECORD.size):
