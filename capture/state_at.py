@@ -5,7 +5,7 @@ A file that begins within a run repeats these messages, so that it can be read b
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Final
@@ -15,7 +15,7 @@ import msgspec
 from foosim.capture.foxglove import SCENE
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Book, Message
-from foosim.capture.mcap.repair import read_messages, scan
+from foosim.capture.mcap.scan import last_message, scan
 from foosim.capture.parts import files_from
 from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, ClientRow
 
@@ -63,41 +63,28 @@ class ActiveState:
             yield self._last[SCENE]
 
 
-class LatchedTopics:
-    """Finds messages of some topics in a capture and the files behind it, without unpacking chunks that have none."""
+class LatchedTopic:
+    """Finds messages of a topic in a capture and the files behind it, without unpacking chunks that have none."""
 
-    def __init__(self, path: Path, topics: Collection[str]) -> None:
+    def __init__(self, path: Path, topic: str) -> None:
         """Raises CaptureError for what cannot be read."""
-        self._topics = topics
-        self._books = [(file, _book_of(file, topics)) for file in files_from(path)]
+        self._topic = topic
+        self._books = [(file, _book_of(file)) for file in files_from(path)]
 
     def before(self, time_ns: int) -> Message | None:
         """Return the last message before a time, None when there is none. Raises CaptureError."""
         for path, book in reversed(self._books):
-            for index in reversed(book.chunks):
-                if index.message_start_time >= time_ns:
-                    continue
-                one = Book(channels=book.channels, chunks=[index])
-                with path.open("rb") as stream:
-                    found = list(read_messages(stream, one, self._topics))
-                latched = [message for message in found if message.log_ns < time_ns]
-                if latched:
-                    return latched[-1]
+            with path.open("rb") as stream:
+                found = last_message(stream, book, self._topic, time_ns)
+            if found is not None:
+                return found
         return None
 
 
-def _book_of(path: Path, topics: Collection[str]) -> Book:
-    """Return the channels of a file, and the chunks with something of the topics."""
+def _book_of(path: Path) -> Book:
+    """Return where the chunks of a file stand, and what they are of."""
     try:
-        size = path.stat().st_size
-        with (
-            path.open("rb") as stream,
-            mmap(stream.fileno(), size, access=ACCESS_READ) as whole,
-            memoryview(whole) as content,
-        ):
-            book = scan(stream, size, str(path), content).book
+        with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as content:
+            return scan(content, str(path)).book
     except (OSError, ValueError) as error:  # an empty file is no map
         raise CaptureError(f"{path}: cannot be read, {error}") from None
-    wanted = {channel.id for channel in book.channels if channel.topic in topics}
-    chunks = [index for index in book.chunks if wanted & index.message_index_offsets.keys()]
-    return Book(channels=book.channels, chunks=chunks)

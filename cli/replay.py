@@ -148,18 +148,22 @@ def recover(
     journals: Annotated[
         Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
     ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="The capture to write, else CAPTURE with .recovered in its name."),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Make a capture valid that its writer left unfinished; what a journal has is added.
+    """Make a valid capture of one that its writer left unfinished; what a journal has is added.
 
-    It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
-    cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
-    earlier ones of the same user left. Of a capture that has its end and is damaged it says what is damaged and which
-    ticks are whole. Exit codes: 0 the capture has all that was recorded, 1 it could not be recovered, or is damaged,
-    and is as it was, 3 it is a capture again, without what no journal told.
+    A new file is written, with all up to the last whole chunk, or to what is damaged; CAPTURE stays as it is.
+    `foosim-supervisor up` does this by itself with what earlier ones of the same user left. Of a capture that has its
+    end and is damaged it says what is damaged and which ticks are whole. Exit codes: 0 the new capture has all that was
+    recorded, or CAPTURE has its end, 1 it could not be recovered, or is damaged, 3 the new capture is without what no
+    journal told.
     """
     try:
-        found = recover_capture(capture, journals)
+        found = recover_capture(capture, journals, out)
         damage = damage_of(capture) if found is None else None
     except (CaptureError, JournalError) as error:
         damage = _damage_of(capture)
@@ -175,6 +179,7 @@ def recover(
         content = {
             "finished_before": found is None,
             "whole": found is None or found.is_whole,
+            "path": None if found is None else str(found.path),
             "tick": None if found is None else found.tick,
             "torn_bytes": 0 if found is None else found.torn_bytes,
             "added_ticks": 0 if found is None else found.added_ticks,

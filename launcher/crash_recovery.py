@@ -1,4 +1,4 @@
-"""What runs that ended uncleanly left: their captures are completed from the vHub's journal at the next start.
+"""What runs that ended uncleanly left: at the next start valid captures are made of theirs and the vHub's journals.
 
 A run whose launcher died with everything else has nobody to finish its capture. Its vHub's journal is in the run's
 folder and says where the capture is.
@@ -15,18 +15,18 @@ from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import decode_any
 from foosim.runtime.journal import JournalError, journal_files, read_records, remove_journal
 from foosim.runtime.run_folder import RunFolder, left_runs
-from foosim.vhub.recording.recovery import recover_capture
+from foosim.vhub.recording.recovery import recover_capture, recovered_path
 from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
 def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> None:
     """Recover the captures of runs of this user whose launcher is gone, a line each; the run `but` is left as it is.
 
-    A vHub's journal goes when its capture is whole. What cannot be recovered stays, and is said.
+    A vHub's journal goes when what is recovered is whole. What cannot be recovered stays, and is said.
     """
     for folder in left_runs():
         path = captured_at(folder)
-        if path is None or folder.name == but or not parts_at(path):
+        if path is None or folder.name == but or not parts_at(path) or recovered_path(path).exists():
             continue
         try:
             recovered = recover_capture(path, folder.journals)

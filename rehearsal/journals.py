@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import Final, Literal, get_args
 
 from foosim.protocol.codec import decode_any
-from foosim.protocol.messages import Epoch
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
 from foosim.vhub.state.resume import Captured, Past, recall
@@ -16,8 +15,6 @@ Ending = Literal["now", "torn", "unsaid"]
 """When a vHub dies: at once; while it writes its next record, which is torn then; behind that, with nothing said."""
 ENDINGS: Final[tuple[Ending, ...]] = get_args(Ending)
 HEADS_KEPT: Final = 5
-CHUNK_TICKS: Final = 3
-"""How many ticks more than those that are lost a capture gives up that is cut between two chunks."""
 
 
 class HubJournal:
@@ -44,10 +41,7 @@ class HubJournal:
         self.records.append(record)
 
     def lose(self, count: int) -> int:
-        """The machine is lost with its last records, as far as a tick is left; return how many these are.
-
-        A capture that is further than the journal loses its last chunk, whose ticks are closed and kept again.
-        """
+        """The machine is lost with its last records, as far as a tick is left; return how many these are."""
         found = [decode_any(HubRecord, raw) for raw in self.records]
         ticks = [(at, record.tick) for at, record in enumerate(found) if isinstance(record, TickRecord)]
         if not ticks:
@@ -57,12 +51,6 @@ class HubJournal:
         del self.records[left:]
         self.machine = f"machine-{int(self.machine.rpartition('-')[2]) + 1}"
         self._heads = [at for at in self._heads if at < left]
-        closed = max(tick for at, tick in ticks if at < left)
-        if self.captured_tick > closed:
-            self.captured_tick = max(ticks[0][1] - 1, closed - CHUNK_TICKS)
-            written = max((at + 1 for at, tick in ticks if tick <= self.captured_tick), default=0)
-            epochs = [record.epoch for record in found[:written] if isinstance(record, Epoch)]
-            self.captured_epoch = max(epochs, default=0)
         return lost
 
     def past(self, hub: HubCore, run: str) -> Past | None:

@@ -342,7 +342,7 @@ class System:
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, RecordClosing):
-            self.hub_journal.captured_tick = action.closing.frame.tick
+            self.hub_journal.captured_tick = max(self.hub_journal.captured_tick, action.closing.frame.tick)
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
         elif isinstance(action, RecordEpoch):

@@ -17,7 +17,7 @@ from typing import Final
 
 from foosim.capture.foxglove import SCENE
 from foosim.capture.reader import About, Scan, deployment_of
-from foosim.capture.state_at import LatchedTopics
+from foosim.capture.state_at import LatchedTopic
 from foosim.common import limits
 from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import BadValue, Malformed, Refused
@@ -120,7 +120,7 @@ def read_span(path: Path, from_ns: int | None = None, until_ns: int | None = Non
 def entries_at(path: Path, entries: Entries, time_ns: int) -> Iterator[Entry]:
     """Yield the entries of a capture from a captured time on, first the scene of that time. Raises CaptureError."""
     if time_ns and entries.has_scene:
-        scene = LatchedTopics(path, {SCENE}).before(time_ns)
+        scene = LatchedTopic(path, SCENE).before(time_ns)
         entry = None if scene is None else entries.view(scene, time_ns)
         if entry is not None:
             yield entry

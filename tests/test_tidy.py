@@ -151,6 +151,7 @@ SHELLS = {
     "vhub/recording/writer.py",
     "vhub/recording/disk_progress.py",
     "capture/mcap/earlier_crc.py",
+    "capture/mcap/scan.py",
     "capture/state_at.py",
     "vhub/main.py",
     "vhub/recording/disk_watch.py",

@@ -66,7 +66,7 @@ from foosim.vhub.recording.disk_watch import RoomWatch
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, first_head
-from foosim.vhub.state.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
+from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
 
 CONNECT_S = 60.0
 SWITCH_S = 0.0001
@@ -326,7 +326,7 @@ class HubProcess:
             **origin_metadata(build.origin),
         }
         described = build.deployment_name, build.deployment, metadata, self._say
-        self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records), end_of(deployment, records))
+        self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records))
         self._capture.while_waiting = self._wait_for_capture
         return self._capture.begun_with
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from io import BytesIO
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, Protocol
 from zlib import crc32
 
 import msgspec
@@ -88,6 +88,22 @@ class Message(msgspec.Struct, frozen=True, gc=False):
 Content = Message | records.Metadata | records.Attachment
 
 
+class Damaged(CaptureError):
+    """A record that is not what was written, `what` being why."""
+
+    def __init__(self, text: str, what: str) -> None:
+        super().__init__(text)
+        self.what = what
+
+
+class ByteSource(Protocol):
+    """A file that is open for reading, or a map of one."""
+
+    def seek(self, place: int, /) -> object: ...
+
+    def read(self, size: int, /) -> bytes: ...
+
+
 class McapFile:
     """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
 
@@ -104,7 +120,9 @@ class McapFile:
         self._since_ns, self._wanted = since_ns, topics
         self.repeats = False
         """Whether the first chunk only says again what was said in another file: then it is passed by."""
-        self._at = 0
+        self.at = 0
+        """Where the record stands that is read, or that is damaged."""
+        self._is_whole = True
         self._crc: int | None = 0
         """Of all bytes so far, in the summary of those of the summary; None where some were passed by."""
         self._known = IN_DATA
@@ -126,8 +144,17 @@ class McapFile:
         """Yield messages, metadata and attachments in the order of the file."""
         if self._stream.read(len(MAGIC)) != MAGIC:
             raise CaptureError(f"{self._name}: no MCAP file, it does not start as one")
-        self._at = len(MAGIC)
+        self.at = len(MAGIC)
         self._crc = crc32(MAGIC)
+        yield from self._contents()
+
+    def contents_behind(self, at: int) -> Iterator[Content]:
+        """Yield what stands behind damage, from the record at a byte on: what is of bytes before is not compared."""
+        self.at, self._crc, self._span, self._is_whole = at, None, None, False
+        self._stream.seek(at)
+        yield from self._contents()
+
+    def _contents(self) -> Iterator[Content]:
         while not self._ended:
             record = self._next_record()
             if record is None:
@@ -138,7 +165,7 @@ class McapFile:
                 yield from self._read(opcode, content)
             except (EndOfFile, struct.error, ValueError, zstandard.ZstdError) as error:
                 raise self._damaged(str(error) or "it is too short") from None
-            self._at += RECORD.size + len(content)
+            self.at += RECORD.size + len(content)
             if opcode != Opcode.DATA_END:
                 self._sum(head, content)
 
@@ -147,8 +174,8 @@ class McapFile:
         """Whether the digests of what stands before the messages have come, and are right."""
         return self._described.is_checked
 
-    def _damaged(self, what: str) -> CaptureError:
-        return CaptureError(f"{self._name}: byte {self._at}: a damaged record, {what}")
+    def _damaged(self, what: str) -> Damaged:
+        return Damaged(f"{self._name}: byte {self.at}: a damaged record, {what}", what)
 
     def _sum(self, head: bytes, content: bytes) -> None:
         if self._crc is not None:
@@ -160,33 +187,40 @@ class McapFile:
             if self._span is not None:
                 self._span.take(content)
             return
-        if self._span is not None:
-            self._span.check()
-            self._span = None
+        span, self._span = self._span, None
+        if span is not None:
+            self._check_span(span)
         if opcode == Opcode.CHUNK:
-            self._span = Span(self._at, *CHUNK_FIELDS.unpack_from(content)[:2])
+            self._span = Span(self.at, *CHUNK_FIELDS.unpack_from(content)[:2])
         elif opcode == Opcode.DATA_END:
-            if self._crc is not None:
-                self._compare_data(self._crc, *_CRC.unpack(content))
-            self._crc, self._known = 0, IN_SUMMARY
-        elif opcode == Opcode.FOOTER:
-            assert self._crc is not None, "nothing of the summary is passed by"
+            data_crc, self._crc, self._known = self._crc, 0, IN_SUMMARY
+            if data_crc is not None:
+                self._compare_data(data_crc, *_CRC.unpack(content))
+        elif opcode == Opcode.FOOTER and self._crc is not None:
             crc = crc32(content[: -_CRC.size], crc32(RECORD.pack(opcode, len(content)), self._crc))
             compare("the summary", crc, FOOTER_FIELDS.unpack(content)[2])
 
     def _compare_data(self, computed: int, told: int) -> None:
         try:
-            compare(f"{self._name}: bytes 0 to {self._at}", computed, told)
+            compare(f"{self._name}: bytes 0 to {self.at}", computed, told)
         except ValueError as error:
-            raise CaptureError(f"{error}: one is damaged that no other checksum is of") from None
+            raise Damaged(f"{error}: one is damaged that no other checksum is of", f"all before it: {error}") from None
+
+    def _check_span(self, span: Span) -> None:
+        """Compare the times of a chunk with its indexes, behind which a record stands. Raises Damaged."""
+        try:
+            span.check()
+        except ValueError as error:
+            self.at = span.at
+            raise self._damaged(str(error)) from None
 
     def _end_unfinished(self, what: str) -> None:
         """Stop at a record that is not whole, which nothing whole follows."""
-        self.unfinished_bytes = self._size - self._at
+        self.unfinished_bytes = self._size - self.at
         self._stream.seek(max(0, self._size - len(MAGIC)))
         if self._stream.read(len(MAGIC)) == MAGIC and self.unfinished_bytes:
             raise self._damaged(what)
-        following = next_chunk(self._stream, self._at + 1, self._size)
+        following = next_chunk(self._stream, self.at + 1, self._size)
         if following is not None:
             raise self._damaged(f"{what}, and a whole chunk follows at byte {following}")
 
@@ -206,7 +240,7 @@ class McapFile:
                 self._end_unfinished("it is longer than the file")
                 return None
             opcode, length = RECORD.unpack(head)
-            if length > self._size - self._at - RECORD.size:
+            if length > self._size - self.at - RECORD.size:
                 self._end_unfinished("it is longer than the file")
                 return None
             if opcode not in self._known:
@@ -214,7 +248,7 @@ class McapFile:
                 return None
             if length > CHUNK_BYTES_MAX:
                 raise CaptureError(
-                    f"{self._name}: byte {self._at}: a record of {length} bytes, at most {CHUNK_BYTES_MAX} are read"
+                    f"{self._name}: byte {self.at}: a record of {length} bytes, at most {CHUNK_BYTES_MAX} are read"
                 )
             is_chunk = opcode == Opcode.CHUNK and length >= CHUNK_FIELDS.size
             content = self._stream.read(CHUNK_FIELDS.size if is_chunk else length)
@@ -222,8 +256,8 @@ class McapFile:
                 content += self._stream.read(length - len(content))
             elif is_chunk:
                 self._check_passed(content)
-                self._at += RECORD.size + length
-                self._stream.seek(self._at)
+                self.at += RECORD.size + length
+                self._stream.seek(self.at)
                 continue
             return (opcode, head, content) if len(content) == length else None
 
@@ -250,7 +284,7 @@ class McapFile:
         if opcode == Opcode.CHUNK and self.repeats and self._topics:
             self.repeats = False
         elif opcode == Opcode.CHUNK:
-            yield from self._messages(unpack_chunk(content, f"{self._name}: byte {self._at}"))
+            yield from self._messages(unpack_chunk(content, f"{self._name}: byte {self.at}"))
         elif opcode == Opcode.MESSAGE:
             yield from self._messages(RECORD.pack(opcode, len(content)) + content)
         elif opcode == Opcode.CHANNEL:
@@ -271,9 +305,10 @@ class McapFile:
             self._end(self._stream.read(len(MAGIC) + 1))
 
     def _check_described(self, told: Mapping[str, str]) -> None:
-        if self._crc is None:
+        if self._is_whole and self._crc is None:
             raise ValueError(f"metadata {CHECKS!r} stand behind a chunk")
-        self._described.check(told, self._crc)
+        if self._crc is not None:
+            self._described.check(told, self._crc)
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))
@@ -326,7 +361,7 @@ def unpack_chunk(content: bytes, place: str) -> bytes:
     return data
 
 
-def next_chunk(stream: BinaryIO, start: int, stop: int) -> int | None:
+def next_chunk(stream: ByteSource, start: int, stop: int) -> int | None:
     """Return where the first whole chunk stands between two places of a file, by its checksum; None where none does.
 
     The place in the file is somewhere else behind this.
@@ -347,7 +382,7 @@ def next_chunk(stream: BinaryIO, start: int, stop: int) -> int | None:
     return None
 
 
-def _is_chunk(stream: BinaryIO, at: int, stop: int) -> bool:
+def _is_chunk(stream: ByteSource, at: int, stop: int) -> bool:
     stream.seek(at)
     opcode, length = RECORD.unpack(stream.read(RECORD.size))
     if opcode != Opcode.CHUNK or not CHUNK_FIELDS.size <= length <= min(CHUNK_BYTES_MAX, stop - at - RECORD.size):

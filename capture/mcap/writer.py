@@ -45,7 +45,7 @@ class Earlier(Protocol):
 class McapWriter:
     """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`.
 
-    With the `book` of an unfinished file (`mcap_scan`) it goes on behind what that one has, which is `earlier`.
+    With the `book` of an unfinished file (`scan`) it goes on behind what that one has, which is `earlier`.
     """
 
     def __init__(
@@ -200,16 +200,6 @@ class McapWriter:
         declared = sum(len(schema.data) + 256 for schema in book.schemas)
         described = 256 * (len(book.attachments) + len(book.metadata) + 4)
         return declared + described + len(book.chunks) * (96 + 10 * len(book.channels))
-
-    def index_last_chunk(self, entries: Mapping[int, array[int]]) -> None:
-        """Write the indexes of the last chunk, behind which the file was cut: (time, place) of the messages."""
-        for channel, pairs in entries.items():
-            self._index[channel].extend(pairs)
-        indexes, offsets = self._message_indexes(self._book.offset)
-        self._put(indexes)
-        self._count()
-        last = self._book.chunks[-1]
-        last.message_index_offsets, last.message_index_length = offsets, len(indexes)
 
     def _message_indexes(self, offset: int) -> tuple[bytes, dict[int, int]]:
         """Return the chunk's message index records, to be written at `offset`, and where each channel's is."""

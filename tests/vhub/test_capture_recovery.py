@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,12 @@ from mcap.stream_reader import StreamReader
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import MAGIC, McapFile, Message
-from foosim.capture.mcap.repair import UNSYNCED_BYTES
+from foosim.capture.mcap.scan import UNSYNCED_BYTES
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Refused
 from foosim.runtime.journal import Journal, JournalError
 from foosim.vhub.recording import unfinished
-from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture
+from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture, recovered_path
 from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
@@ -46,8 +47,12 @@ def cut(tmp_path: Path, content: bytes) -> Path:
 
 
 def recovered(path: Path, journals: Path | None = None) -> Recovered:
-    found = recover_capture(path, journals)
-    assert found is not None
+    """Recover a capture to another file, the one of the call before going; the one that is left stays as it is."""
+    before, out = path.read_bytes(), path.with_name("recovered.mcap")
+    out.unlink(missing_ok=True)
+    found = recover_capture(path, journals, out)
+    assert found is not None and found.path == out and path.read_bytes() == before
+    assert not list(path.parent.glob(".*")), "nothing else is left"
     return found
 
 
@@ -122,8 +127,8 @@ def test_cut_anywhere_without_a_journal_every_whole_chunk_stays(chunked: bytes, 
         path = cut(tmp_path, chunked[:size])
         before = rows(path, 64)
         found = recovered(path)
-        after = rows(path, 64)
-        assert open_capture(path).finished and read_by_others(path) > 0
+        after = rows(found.path, 64)
+        assert open_capture(found.path).finished and read_by_others(found.path) > 0
         assert found.problem == "there is no journal of it" and found.added_ticks == 0
         assert after == before and found.tick == len(before.get("/tick", ())) - 1
 
@@ -141,17 +146,21 @@ def test_a_chunk_whose_indexes_were_cut_stays(chunked: bytes, tmp_path: Path) ->
         path = cut(tmp_path, chunked[:size])
         before = rows(path)
         found = recovered(path)
-        assert (rows(path) == before and found.torn_bytes == size - end) or size == end + chunk.message_index_length
-        assert read_by_others(path) == sum(map(len, before.values())) + 1  # the line about the recovery
+        assert rows(found.path) == before
+        assert read_by_others(found.path) == sum(map(len, before.values())) + 1  # the line about the recovery
 
 
-def test_bytes_that_were_never_written_are_cut_off(chunked: bytes, journals: Path, tmp_path: Path) -> None:
-    """A machine without power leaves zeros; they are no record that is cut, so the journal has to cover them."""
+def test_bytes_that_were_never_written_are_left_out(
+    chunked: bytes, journals: Path, hub_run: HubRun, tmp_path: Path
+) -> None:
+    """A machine without power leaves zeros: a vHub goes on over them only where its journal has what they were."""
     size = len(chunked) * 2 // 3
-    with pytest.raises(CaptureError, match=r"damaged; \d+ bytes from there on would be lost, no journal has tick \d+"):
-        recover_capture(cut(tmp_path, chunked[:size] + bytes(20_000)))
     path = cut(tmp_path, chunked[:size] + bytes(20_000))
-    assert recovered(path, journals).tick == LAST and open_capture(path).finished
+    assert recovered(path).problem.endswith("there is no journal of it")
+    with pytest.raises(CaptureError, match=r"damaged; \d+ bytes from there on would be lost, no journal has tick \d+"):
+        CaptureWriter(path, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-1"}, None, LAST)
+    found = recovered(path, journals)
+    assert found.tick == LAST and found.is_whole and open_capture(found.path).finished
 
 
 def test_damage_before_the_end_loses_nothing_that_no_journal_has(
@@ -160,11 +169,12 @@ def test_damage_before_the_end_loses_nothing_that_no_journal_has(
     content = bytearray(chunked[: len(chunked) * 3 // 4])
     content[len(chunked) // 2] ^= 1
     path = cut(tmp_path, bytes(content))
-    with pytest.raises(CaptureError, match="damaged"):
-        recover_capture(path)
-    assert path.read_bytes() == content
+    found = recovered(path)
+    assert re.fullmatch(r".*cut\.mcap: byte \d+: a damaged record, .*; there is no journal of it", found.problem)
+    assert open_capture(found.path).ticks.tolist() == list(range(found.tick + 1)) and 0 < found.tick < 40
     found = recovered(path, journals)
-    assert found.added_ticks > 20 and open_capture(path).ticks.tolist() == list(range(LAST + 1))
+    assert found.is_whole and found.added_ticks > 20
+    assert open_capture(found.path).ticks.tolist() == list(range(LAST + 1))
 
 
 def test_what_was_in_flight_is_written_once(path: Path, journals: Path, hub_run: HubRun, tmp_path: Path) -> None:
@@ -197,7 +207,19 @@ def test_a_journal_that_does_not_fit_is_told_and_changes_nothing(
     assert found.problem == "its journal starts at tick 64 only" and rows(found.path) == before
     with Journal(journals, "vhub"), pytest.raises(JournalError, match="being written by another process"):
         recover_capture(cut(tmp_path, half), journals)
-    assert found.path.read_bytes() == half
+    assert (tmp_path / "cut.mcap").read_bytes() == half
+
+
+def test_a_file_that_is_there_is_not_overwritten(chunked: bytes, tmp_path: Path) -> None:
+    path = cut(tmp_path, chunked[: len(chunked) // 2])
+    found = recover_capture(path)
+    assert found is not None and found.path == recovered_path(path) == tmp_path / "cut.recovered.mcap"
+    before = found.path.read_bytes()
+    with pytest.raises(CaptureError, match=r"cut\.recovered\.mcap: exists already"):
+        recover_capture(path)
+    with pytest.raises(CaptureError, match=r"\.new\.mcap\.part: cannot be created"):
+        recover_capture(path, out=path / "new.mcap")
+    assert found.path.read_bytes() == before
 
 
 def test_a_journal_that_is_damaged_gives_what_is_before(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:
@@ -216,7 +238,7 @@ def test_no_capture_is_refused(tmp_path: Path) -> None:
         assert (tmp_path / "cut.mcap").read_bytes() == content
 
 
-@pytest.mark.parametrize("unsynced", [1000, UNSYNCED_BYTES])
+@pytest.mark.parametrize("unsynced", [20_000, UNSYNCED_BYTES])
 def test_a_writer_goes_on_with_what_it_left(
     chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
 ) -> None:

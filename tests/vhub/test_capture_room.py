@@ -143,9 +143,9 @@ def test_a_disk_that_refuses_leaves_what_is_whole(
         if writer.state.level is not Level.FINE:
             assert f"cannot be written, {os.strerror(number)}" in writer.state.text
         taken.room = 1 << 30
-        if not capture.finished:
-            assert recover_capture(writer.path) is not None
-        assert_valid(writer.path)
+        found = recover_capture(writer.path)
+        assert (found is None) == capture.finished
+        assert_valid(writer.path if found is None else found.path)
     assert (Level.FINE, True, False) in outcomes and (Level.OUT, False, True) in outcomes, outcomes
     assert (Level.OUT, False, False) in outcomes, "a disk that took all rows and refused the end"
 
@@ -206,8 +206,9 @@ def test_on_a_disk_that_others_fill_what_was_whole_stays(
     assert_accounted(writer, hub_run)
     assert not open_capture(path).finished and open_capture(path).about.unfinished_bytes == 0
     others.unlink()
-    assert recover_capture(path) is not None
-    assert_valid(path)
+    found = recover_capture(path)
+    assert found is not None
+    assert_valid(found.path)
 
 
 def test_a_capture_that_takes_long_to_close_shows_how_far_it_is(

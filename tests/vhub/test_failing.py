@@ -99,7 +99,7 @@ def test_a_vhub_that_cannot_listen_leaves_a_capture_that_the_next_one_goes_on_wi
         assert end_of(path) is None
     found = recover_capture(path, tmp_path / "journals")
     assert found is not None and (found.tick, found.problem) == (LAST, "")
-    assert has_end(path) and capture_info(path).end["reason"] == UNCLEAN
+    assert has_end(found.path) and capture_info(found.path).end["reason"] == UNCLEAN
 
 
 def test_a_vhub_whose_journal_contradicts_itself_leaves_its_capture_as_it_was(

@@ -108,7 +108,9 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     assert words[:3] == ["foosim-supervisor", "up", str(house.table)]
     assert words[-2:] == ["--from", f"{house.folder / 'far.mcap'}@last"]
     begun = make_plan(RunOptions(Path(words[2]), sets=tuple(BARE[1::2]), branch=words[-1])).start
-    assert begun is not None and 0 < begun.origin.tick <= int(told[1]) < int(told[2])
+    captured = open_capture(house.folder / "far.mcap")
+    assert begun is not None and begun.origin.tick == captured.frame_ticks[-1] and int(told[1]) < int(told[2])
+    assert captured.ticks.tolist() == list(range(len(captured.ticks))), "what it has stays"
     shutil.rmtree(folder.journals)
     shutil.copytree(house.folder / "whole", folder.journals)
 

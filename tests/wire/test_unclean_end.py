@@ -43,17 +43,19 @@ def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(hou
     code, out, err = house.end(again)
     assert code == 0, err
     (line,) = [line for line in out.splitlines() if "recovered" in line]
-    assert line.startswith(f"run {run.run}: capture {path} of an unclean end is recovered: ")
+    made = house.folder / "run.recovered.mcap"
+    assert line.startswith(f"run {run.run}: capture {path} of an unclean end is recovered to {made}: ")
     journals = house.folder / "state" / "foosim" / "runs" / run.run / "journals"
     assert not list(journals.glob("vhub-*")), "they are done with"
 
-    capture = open_capture(path)
+    assert not open_capture(path).finished and len(files_from(path)) >= 3, "it stays as it is"
+    capture = open_capture(made)
     last = int(capture.ticks[-1])
     assert capture.finished and capture.about.end["reason"] == UNCLEAN and "problem" not in capture.about.end
     assert capture.ticks.tolist() == list(range(last + 1)) and last >= int(had.ticks[-1])
     same = rehearse(house.table.read_text(), "table.yaml", last, None, ["engine=pure", slow])
-    assert capture_info(path).chain == same.json["digest"]["chain"]
-    assert verify_capture(path).equal and len(files_from(path)) >= 3
+    assert capture_info(made).chain == same.json["digest"]["chain"]
+    assert verify_capture(made).equal and files_from(made) == [made]
     packets = capture.packets
     fates = {fate: int((packets.fate == fate).sum()) for fate in ("delivered", "dropped", "in_flight")}
     assert sum(fates.values()) == len(packets) and fates["in_flight"] > 0

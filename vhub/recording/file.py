@@ -30,7 +30,7 @@ from foosim.capture.foxglove import LOG, POSES, SCENE, View
 from foosim.capture.mcap.checks import CHECKS, CaptureError
 from foosim.capture.mcap.earlier_crc import EarlierCrc
 from foosim.capture.mcap.format import Book, Message
-from foosim.capture.mcap.repair import Scanned, read_messages
+from foosim.capture.mcap.scan import Scanned, read_messages
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, part_path, parts_at
 from foosim.capture.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE
@@ -43,7 +43,7 @@ from foosim.vhub.network.custom_models import model_versions
 from foosim.vhub.recording.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.recording.rows_of_closing import add_packets, epoch_entry, frame_row, plan_of, world_rows
 from foosim.vhub.recording.split import Split
-from foosim.vhub.recording.unfinished import Journalled, Left, Progress, look, run_of
+from foosim.vhub.recording.unfinished import Left, Progress, look, run_of
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 
@@ -62,28 +62,31 @@ Item = Closing | Epoch | Line
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What a capture says of its run beside the rows. `metadata` joins what the deployment tells."""
+    """What a capture says of its run beside the rows. `metadata` joins what the deployment tells.
+
+    `versions` are those that the run depended on, None: this process's.
+    """
 
     deployment: Deployment
     name: str
     text: str
     metadata: Mapping[str, str]
+    versions: Mapping[str, str] | None = None
 
 
 class CaptureFile:
     """One capture on the disk. Raises CaptureError when it exists already, or cannot be written.
 
-    With `journal`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes` of
-    it were cut off. A file that ends before its description is begun anew; one that has its end is refused. A capture
-    that is split (`capture.split_size`, `split_time`) goes on in another file where `begins_next` says so and `go_on`
-    is called; of its files that were left the last is gone on with.
+    With `journal_tick`, from which on a journal has all ticks, a file that is there is one that this run left
+    unfinished: it is gone on with behind its last whole chunk. A file that ends before its description is begun anew;
+    one that has its end is refused. A capture that is split (`capture.split_size`, `split_time`) goes on in another
+    file where `begins_next` says so and `go_on` is called; of its files that were left the last is gone on with.
     """
 
-    def __init__(self, path: Path, described: Described, journal: Journalled | None = None) -> None:
+    def __init__(self, path: Path, described: Described, journal_tick: int | None = None) -> None:
         capture = described.deployment.capture
         self.path = path
         self.done = Progress()
-        self.torn_bytes = 0
         self._described = described
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
@@ -98,16 +101,14 @@ class CaptureFile:
         """The frame of the last closing, written or not."""
         self._file = -1
         try:
-            found = None if journal is None else self._go_on_with_left(journal)
-            if journal is None:
+            found = None if journal_tick is None else self._go_on_with_left(journal_tick)
+            if journal_tick is None:
                 self._file = self._open(path, os.O_WRONLY | os.O_EXCL)
             self.mcap = self._writer(self._file, None if found is None else found.book)
             if found is None:
                 self._channels = self._describe(self.mcap, {} if self._split is None else self._split.entries())
             else:
                 self._channels = {channel.topic: channel.id for channel in found.book.channels}
-                if found.to_index:
-                    self.mcap.index_last_chunk(found.to_index)
             self._saved = replace(self.done)
         except OSError as error:
             self._let_go()
@@ -128,12 +129,21 @@ class CaptureFile:
             topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
             self._add(Message(topic, log_ns, publish_ns, sequence, self._encode(row)))
             self.done.epoch = item.epoch
-        elif item.frame.tick <= self.done.tick and (self._known is None or item.frame.tick > self._known.tick):
+        elif self._has(item.frame.tick):
             self._pass(item.frame)
             return False
         else:
             self._write_closing(item)
         return True
+
+    def copy(self, message: Message) -> None:
+        """Add a message that another file of the run has; `done` is the caller's."""
+        self._add(message)
+
+    def _has(self, tick: int) -> bool:
+        """Whether the file has what a closing gives; with the last frame, what is in flight comes once more."""
+        done, known = self.done, self._known
+        return tick < done.tick or (tick == done.tick and (done.in_flight or known is None or known.tick < tick))
 
     def _write_closing(self, closing: Closing) -> None:
         encode, done, tick = self._encode, self.done, closing.frame.tick
@@ -286,7 +296,8 @@ class CaptureFile:
 
     @cached_property
     def _versions(self) -> bytes:
-        return encode_json(library_versions() | model_versions(self._described.deployment.network))
+        described = self._described
+        return encode_json(described.versions or library_versions() | model_versions(described.deployment.network))
 
     def _let_go(self) -> None:
         if self._file >= 0:
@@ -347,7 +358,7 @@ class CaptureFile:
 
     # --- files that were left unfinished -----------------------------------------------------------------------------
 
-    def _go_on_with_left(self, journal: Journalled) -> Scanned | None:
+    def _go_on_with_left(self, journal_tick: int) -> Scanned | None:
         """Open the last file that was left, and cut it behind what is whole; None when it has to be begun anew.
 
         A file without a tick, which is not the only one, is dropped: it comes again behind the one before.
@@ -357,13 +368,13 @@ class CaptureFile:
         for number, path in sorted(there.items(), reverse=True):
             self._let_go()
             self._file = self._open(path, os.O_RDWR)
-            left = look(self._file, path, self._plan.tick_ns, journal)
+            left = look(self._file, path)
             if left.done.tick >= 0 or number == min(there):
                 break
             dropped.append(left)
         self.done = left.done
         for found in (left, *dropped):
-            self._check_left(found, journal.tick)
+            self._check_left(found, journal_tick)
         for found in dropped:
             found.path.unlink()
         return self._cut(number, left)
@@ -374,15 +385,15 @@ class CaptureFile:
             raise CaptureError(f"{left.path}: is that of run {run_of(left)}, not of run {run}")
         if left.found.book.chunks and not _is_described(left.found):
             raise CaptureError(f"{left.path}: no capture of foosim, it lacks {CHECKS}")
-        if left.problem and journal_tick > self.done.tick + 1:
-            raise CaptureError(f"{left.problem}, no journal has tick {self.done.tick + 1}")
+        if left.found.is_damaged and journal_tick > self.done.tick + 1:
+            lost = f"{left.torn_bytes} bytes from there on would be lost, no journal has tick {self.done.tick + 1}"
+            raise CaptureError(f"{left.path}: byte {left.found.book.offset}: damaged; {lost}")
 
     def _cut(self, number: int, left: Left) -> Scanned | None:
         found, split = left.found, self._split
         is_described = _is_described(found)
         if number and not is_described:
             raise CaptureError(f"{left.path}: ends before its description, and no file before it is there")
-        self.torn_bytes = left.torn_bytes
         if split is not None and is_described:
             first = found.book.chunks[0].chunk_start_offset if found.book.chunks else found.book.offset
             split.take_over(number, first, is_empty=left.done.tick < 0)

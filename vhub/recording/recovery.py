@@ -1,4 +1,4 @@
-"""What an unclean end left unfinished is made a valid capture: cut at its last whole chunk, completed from the journal.
+"""A new, valid capture of one that an unclean end left: its whole chunks, and what the vHub's journal has.
 
 The vHub writes its journal before its capture, so the journal has what the capture lacks: the ticks, frames, packets
 and fates behind the last chunk, and what was in flight. What only a clock or a person knew is not in it: fields that
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,9 +18,10 @@ from typing import Final
 
 import msgspec
 
-from foosim.capture.contents import CHUNK_BYTES
-from foosim.capture.parts import whole_path
-from foosim.capture.reader import About, deployment_of, read_about
+from foosim.capture.contents import CHUNK_BYTES, check_new, sync_folder
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import AFTER, LAST, PART, whole_path
+from foosim.capture.reader import About, Scan, deployment_of, read_about
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
@@ -29,7 +31,7 @@ from foosim.protocol.messages import Epoch
 from foosim.runtime.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.recording.file import CaptureFile, Described, Line
-from foosim.vhub.recording.unfinished import Journalled
+from foosim.vhub.recording.unfinished import progress
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, fold
 
@@ -38,12 +40,13 @@ UNCLEAN: Final = "unclean end"
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What a recovery found and did. `tick` is the last tick of the capture, -1 when it has none.
+    """What a recovery found and made: `path` from `source`. `tick` is the last tick, -1 when there is none.
 
-    `torn_bytes` were cut off behind the last whole chunk; `added_ticks` came from the journal; `problem` says why the
-    journal could not be used, or not to its end.
+    `torn_bytes` stand in `source` behind its last whole chunk; `added_ticks` came from the journal; `problem` says what
+    `source` lacks that no journal told.
     """
 
+    source: Path
     path: Path
     tick: int
     torn_bytes: int
@@ -58,47 +61,83 @@ class Recovered:
     def __str__(self) -> str:
         added = f", {self.added_ticks} of them from its journal" if self.added_ticks else ""
         problem = f"; {self.problem}" if self.problem else ""
-        return f"capture {self.path} of an unclean end is recovered: {self.tick + 1} ticks{added}{problem}"
+        ticks = f"{self.tick + 1} ticks{added}{problem}"
+        return f"capture {self.source} of an unclean end is recovered to {self.path}: {ticks}"
 
 
-def recover_capture(path: Path, journals: Path | None = None) -> Recovered | None:
-    """Make an unfinished capture a valid one, in place; None when it has its end already.
+def recovered_path(path: Path) -> Path:
+    """Return where a capture is recovered to when nothing else is said: `run.recovered.mcap` for `run.mcap`."""
+    return path.with_name(f"{path.stem}.recovered{path.suffix}")
 
-    Of a capture that is split that is done to its last file, whichever is named. `journals` is the folder of the vHub's
-    journal, which stays. Raises CaptureError when the file is no capture, when
-    it is damaged before its end and no journal tells what would be cut off, or when the disk refuses; JournalError when
-    a vHub still writes the journal.
+
+def recover_capture(path: Path, journals: Path | None = None, out: Path | None = None) -> Recovered | None:
+    """Make a valid capture of an unfinished one, in a new file; None when it has its end already.
+
+    Of a capture that is split all files become one, whichever is named. `journals` is the folder of the vHub's journal,
+    which stays, as the capture does. Raises CaptureError when the file is no capture, when `out` (None:
+    `recovered_path`) is there or cannot be written; JournalError when a vHub still writes the journal.
     """
     about = read_about(whole_path(path))
     if about.finished:
         return None
+    out = recovered_path(about.path) if out is None else out
     if journals is None or not journal_files(journals, VHUB):
-        return _recover(about, [])
+        return _recover(about, [], out)
     lock = lock_journal(journals, VHUB)
     try:
-        return _recover(about, read_journal(journals, VHUB))
+        return _recover(about, read_journal(journals, VHUB), out)
     finally:
         os.close(lock)
 
 
-def _recover(about: About, records: Iterable[bytes]) -> Recovered:
+def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
+    """Write the new file; it gets its name when it is on the disk."""
+    check_new(out)
     deployment = deployment_of(about)
-    described = Described(deployment, about.deployment_name, about.deployment_text, about.metadata)
-    completion = _Completion(deployment, about.metadata.get("run", ""), records)
-    file = CaptureFile(about.path, described, Journalled(completion.first_tick))
+    metadata = {key: value for key, value in about.metadata.items() if key not in (PART, AFTER, LAST)}
+    whole = deployment.model_copy(update={"capture": deployment.capture.model_copy(update=_ONE_FILE)})
+    described = Described(whole, about.deployment_name, about.deployment_text, metadata, about.versions)
+    part = out.with_name(f".{out.name}.part")
+    with suppress(OSError):
+        part.unlink()
+    file = CaptureFile(part, described)
     try:
+        torn_bytes, damage = _copy(about.path, file)
         had = file.done.tick
+        completion = _Completion(deployment, about.metadata.get("run", ""), records)
         completion.write(file)
         tick = file.done.tick
-        recovered = Recovered(about.path, tick, file.torn_bytes, tick - had, completion.problem)
+        problem = completion.problem if not (damage and completion.problem) else f"{damage}; {completion.problem}"
+        recovered = Recovered(about.path, out, tick, torn_bytes, tick - had, problem)
         file.write(Line("warning", str(recovered), max(0, tick)))
-        end = {"reason": UNCLEAN, "torn_bytes": str(file.torn_bytes), "added_ticks": str(tick - had)}
-        file.finish({**end, "problem": recovered.problem} if recovered.problem else end)
+        end = {"reason": UNCLEAN, "torn_bytes": str(torn_bytes), "added_ticks": str(tick - had)}
+        file.finish({**end, "problem": problem} if problem else end)
+        part.rename(out)
+        sync_folder(out.parent)
     except OSError as error:
-        raise file.disk_error(error) from None
+        raise CaptureError(f"{out}: cannot be written, {error.strerror}") from None
     finally:
         file.close()
+        part.unlink(missing_ok=True)
     return recovered
+
+
+_ONE_FILE: Final = {"split_bytes": None, "split_ns": None}
+
+
+def _copy(path: Path, file: CaptureFile) -> tuple[int, str]:
+    """Copy what is whole; return how many bytes behind it are cut, and what is damaged, empty where nothing is."""
+    scan, last, damage = Scan(path), dict[str, bytes](), ""
+    try:
+        for message in scan.messages():
+            file.copy(message)
+            last[message.topic] = message.data
+            if file.mcap.chunk_bytes > CHUNK_BYTES:
+                file.end_chunk()
+    except CaptureError as error:
+        damage = str(error)
+    file.done = progress(lambda topic: last.get(topic, b""))
+    return scan.about.unfinished_bytes, damage
 
 
 class _Completion:
@@ -129,20 +168,18 @@ class _Completion:
         last: tuple[HubState, Closing] | None = None
         try:
             for last in fold(self._deployment, self._told_of(file)):
-                if file.begins_next(last[1]):
-                    file.go_on(last[1])
                 file.write(last[1])
                 if file.mcap.chunk_bytes > CHUNK_BYTES:
                     file.end_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
-        if last is None or file.done.in_flight or last[1].frame.tick < file.done.tick:
-            return
-        state, closing = last
-        flights = state.in_flight()
-        for flight in flights:
-            flight.cause = IN_FLIGHT
-        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=state.ages.untold(state.closed)))
+        if last is not None:
+            state, closing = last
+            flights = state.in_flight()
+            for flight in flights:
+                flight.cause = IN_FLIGHT
+            ages = state.ages.untold(state.closed)
+            file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

@@ -24,7 +24,6 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import Level
 from foosim.vhub.recording.file import CaptureFile, Described, Item, Line
-from foosim.vhub.recording.unfinished import Journalled
 from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Captured
 
@@ -68,8 +67,7 @@ class CaptureWriter:
 
     Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
     a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
-    that tick on; what the file has already is not written again, and what it has behind `journal_end`, the last tick
-    and epoch of that journal, is cut off. `say` takes what people should know, as (level, text).
+    that tick on; what the file has already is not written again. `say` takes what people should know, as (level, text).
     `keep`, `log`, `finish` and `leave` are for one thread.
     """
 
@@ -82,7 +80,6 @@ class CaptureWriter:
         metadata: Mapping[str, str],
         say: Callable[[str, str], None] | None = None,
         journal_tick: int | None = None,
-        journal_end: Captured | None = None,
     ) -> None:
         self.path = path
         self._say = say or (lambda level, text: None)
@@ -107,8 +104,7 @@ class CaptureWriter:
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
         described = Described(deployment, deployment_name, deployment_text, metadata)
-        journal = None if journal_tick is None else Journalled(journal_tick, journal_end, at_once=True)
-        self._file = CaptureFile(path, described, journal)
+        self._file = CaptureFile(path, described, journal_tick)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
         self.has_ended = False

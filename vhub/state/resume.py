@@ -37,7 +37,7 @@ from foosim.world.layout import Layout
 
 @dataclass(frozen=True, slots=True)
 class Captured:
-    """Last tick and last epoch of a capture or a journal; -1 and 0 when it has none yet."""
+    """Last tick and last epoch of a capture; -1 and 0 when it has none yet."""
 
     tick: int = -1
     epoch: int = 0
@@ -109,8 +109,6 @@ def recall(
         elif captured is not None and folded.record.tick == captured.tick:
             past.known = folded.closing.frame
     if captured is not None:
-        if captured.tick > fold.state.closed:
-            raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
         past.kept = list(_untold(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     past.absences = fold.absences
@@ -191,23 +189,6 @@ def last_tick_of(records: Sequence[bytes]) -> int:
     """Return the last tick of which a journal has a record, -1 when it has none."""
     ticks = (record.tick for raw in reversed(records) if isinstance(record := decode_any(HubRecord, raw), TickRecord))
     return next(ticks, -1)
-
-
-def end_of(deployment: Deployment, records: Sequence[bytes]) -> Captured | None:
-    """Return the last tick and epoch of a journal; None when there is no journal. Raises Malformed for what is none."""
-    tick, epoch = -1, 0
-    for raw in records:
-        record = decode_any(HubRecord, raw)
-        if isinstance(record, TickRecord):
-            tick = record.tick
-        elif isinstance(record, Epoch):
-            epoch = record.epoch
-        elif isinstance(record, HeadRecord) and record.epoch:
-            epoch = decode(Epoch, record.epoch).epoch
-    if records and tick < 0:
-        head = decode_any(HeadRecord, records[0])
-        tick = HubState.restore(deployment, head.state).closed
-    return Captured(tick, epoch) if records else None
 
 
 def was_captured(records: Sequence[bytes]) -> str | None:
