@@ -26,15 +26,12 @@ from foosim.protocol import channels, identity
 from foosim.protocol.channels import VHUB, Plane
 from foosim.runtime.command import DONE, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.loop import Loop, Wire
-from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot, start_log
-from foosim.runtime.transport.admission import Admission
-from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
+from foosim.runtime.loop import Wire
+from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot
+from foosim.runtime.process_shell import ProcessShell, client_session
+from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.session import Session, use_client_runtime
-from foosim.runtime.transport.settings import Security
-
-CONNECT_S = 60.0
+from foosim.runtime.transport.session import Session
 
 
 class PlayerProcess:
@@ -51,26 +48,24 @@ class PlayerProcess:
     ) -> None:
         now_ns = time.monotonic_ns()
         self.crew = Crew([ClientCore(name, new_boot(), now_ns, world) for name in names])
-        self.stopped = False
-        self._inbox = inbox
         self._absent = [Wire(session, Plane.RADIO, inbox, name) for name in names]
-        """Those of players that are not present yet, since they were not let in."""
-        self._admission = Admission(credentials, VHUB, session.locator, now_ns)
-        log = start_log(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others")
-        warn_of_end(credentials, log)
-        self._loop = Loop(self.crew, inbox, log, lambda now_ns: self.crew.deadline_ns())
-        self._loop.connect(self._absent[0])
-        self._loop.show_progress(progress)
+        """Those of players that are not admitted yet."""
+        log = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others"
+        first = self._absent[0]
+        self._shell = ProcessShell(
+            self.crew, log, first, inbox, lambda now_ns: self.crew.deadline_ns(), progress, credentials
+        )
+        self._loop = self._shell.loop
         self._loop.turn = self._turn
         self._loop.on_alive, self._loop.stood = self._on_alive, self.crew.rest
-        for wire in self._absent:  # who is alone waits for its downlinks itself; of several queues nobody can
+        for wire in self._absent:  # a loop waits in the queue of one player, not in those of several
             wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
-        self._absent[0].watch_alive(VHUB)
+        self._shell.watch_router(VHUB, session.locator)
 
     def run(self) -> int:
         """Take part until the end; return the exit code. Raises PlayerError for a player that fails."""
         try:
-            self._loop.run(lambda: self.stopped or self.crew.is_over)
+            self._loop.run(lambda: self._shell.stopped or self.crew.is_over)
         except PlayerError:
             self._loop.perform()  # the vHub is told, and the log has where
             raise
@@ -80,11 +75,10 @@ class PlayerProcess:
 
     def stop(self) -> None:
         """Have `run` return soon; a signal handler may call this."""
-        self.stopped = True
-        self._inbox.wake()
+        self._shell.stop()
 
     def _turn(self, now_ns: int) -> None:
-        self._admission.check(now_ns)
+        self._shell.check(now_ns)
         if self._absent:
             self._be_present()
         self.crew.step(now_ns)
@@ -98,7 +92,7 @@ class PlayerProcess:
         self._absent = [wire for wire in self._absent if wire.name not in welcome]
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
-        self._admission.heard(name, is_alive)
+        self._shell.on_alive(name, is_alive)
         if name == VHUB:
             self.crew.hub_alive(is_alive, time.monotonic_ns())
 
@@ -139,16 +133,13 @@ def run_players(
             raise BadValue("not a name for a player", name)
         if names.count(name) > 1:
             raise BadValue("a player that is named twice", name)
-    use_client_runtime()
     stop = Stop()
-    limit = limits.RADIO_MESSAGE_BYTES_MAX
     with ExitStack() as stack:
         players: list[PlayerProcess] = []
         for crew in [names] if pki is None else [[name] for name in names]:  # a session has one certificate
-            credentials = load_credentials(pki, identity.client(crew[0]))
-            security = None if credentials is None else Security(credentials)
-            session = stack.enter_context(Session.client(connect, CONNECT_S, limit, stop.is_set, security))
-            inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+            who, limit = identity.client(crew[0]), limits.RADIO_MESSAGE_BYTES_MAX
+            link = client_session(connect, who, pki, stop, limit, sets_runtime=not players)
+            session, inbox, credentials = stack.enter_context(link)
             first = progress if not players else None  # the others end when its loop does not go round any more
             players.append(PlayerProcess(crew, session, inbox, world, credentials, first))
         if len(players) == 1:

@@ -129,9 +129,10 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
     ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
-    ("vhub.main", "CONNECT_S"): ("vHub", "a supervisor to connect to; then it fails"),
-    ("node.main", "CONNECT_S"): ("nodes", "the same"),
-    ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),
+    ("runtime.process_shell", "CONNECT_S"): (
+        "vHub, nodes, players",
+        "a supervisor or vHub to connect to; then they fail",
+    ),
     ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
     ("runtime.transport.admission", "ADMISSION_NS"): (
         "every process",

@@ -11,7 +11,6 @@ from typing import Annotated
 
 import typer
 
-from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.node.core import NodeCore
@@ -22,17 +21,13 @@ from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.loop import Loop, Wire
-from foosim.runtime.process import Stop, die_with_parent, new_boot, start_log
+from foosim.runtime.loop import Wire
+from foosim.runtime.process import Stop, die_with_parent, new_boot
+from foosim.runtime.process_shell import ProcessShell, client_session
 from foosim.runtime.supervisor_timeout import Orphan
-from foosim.runtime.systemd import Notify
-from foosim.runtime.transport.admission import Admission
-from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
+from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.session import Session, use_client_runtime
-from foosim.runtime.transport.settings import Security
-
-CONNECT_S = 60.0
+from foosim.runtime.transport.session import Session
 
 
 class NodeProcess:
@@ -48,24 +43,17 @@ class NodeProcess:
         progress: Path | None = None,
     ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
-        self.stopped = False
         self._orphan = Orphan()
         self._solver = Solver(self.core)
-        self._wire = Wire(session, Plane.SIMULATION, inbox, name)
-        self._inbox = inbox
         self._is_present = False
-        self._admission = Admission(credentials, SUPERVISOR, session.locator, time.monotonic_ns())
-        log = start_log(name)
-        warn_of_end(credentials, log)
-        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
-        self._loop.connect(self._wire)
-        self._loop.show_progress(progress)
-        self._loop.notify = Notify()
+        wire = Wire(session, Plane.SIMULATION, inbox, name)
+        self._shell = ProcessShell(self.core, name, wire, inbox, self._deadline_ns, progress, credentials)
+        self._loop = self._shell.loop
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive, self._loop.stood = self._on_alive, self._orphan.rest
-        self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
-        self._wire.watch_alive(SUPERVISOR)
+        wire.read(channels.NODE_READS, channels.NODE_WAITS)
+        self._shell.watch_router(SUPERVISOR, session.locator)
 
     def run(self) -> int:
         """Take part until the end; return the exit code."""
@@ -78,20 +66,19 @@ class NodeProcess:
 
     def stop(self) -> None:
         """Have `run` return soon; a signal handler may call this."""
-        self.stopped = True
-        self._inbox.wake()
+        self._shell.stop()
 
     def _is_over(self) -> bool:
-        return self.stopped or self.core.ended is not None or bool(self.core.member.refusal)
+        return self._shell.stopped or self.core.ended is not None or bool(self.core.member.refusal)
 
     def _turn(self, now_ns: int) -> None:
         """Compute ticks as far as the inputs allow; what a tick says first is said before it is solved."""
         core = self.core
         core.busy = self._loop.busy
-        self._admission.check(now_ns)
+        self._shell.check(now_ns)
         if core.member.build is not None and not self._is_present:
             self._is_present = True
-            self._wire.declare_alive()
+            self._shell.wire.declare_alive()
         if self._orphan.is_over(core.deployment, now_ns) and not self._is_over():
             core.actions.append(Say("error", "lost the supervisor, and it has not come back"))
             self.stop()
@@ -109,7 +96,7 @@ class NodeProcess:
         return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
-        self._admission.heard(name, is_alive)
+        self._shell.on_alive(name, is_alive)
         if name != SUPERVISOR or self.core.ended is not None:
             return
         if not is_alive:
@@ -124,12 +111,8 @@ def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, 
     """
     if not is_name(name):
         raise BadValue("not a name for a node", name)
-    credentials = load_credentials(pki, identity.node(name))
-    security = None if credentials is None else Security(credentials)
-    use_client_runtime()
-    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Session.client(connect, CONNECT_S, give_up=stop.is_set, security=security) as session:
+    with client_session(connect, identity.node(name), pki, stop, sets_runtime=True) as (session, inbox, credentials):
         node = NodeProcess(name, session, inbox, world, credentials, progress)
         stop.then(node.stop)
         return node.run()

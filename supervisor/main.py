@@ -17,7 +17,7 @@ import msgspec
 
 from foosim.capture.parts import is_complete
 from foosim.common import limits, wall_clock
-from foosim.common.addresses import Address, parse_address
+from foosim.common.addresses import Address
 from foosim.common.errors import Malformed, Refused
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -27,13 +27,12 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.disk import Level, room_on_disk
 from foosim.runtime.journal import Journal, JournalError, journal_files, remove_journal
-from foosim.runtime.loop import Loop, Wire
-from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot, start_log
+from foosim.runtime.loop import Wire
+from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot
+from foosim.runtime.process_shell import ProcessShell
 from foosim.runtime.run_folder import RESULT_FILE, RunFolder, RunInfo
-from foosim.runtime.systemd import Notify
 from foosim.runtime.transport.certificates import check_host, load_credentials, warn_of_end
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.supervisor.core import SupervisorCore
@@ -101,18 +100,15 @@ class SupervisorProcess:
             session.locator,
             pki="" if pki is None else str(pki.absolute()),
         )
-        self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         known = folder.info()
         if history is not None and known is not None:
             self._info = msgspec.structs.replace(self._info, started=known.started, radio=known.radio)
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
-        self.log = start_log(SUPERVISOR)
-        self._loop = Loop(self.core, inbox, self.log, self.core.deadline_ns)
-        self._loop.connect(wire)
-        self._loop.show_progress(progress)
+        self._shell = ProcessShell(self.core, SUPERVISOR, wire, inbox, self.core.deadline_ns, progress)
+        self._shell.listens(session.locator)
+        self._loop, self.log = self._shell.loop, self._shell.log
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
-        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.on_unwritten = self._on_unwritten
         reserve = self.core.state.deployment.capture.reserve_bytes
@@ -153,9 +149,7 @@ class SupervisorProcess:
 
     def _turn(self, now_ns: int) -> None:
         self.core.state.busy = self._loop.busy
-        reminder = self._exposure.due(now_ns)
-        if reminder:
-            self.core.state.log("warning", reminder)
+        self._shell.check(now_ns)
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()

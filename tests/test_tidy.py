@@ -84,6 +84,7 @@ SHELLS = {
     "runtime/health.py",
     "runtime/systemd.py",
     "runtime/process.py",
+    "runtime/process_shell.py",
     "runtime/progress.py",
     "node/engines/quiet.py",
     "runtime/transport/session.py",

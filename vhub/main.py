@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from foosim.capture.contents import check_new, ending_metadata, origin_metadata
 from foosim.capture.parts import first_there
 from foosim.common import limits, wall_clock
-from foosim.common.addresses import LOOPBACK, Address, check_listen, parse_address
+from foosim.common.addresses import LOOPBACK, Address, check_listen
 from foosim.common.errors import BadValue, DeploymentError, Refused
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -43,19 +43,15 @@ from foosim.runtime.journal import (
     read_whole,
     remove_journal,
 )
-from foosim.runtime.loop import Loop, Wire
-from foosim.runtime.process import Stop, die_with_parent, machine_start, new_boot, start_log
-from foosim.runtime.systemd import Notify
-from foosim.runtime.transport.admission import Admission
+from foosim.runtime.loop import Wire
+from foosim.runtime.process import Stop, die_with_parent, machine_start, new_boot
+from foosim.runtime.process_shell import ProcessShell, client_session
 from foosim.runtime.transport.certificates import (
     Credentials,
     check_host,
-    load_credentials,
     passwords_file,
-    warn_of_end,
 )
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.vhub.core import ClosingCore, HubCore
@@ -68,7 +64,6 @@ from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, first_head
 from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
 
-CONNECT_S = 60.0
 SWITCH_S = 0.0001
 """For how long the capture's thread may keep the interpreter from the loop. Python's own 5 ms would hold up ticks: at
 each of the loop's calls into journal and network, some a tick, that thread may come in between."""
@@ -106,8 +101,6 @@ class HubProcess:
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), machine=machine_start())
         self._options = options
         self._open_radio = open_radio
-        self._admission = Admission(credentials, SUPERVISOR, simulation.locator, time.monotonic_ns())
-        self._exposure: Exposure | None = None
         self._inbox = inbox
         self._journal: Journal | None = None
         self._capture: CaptureWriter | None = None
@@ -117,13 +110,11 @@ class HubProcess:
         """Whether the run has ended, and the capture takes nothing any more."""
         self._why_abandoned = ""
         """Why it ends though the run has not."""
-        self._log: logging.Logger = start_log(VHUB)
-        warn_of_end(credentials, self._log)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
-        self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
-        self._loop.connect(self._wire)
-        self._loop.show_progress(options.progress)
-        self._loop.notify = Notify()
+        self._shell = ProcessShell(
+            self.core, VHUB, self._wire, inbox, lambda now_ns: self.core.deadline_ns(), options.progress, credentials
+        )
+        self._log, self._loop = self._shell.log, self._shell.loop
         self._loop.turn = self._turn
         self._loop.took, self._loop.stood = self.core.waits.took, self.core.rest
         self._loop.lacking = lambda: self.core.lacking
@@ -132,7 +123,7 @@ class HubProcess:
         self._loop.on_say = self._on_say
         self._loop.on_unwritten = self._on_unwritten
         self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
-        self._wire.watch_alive(SUPERVISOR)
+        self._shell.watch_router(SUPERVISOR, simulation.locator)
 
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code.
@@ -204,7 +195,7 @@ class HubProcess:
     def _turn(self, now_ns: int) -> None:
         core = self.core
         core.busy = self._loop.busy
-        self._admission.check(now_ns)
+        self._shell.check(now_ns)
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build, now_ns)
         if core.orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._why_abandoned:
@@ -213,9 +204,6 @@ class HubProcess:
         while core.step(now_ns, sent_ns):
             self._loop.perform()
             sent_ns = time.monotonic_ns()
-        reminder = "" if self._exposure is None else self._exposure.due(now_ns)
-        if reminder:
-            core.actions.append(Say("warning", reminder))
         if now_ns >= self._look_ns and self._room is not None:
             self._look_ns = now_ns + LOOK_EVERY_NS
             self._look_at_room(self._room, now_ns)
@@ -334,7 +322,7 @@ class HubProcess:
         """Open the radio plane to the clients that the deployment declares."""
         session = self._open_radio(deployment)
         self.core.shell.radio_address = session.locator
-        self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
+        self._shell.listens(session.locator)
         radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
         self._loop.connect(radio)
         radio.read(channels.VHUB_READS, channels.VHUB_WAITS)
@@ -366,7 +354,7 @@ class HubProcess:
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if plane is Plane.SIMULATION:
-            self._admission.heard(name, is_alive)
+            self._shell.on_alive(name, is_alive)
         if is_alive:
             if name == SUPERVISOR:
                 self.core.orphan.hear(True, time.monotonic_ns())
@@ -410,15 +398,8 @@ def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki
     `pki` is the folder with its certificate and, where clients have passwords, with these.
     """
     address = check_listen(listen, insecure, secured=pki is not None)
-    credentials = load_credentials(pki, VHUB)
-    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with (
-        ExitStack() as opened,
-        Session.client(
-            connect, CONNECT_S, give_up=stop.is_set, security=None if credentials is None else Security(credentials)
-        ) as simulation,
-    ):
+    with ExitStack() as opened, client_session(connect, VHUB, pki, stop) as (simulation, inbox, credentials):
 
         def open_radio(deployment: Deployment) -> Session:
             session = opened.enter_context(_radio_session(address, credentials, deployment, pki))
