@@ -112,7 +112,6 @@ class McapFile:
     ) -> None:
         """`topics`: messages of others are passed by; None: all are read.
 
-
         `since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
         A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
         """
@@ -123,6 +122,7 @@ class McapFile:
         self.at = 0
         """Where the record stands that is read, or that is damaged."""
         self._is_whole = True
+        """Whether nothing was left out as damaged."""
         self._crc: int | None = 0
         """Of all bytes so far, in the summary of those of the summary; None where some were passed by."""
         self._known = IN_DATA

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 import sys
 from array import array
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from mmap import mmap
@@ -23,7 +23,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.capture.mcap.checks import CHECKS, CaptureError, Described, read_attachment, read_metadata
+from foosim.capture.mcap.checks import CHECKS, CaptureError, Described, Span, read_attachment, read_metadata
 from foosim.capture.mcap.format import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
@@ -84,9 +84,8 @@ class _Scan:
         self._described = Described()
         self._indexed: dict[int, int] = {}
         """By channel, how many messages of the last chunk are indexed."""
-        self._to_index: dict[int, array[int]] = {}
-        """What the indexes of the last chunk have to be that have not come, by channel, where it was read."""
-        self._is_read = False
+        self._span: Span | None = None
+        """Times of the last chunk, where it was read."""
 
     def run(self) -> Scanned:
         found, book, content = self._found, self._book, self._content
@@ -96,25 +95,18 @@ class _Scan:
         if start != MAGIC:
             return found
         book.offset = len(MAGIC)
-        self._read()
-        if book.chunks and not self._is_read and not found.finished:  # its indexes may be cut
-            self._trusted = 0
-            self._drop_last_chunk()
-            self._read()
-        if not found.finished and next_chunk(content, book.offset + 1, found.size) is not None:
-            found.is_damaged = True
-        if self._to_index:
-            self._drop_last_chunk()
-        book.start_ns = min((chunk.message_start_time for chunk in book.chunks), default=sys.maxsize)
-        book.end_ns = max((chunk.message_end_time for chunk in book.chunks), default=0)
-        return found
-
-    def _read(self) -> None:
         try:
             while self._next():
                 continue
         except _DAMAGED:
-            self._found.is_damaged = True
+            found.is_damaged = True
+        if not found.finished and book.chunks and not self._is_last_indexed():
+            self._drop_last_chunk()
+        if not found.finished and next_chunk(content, book.offset + 1, found.size) is not None:
+            found.is_damaged = True
+        book.start_ns = min((chunk.message_start_time for chunk in book.chunks), default=sys.maxsize)
+        book.end_ns = max((chunk.message_end_time for chunk in book.chunks), default=0)
+        return found
 
     def _next(self) -> bool:
         """Take the next record; False at one that is longer than the file, and where the data end."""
@@ -126,15 +118,20 @@ class _Scan:
             raise ValueError(f"a record of the kind {opcode:#04x}")
         if length > size - at:
             return False
-        if opcode == Opcode.DATA_END:
-            self._found.finished = at + length < size and self._content[-len(MAGIC) :] == MAGIC
-            return False
         if length > CHUNK_BYTES_MAX:
             raise ValueError(f"a record of {length} bytes")
+        if opcode == Opcode.MESSAGE_INDEX:
+            self._take_index(at, length)
+            self._book.offset = at + length
+            return True
+        span, self._span = self._span, None
+        if span is not None:
+            span.check()
         if opcode == Opcode.CHUNK:
             self._take_chunk(at, length)
-        elif opcode == Opcode.MESSAGE_INDEX:
-            self._take_index(at, length)
+        elif opcode == Opcode.DATA_END:
+            self._found.finished = at + length < size and self._content[-len(MAGIC) :] == MAGIC
+            return False
         else:
             self._take(opcode, self._content[at : at + length])
         self._book.offset = at + length
@@ -162,13 +159,11 @@ class _Scan:
             self._found.metadata[metadata.name] = metadata.metadata
 
     def _take_chunk(self, at: int, length: int) -> None:
-        if self._to_index:
-            raise ValueError("a chunk behind one that lacks indexes")
         head = self._content[at : at + min(length, CHUNK_HEAD_BYTES_MAX)]
         first_ns, last_ns, size, _, name_length = CHUNK_FIELDS.unpack_from(head)
-        self._is_read = at + length > self._trusted
-        if self._is_read:
-            self._to_index = _indexes_of(unpack_chunk(self._content[at : at + length], self._name), self._book.counts)
+        if at + length > self._trusted:
+            unpack_chunk(self._content[at : at + length], self._name)
+            self._span = Span(self._book.offset, first_ns, last_ns)
         self._indexed = {}
         self._book.chunks.append(
             records.ChunkIndex(
@@ -190,15 +185,26 @@ class _Scan:
         last = self._book.chunks[-1]
         if size != length - INDEX_FIELDS.size or channel in last.message_index_offsets:
             raise ValueError(f"an index of {size} bytes for channel {channel}")
-        if self._is_read and self._to_index.get(channel) != array(
-            "Q", self._content[at + INDEX_FIELDS.size : at + length]
-        ):
-            raise ValueError(f"an index of channel {channel} that is not that of its chunk")
-        self._to_index.pop(channel, None)
+        if self._span is not None:
+            self._span.take(self._content[at : at + length])
         self._indexed[channel] = size // (2 * PLACE.size)
         self._book.counts[channel] += self._indexed[channel]
         last.message_index_offsets[channel] = self._book.offset
         last.message_index_length += RECORD.size + length
+
+    def _is_last_indexed(self) -> bool:
+        """Whether the last chunk is whole, and all its indexes are there."""
+        last, content = self._book.chunks[-1], self._content
+        start, found = last.chunk_start_offset, {}
+        try:
+            for channel, at in last.message_index_offsets.items():
+                _, length = RECORD.unpack_from(content, at)
+                found[channel] = array("Q", content[at + RECORD.size + INDEX_FIELDS.size : at + RECORD.size + length])
+            chunk = unpack_chunk(content[start + RECORD.size : start + last.chunk_length], self._name)
+            return found == _indexes_of(chunk)
+        except _DAMAGED:
+            self._found.is_damaged = True
+            return False
 
     def _drop_last_chunk(self) -> None:
         """Go back to before the last chunk."""
@@ -210,14 +216,12 @@ class _Scan:
         self._indexed = {}
 
 
-def _indexes_of(chunk: bytes, channels: Mapping[int, int]) -> dict[int, array[int]]:
+def _indexes_of(chunk: bytes) -> dict[int, array[int]]:
     """Return the indexes of a chunk's messages, (time, place) each, by channel. Raises ValueError."""
     entries: dict[int, array[int]] = {}
     for opcode, start, _ in chunk_records(chunk):
         if opcode == Opcode.MESSAGE:
             channel, _, log_ns, _ = MESSAGE_FIELDS.unpack_from(chunk, start)
-            if channel not in channels:
-                raise ValueError(f"a message of channel {channel}, which is not declared")
             entries.setdefault(channel, array("Q")).extend((log_ns, start - RECORD.size))
     return entries
 

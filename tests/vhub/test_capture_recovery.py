@@ -19,8 +19,9 @@ from foosim.capture.mcap.format import MAGIC, McapFile, Message
 from foosim.capture.mcap.scan import UNSYNCED_BYTES
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Refused
+from foosim.runtime.disk import Room
 from foosim.runtime.journal import Journal, JournalError
-from foosim.vhub.recording import unfinished
+from foosim.vhub.recording import recovery, unfinished
 from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture, recovered_path
 from foosim.vhub.recording.writer import CaptureWriter
 
@@ -220,6 +221,16 @@ def test_a_file_that_is_there_is_not_overwritten(chunked: bytes, tmp_path: Path)
     with pytest.raises(CaptureError, match=r"\.new\.mcap\.part: cannot be created"):
         recover_capture(path, out=path / "new.mcap")
     assert found.path.read_bytes() == before
+
+
+def test_the_reserve_of_the_disk_is_kept(chunked: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = cut(tmp_path, chunked[: len(chunked) // 2])
+    room = Room((64 << 20) + path.stat().st_size - 1, 64 << 20, "on its disk")
+    monkeypatch.setattr(recovery, "room_on_disk", lambda place, reserve: room)
+    told = r"cut\.recovered\.mcap: needs 0\.1 MB or more, there are 67\.2 MB left on its disk, the reserve is 64 MiB"
+    with pytest.raises(CaptureError, match=told):
+        recover_capture(path)
+    assert [left.name for left in tmp_path.iterdir()] == ["cut.mcap"]
 
 
 def test_a_journal_that_is_damaged_gives_what_is_before(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:

@@ -407,6 +407,21 @@ def test_only_the_last_is_kept(hub_run: HubRun, path: Path, tmp_path: Path) -> N
         open_capture(run)
 
 
+def test_what_is_kept_of_a_killed_writer_is_recovered_to_one_file(hub_run: HubRun, path: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run.mcap"
+    write(run, hub_run, BY_TIME, "capture.last=50 ms")
+    last = files_from(run)[-1]
+    last.write_bytes(last.read_bytes()[:-100])
+    with Journal(tmp_path / "journals", "vhub") as journal:
+        for record in hub_run.journal:
+            journal.append(record)
+    found = recover_capture(run, tmp_path / "journals")
+    assert found is not None and found.is_whole and found.path == tmp_path / "run.recovered.mcap"
+    info, capture = capture_info(found.path), open_capture(found.path)
+    assert capture.ticks.tolist() == list(range(30, 65)) and capture.finished and info.parts == (found.path.name,)
+    assert info.first_tick == 30 and "last" not in info.metadata and info.chain == capture_info(path).chain
+
+
 def test_what_was_let_go_does_not_count(hub_run: HubRun, tmp_path: Path) -> None:
     """All files together are larger than the capture may be; those that are there never are."""
     sizes = [file.stat().st_size for file in files_from(write(tmp_path / "a" / "run.mcap", hub_run, BY_TIME).path)]

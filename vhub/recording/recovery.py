@@ -20,7 +20,7 @@ import msgspec
 
 from foosim.capture.contents import CHUNK_BYTES, check_new, sync_folder
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.parts import AFTER, LAST, PART, whole_path
+from foosim.capture.parts import AFTER, LAST, PART, files_from, whole_path
 from foosim.capture.reader import About, Scan, deployment_of, read_about
 from foosim.common import limits
 from foosim.common.errors import Malformed
@@ -28,6 +28,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
+from foosim.runtime.disk import megabytes, room_on_disk
 from foosim.runtime.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.recording.file import CaptureFile, Described, Line
@@ -93,33 +94,43 @@ def recover_capture(path: Path, journals: Path | None = None, out: Path | None =
 def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
     """Write the new file; it gets its name when it is on the disk."""
     check_new(out)
-    deployment = deployment_of(about)
-    metadata = {key: value for key, value in about.metadata.items() if key not in (PART, AFTER, LAST)}
-    whole = deployment.model_copy(update={"capture": deployment.capture.model_copy(update=_ONE_FILE)})
-    described = Described(whole, about.deployment_name, about.deployment_text, metadata, about.versions)
     part = out.with_name(f".{out.name}.part")
     with suppress(OSError):
         part.unlink()
-    file = CaptureFile(part, described)
     try:
-        torn_bytes, damage = _copy(about.path, file)
-        had = file.done.tick
-        completion = _Completion(deployment, about.metadata.get("run", ""), records)
-        completion.write(file)
-        tick = file.done.tick
-        problem = completion.problem if not (damage and completion.problem) else f"{damage}; {completion.problem}"
-        recovered = Recovered(about.path, out, tick, torn_bytes, tick - had, problem)
-        file.write(Line("warning", str(recovered), max(0, tick)))
-        end = {"reason": UNCLEAN, "torn_bytes": str(torn_bytes), "added_ticks": str(tick - had)}
-        file.finish({**end, "problem": problem} if problem else end)
+        found = _write(about, records, part, out)
         part.rename(out)
         sync_folder(out.parent)
     except OSError as error:
         raise CaptureError(f"{out}: cannot be written, {error.strerror}") from None
     finally:
+        with suppress(OSError):
+            part.unlink()
+    return found
+
+
+def _write(about: About, records: Iterable[bytes], part: Path, out: Path) -> Recovered:
+    deployment = deployment_of(about)
+    metadata = {key: value for key, value in about.metadata.items() if key not in (PART, AFTER, LAST)}
+    whole = deployment.model_copy(update={"capture": deployment.capture.model_copy(update=_ONE_FILE)})
+    file = CaptureFile(part, Described(whole, about.deployment_name, about.deployment_text, metadata, about.versions))
+    try:
+        needed = sum(left.stat().st_size for left in files_from(about.path))
+        room = room_on_disk(part.parent, deployment.capture.reserve_bytes)
+        if room.left - needed < room.reserve:
+            raise CaptureError(f"{out}: needs {megabytes(needed)} or more, there are {room}")
+        torn_bytes, damage = _copy(about.path, file)
+        had = file.done.tick
+        completion = _Completion(deployment, about.metadata.get("run", ""), records)
+        completion.write(file)
+        problem = "; ".join(filter(None, (damage, completion.problem))) if completion.problem else ""
+        found = Recovered(about.path, out, file.done.tick, torn_bytes, file.done.tick - had, problem)
+        file.write(Line("warning", str(found), max(0, found.tick)))
+        end = {"reason": UNCLEAN, "torn_bytes": str(torn_bytes), "added_ticks": str(found.added_ticks)}
+        file.finish({**end, "problem": problem} if problem else end)
+    finally:
         file.close()
-        part.unlink(missing_ok=True)
-    return recovered
+    return found
 
 
 _ONE_FILE: Final = {"split_bytes": None, "split_ns": None}
