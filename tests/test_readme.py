@@ -130,7 +130,13 @@ def test_the_readmes_player_plays(house: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["docs/tutorials/first_capture.md", "docs/reference/capture.md", "docs/tutorials/writing_a_player.md"]
+    "name",
+    [
+        "docs/tutorials/first_capture.md",
+        "docs/reference/capture.md",
+        "docs/how-to/use_a_capture.md",
+        "docs/tutorials/writing_a_player.md",
+    ],
 )
 def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """Each page's last block of Python; it prints what it found."""

@@ -311,11 +311,11 @@ def test_with_certificates_operators_listen_and_nobody_else(tmp_path: Path, monk
 
 
 def test_the_program_in_the_docs_listens(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page = (TABLE.parents[1] / "docs" / "reference" / "capture.md").read_text()
+    page = (TABLE.parents[1] / "docs" / "how-to" / "use_a_capture.md").read_text()
     (program,) = re.findall(r"^```py\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     assert "tcp/127.0.0.1:7470" in program
     with playing(run, pace=FAST, paused=True) as play:
-        exec(compile(program.replace("tcp/127.0.0.1:7470", play.address), "capture.md", "exec"), {})
+        exec(compile(program.replace("tcp/127.0.0.1:7470", play.address), "use_a_capture.md", "exec"), {})
     shown = capsys.readouterr().out
     assert shown.startswith("table 600000000\n") and "player-red BallPosition(" in shown
 
