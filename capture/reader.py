@@ -196,11 +196,10 @@ class Scan:
             return
         if not self.about.earlier:
             raise CaptureError(f"{self._path}: format {found!r} of a capture, this reads {FORMAT}")
-        writer = f"foosim {self.about.versions.get('foosim', 'of an unknown version')}"
+        wrote = self.about.versions.get("foosim", "of an unknown version")
         raise CaptureError(
-            f"{self._path}: a capture of format {found}, written by {writer}: this needs a foosim whose captures have "
-            f"format {found}; foosim {version('foosim')} has format {FORMAT}, and reads earlier ones by `info` and "
-            "`export` alone"
+            f"{self._path}: a capture of format {found}, written by foosim {wrote}, which can do this. foosim "
+            f"{version('foosim')} has format {FORMAT}, and reads format {found} by `info` and `export` alone"
         )
 
     def _take(self, content: records.Metadata | records.Attachment) -> None:

@@ -20,7 +20,7 @@ from foosim.deployment.loader import load_deployment
 from tests.replay.conftest import TABLE, replay
 
 DATA = Path(__file__).parent / "data"
-TEXT = "a capture of format 2, written by foosim 0.1.0: this needs a foosim whose captures have format 2"
+TEXT = "a capture of format 2, written by foosim 0.1.0, which can do this. foosim 0."
 
 
 @pytest.fixture(params=["format_2", "format_2_hashed"])
