@@ -87,32 +87,3 @@ def _line(finding: Finding) -> str:
     text = describe(finding.what, finding.value, finding.nearest)
     path = path_text(location)
     return f"{path}: {text}" if path else text
-
-
-def told(event: Event) -> str:
-    """Return in a few words what an event does: `partition of player-red from rest for 10 s`."""
-    if event.heal is not None:
-        return f"heal of {event.heal}"
-    if event.set is not None:
-        fields = type(event.set).model_fields
-        changed = sorted(fields[key].alias or key for key in event.set.model_fields_set - {"link"})
-        return f"{event.set.link}: {', '.join(changed)} set"
-    if event.partition is not None:
-        groups = [", ".join(group) for group in event.partition]
-        way = " from " if event.symmetric else ", one way, from "
-        what = f"partition of {way.join((groups[0], ' from '.join(groups[1:])))}"
-    elif event.clog is not None:
-        what = f"clog from {', '.join(event.clog.from_)} to {', '.join(event.clog.to)}"
-    else:
-        assert event.chaos is not None, "one action"
-        what = f"chaos among {', '.join(event.chaos.among)}"
-    return what + _until(event)
-
-
-def _until(event: Event) -> str:
-    if event.until_ns is not None:
-        return f" until {units.format_ns(event.until_ns)}"
-    if event.lasts is None:
-        return ""
-    mean = " (mean, exponential)" if event.lasts.is_random else ""
-    return f" for {units.format_ns(event.lasts.ns)}{mean}"

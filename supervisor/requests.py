@@ -19,8 +19,9 @@ from foosim.common.errors import Malformed, Refused, show
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.units import parse_pace
-from foosim.deployment.event_requests import event_text, told
+from foosim.deployment.event_requests import event_text
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
+from foosim.deployment.network.settings_text import event_words
 from foosim.protocol import channels
 from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once
@@ -296,8 +297,8 @@ class Requests:
             raise Refused(f"{EVENTS_MAX} events were asked for already")
         state.disruptions += 1
         event = event_of(text, effective * deployment.tick_ns)
-        what = f"{told(event)} from tick {effective} on" if event.heal is None else f"{told(event)} at tick {effective}"
-        return self._accept(request, tick, what, [Disrupt(text)], effective=effective)
+        when = f"from tick {effective} on" if event.heal is None else f"at tick {effective}"
+        return self._accept(request, tick, f"{event_words(event)}, {when}", [Disrupt(text)], effective=effective)
 
     def _move(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         state = self._state

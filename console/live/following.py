@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
-from foosim.analysis.settings_text import event_text
 from foosim.common.errors import Malformed
 from foosim.console.live.history import History
 from foosim.console.live.status_marks import StatusMarks
@@ -22,6 +21,7 @@ from foosim.console.shown.source import About, Curve, Moment, Wanted
 from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.network.rules import Event
+from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
@@ -205,7 +205,7 @@ class Following:
         marks = self._marks.new(status)
         while self._planned and self._planned[-1].at_ns <= status["ticks"] * status["tick_ns"]:
             event = self._planned.pop()
-            marks.append(asdict(Mark(event.at_ns // status["tick_ns"], NETWORK, event_text(event))))
+            marks.append(asdict(Mark(event.at_ns // status["tick_ns"], NETWORK, event_words(event))))
         if self._events is not None and self._frame is not None:
             marks += map(asdict, self._events.take(self._frame))
         if marks:

@@ -14,7 +14,6 @@ from typing import Final
 from pydantic import ValidationError
 
 from foosim.analysis.age_tallies import AgeAtUse, AgeTallies
-from foosim.analysis.settings_text import event_text, impairments_text, radio_text, rule_ends, sends_once
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, chain_at_start
 from foosim.capture.rows import AGES, PACKETS, TICK, PacketRow
@@ -26,6 +25,7 @@ from foosim.console.shown.timeline import WorldEvents
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import event_of
+from foosim.deployment.network.settings_text import event_words, impairments_text, radio_text, rule_ends, sends_once
 from foosim.vhub.links.summary import delay_of, residual_of
 from foosim.vhub.network.timeline import Timeline
 from foosim.world.frame import Frame, chain_next
@@ -252,7 +252,7 @@ class _Gathered:
         network = deployment.network
         seed = deployment.seed if network.seed is None else network.seed
         self._timeline = Timeline(network, seed, deployment.endpoints())
-        self._happenings = [Happening(event.at_ns, event_text(event), is_asked=False) for event in network.events]
+        self._happenings = [Happening(event.at_ns, event_words(event), is_asked=False) for event in network.events]
         self._fates: Counter[str] = Counter()
         self._copies = 0
         self._causes: dict[str, list[int]] = {}
@@ -316,7 +316,7 @@ class _Gathered:
                         f"{self._capture.path}: tick {row.tick}: no event of a network: {error}"
                     ) from None
                 self._timeline.add(event)
-                self._happenings.append(Happening(at_ns, event_text(event), is_asked=True))
+                self._happenings.append(Happening(at_ns, event_words(event), is_asked=True))
 
     def take_frame(self, frame: Frame) -> None:
         self._map.take_frame(frame)

@@ -9,10 +9,10 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from foosim.analysis.settings_text import impairments_text, radio_text, rule_ends
 from foosim.common.errors import Refused
 from foosim.deployment.network.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles, over
 from foosim.deployment.network.rules import LinkRule, event_of
+from foosim.deployment.network.settings_text import impairments_text, radio_text, rule_ends
 from foosim.deployment.schema import Deployment
 from foosim.vhub.links.summary import SharedSettings, summary_of
 from foosim.vhub.links.summary_text import summary_line

@@ -13,12 +13,12 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from foosim.analysis.settings_text import event_text
 from foosim.capture.rows import EditRow, EpochRow, RecoveryRow
 from foosim.common.errors import Refused
 from foosim.common.names import TEAMS
 from foosim.console.shown.asked import edit_text, moves
 from foosim.deployment.network.rules import event_of
+from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame
 from foosim.world.initial_state import kickoff_ticks
@@ -140,7 +140,7 @@ class Timeline:
         self._fine_ns = max(FINE_NS, self._tick_ns)
         self._drops: dict[int, Counter[str]] = {}
         for event in deployment.network.events:
-            self._add(Mark(event.at_ns // self._tick_ns, NETWORK, event_text(event)))
+            self._add(Mark(event.at_ns // self._tick_ns, NETWORK, event_words(event)))
 
     def _add(self, mark: Mark) -> None:
         self._kinds[mark.kind] += 1
@@ -164,7 +164,7 @@ class Timeline:
 
     def _network_text(self, event: str, tick: int) -> str:
         try:
-            return event_text(event_of(event, tick * self._tick_ns))
+            return event_words(event_of(event, tick * self._tick_ns))
         except (ValidationError, ValueError, TypeError, Refused):
             return "an event of the network that cannot be read"
 

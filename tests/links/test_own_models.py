@@ -12,7 +12,6 @@ import msgspec
 import pytest
 
 from foosim.analysis.explain import PacketName, explain_packet
-from foosim.analysis.settings_text import impairments_text, radio_text
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import PACKETS, PacketRow
 from foosim.cli.net import linted
@@ -20,6 +19,7 @@ from foosim.common.errors import DeploymentError
 from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.link_settings import Profiles
+from foosim.deployment.network.settings_text import impairments_text, radio_text
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System

@@ -8,9 +8,10 @@ from typing import Any, Final
 import pytest
 
 from foosim.common.json_text import decode_json
-from foosim.deployment.event_requests import BadEvent, event_text, told
+from foosim.deployment.event_requests import BadEvent, event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
+from foosim.deployment.network.settings_text import event_words
 from foosim.protocol.messages import Answer
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
@@ -61,18 +62,18 @@ def test_a_bad_event_is_refused_with_path_value_and_nearest_name(event: Any, pro
 @pytest.mark.parametrize(
     ("event", "text"),
     [
-        ({"partition": [["player-red"], ["rest"]]}, "partition of player-red from rest"),
+        ({"partition": [["player-red"], ["rest"]]}, "partition player-red | rest"),
         ({"partition": [["*.goal", "camera"], ["player-*"]], "symmetric": False, "until": "3 s"},
-         "partition of *.goal, camera, one way, from player-* until 3 s"),
+         "partition *.goal, camera | player-*, one way, until 3 s"),
         ({"clog": {"from": "*", "to": "camera"}, "for": {"exponential": "2 s"}},
-         "clog from * to camera for 2 s (mean, exponential)"),
-        ({"set": {"link": "lan", "loss": "5 %", "delay": "3 ms"}}, "lan: delay, loss set"),
-        ({"chaos": {"among": "player-*"}, "for": "10s"}, "chaos among player-* for 10 s"),
-        ({"heal": "all"}, "heal of all"),
+         "clog from * to camera, for 2 s on average"),
+        ({"set": {"link": "lan", "loss": "5 %", "delay": "3 ms"}}, "set lan: delay 3 ms, loss 5 %"),
+        ({"chaos": {"among": "player-*"}, "for": "10s"}, "chaos tigerbeetle_swarm among player-*, for 10 s"),
+        ({"heal": "all"}, "heal all"),
     ],
 )  # fmt: skip
-def test_an_event_is_told_in_words(event: Any, text: str) -> None:
-    assert told(event_of(event_text(DEPLOYMENT, event, SECOND_NS), SECOND_NS)) == text
+def test_an_event_is_described_in_words(event: Any, text: str) -> None:
+    assert event_words(event_of(event_text(DEPLOYMENT, event, SECOND_NS), SECOND_NS)) == text
 
 
 def test_it_happens_to_what_is_sent_from_the_tick_of_the_answer_on() -> None:
@@ -93,8 +94,8 @@ def test_it_happens_to_what_is_sent_from_the_tick_of_the_answer_on() -> None:
         TABLE.read_text(), TABLE.name, 100, 1, SETS, Settings(on_closing=closings.append), prepare=prepare
     )
     cut, refused, healed = (rehearsed.answers[identity] for identity in asked)
-    assert cut.text == f"partition of camera from player-* from tick {cut.tick} on"
-    assert healed.text == f"heal of all at tick {healed.tick}"
+    assert cut.text == f"partition camera | player-*, from tick {cut.tick} on"
+    assert healed.text == f"heal all, at tick {healed.tick}"
     assert not refused.accepted and "nearest is 'camera'" in refused.text
     lost = {f.sent_ns // 2_000_000 for c in closings for f in c.fates if f.cause == "partition" and f.arrival_tick < 0}
     sensed = {f.sent_ns // 2_000_000 for c in closings for f in c.fates if f.source == "camera"}

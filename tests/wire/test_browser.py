@@ -194,7 +194,7 @@ def cut_and_heal(page: Page) -> None:
     page.until("document.querySelector('table.links tr[aria-selected=true]').textContent.includes('partition')")
     page.click("#heal")
     send(page)
-    page.until("document.querySelector('.disturbances').textContent.includes('heal of all')")
+    page.until("document.querySelector('.disturbances').textContent.includes('heal all')")
 
 
 def pause_and_step(page: Page) -> int:

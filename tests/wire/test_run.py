@@ -304,7 +304,7 @@ def cut_and_healed(house: House) -> tuple[int, int]:
     house.ticking(cut + 20)
     code, out, err = house.ask("foosim-net", "heal", "--json")
     healed = json.loads(out)["tick"]
-    assert (code, json.loads(out)["text"]) == (0, f"heal of all at tick {healed}")
+    assert (code, json.loads(out)["text"]) == (0, f"heal all, at tick {healed}")
     status = house.ticking(healed + 20)
     assert [told["tick"] for told in status["disruptions"]["last"]] == [cut, healed]
     return cut, healed

@@ -202,19 +202,19 @@ export function oldText(status) {
   if (!status?.vhub_away) return "";
   const lost = status.vhub_lost;
   const since = lost ? ` since tick ${lost.tick}, for ${number(lost.for_s, 2)} s: ${lost.reason}` : "";
-  return `⚠ The vHub is away${since}. Packets and links are those that it told last.`;
+  return `⚠ The vHub is away${since}. Packets and links are those of its last report.`;
 }
 
 /**
- * An event in words: `partition of rover01 from rest for 10 s`. @param {any} event
+ * An event in words, as the supervisor's answers have it: `partition rover01 | rest, for 10 s`. @param {any} event
  */
 export function eventText(event) {
-  const lasts = event.for ? ` for ${typeof event.for === "string" ? event.for : `${event.for.exponential} (mean)`}` : "";
+  const lasts = event.for ? `, for ${typeof event.for === "string" ? event.for : `${event.for.exponential} on average`}` : "";
   const list = (/** @type {any} */ names) => (Array.isArray(names) ? names.join(", ") : String(names));
-  if (event.heal) return `heal of ${event.heal}`;
-  if (event.partition) return `partition of ${event.partition.map(list).join(" from ")}${event.symmetric === false ? ", one way" : ""}${lasts}`;
+  if (event.heal) return `heal ${event.heal}`;
+  if (event.partition) return `partition ${event.partition.map(list).join(" | ")}${event.symmetric === false ? ", one way" : ""}${lasts}`;
   if (event.clog) return `clog from ${list(event.clog.from)} to ${list(event.clog.to)}${lasts}`;
-  if (event.chaos) return `chaos among ${list(event.chaos.among ?? "*")}${lasts}`;
-  if (event.set) return `${event.set.link}: ${Object.keys(event.set).filter((key) => key !== "link").join(", ")} set`;
+  if (event.chaos) return `chaos ${event.chaos.preset ?? "tigerbeetle_swarm"} among ${list(event.chaos.among ?? "*")}${lasts}`;
+  if (event.set) return `set ${event.set.link}: ${Object.keys(event.set).filter((key) => key !== "link").join(", ")}`;
   return JSON.stringify(event);
 }

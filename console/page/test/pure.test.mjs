@@ -187,7 +187,7 @@ test("what the table of links leaves out, and that its figures are old, is said"
   assert.equal(oldText(null), "");
   assert.equal(
     oldText({ vhub_away: true, vhub_lost: { reason: "its connection has closed", tick: 73, for_s: 1.25 } }),
-    "⚠ The vHub is away since tick 73, for 1.25 s: its connection has closed. Packets and links are those that it told last.",
+    "⚠ The vHub is away since tick 73, for 1.25 s: its connection has closed. Packets and links are those of its last report.",
   );
 });
 

@@ -57,7 +57,7 @@ def impairments_text(settings: Impairments) -> str:
     return settings_text(LinkSettings.model_construct(_fields_set=written, **values))
 
 
-def event_text(event: Event) -> str:
+def event_words(event: Event) -> str:
     """Return what an event does, without when."""
     if event.partition is not None:
         what = f"partition {' | '.join(', '.join(group) for group in event.partition)}"
