@@ -1,7 +1,7 @@
 """Where a plane listens: `HOST`, `HOST:PORT`, `tcp/HOST:PORT` or, with certificates, `tls/HOST:PORT`, read and checked.
 
-Without certificates whoever reaches a plane takes part in it, so an address that other machines reach has to be asked
-for twice: with `--insecure`.
+Without certificates every process that reaches a plane can take part in it, so an address that other machines can reach
+needs `--insecure`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ADDRESS = re.compile(rf"(?:(?P<protocol>tcp|tls)/)?(?P<host>{_HOST})(?::(?P<por
 
 
 class Insecure(Refused):
-    """An address that others can reach, without the word that this is meant."""
+    """An address that others can reach, without `--insecure`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Address:
 
     @property
     def is_wildcard(self) -> bool:
-        """Whether it stands for every address of this machine."""
+        """Whether it is the wildcard for every address of this machine."""
         try:
             return ip_address(self.host.strip("[]")).is_unspecified
         except ValueError:
@@ -59,7 +59,7 @@ class Address:
 def parse_address(text: str, secured: bool | None = None) -> Address:
     """Return the address in `text`; raises BadValue.
 
-    `secured` says whether there are certificates: then it is a `tls` address, else a `tcp` one. None takes either.
+    `secured`: with certificates the address is `tls`, without it is `tcp`. None accepts either.
     """
     match = _ADDRESS.fullmatch(text)
     port = int(match["port"] or 0) if match is not None else 0
@@ -69,14 +69,14 @@ def parse_address(text: str, secured: bool | None = None) -> Address:
     if secured is True and said == "tcp":
         raise BadValue("not an address for certificates", text, f"tls/{match['host']}:{port}")
     if secured is False and said == "tls":
-        raise BadValue("an address that needs certificates: say where they are by --pki DIR", text)
+        raise BadValue("an address that needs certificates: give their folder by --pki DIR", text)
     return Address(match["host"], port, "tls" if secured or said == "tls" else "tcp")
 
 
 def check_listen(text: str, insecure: bool, ports: int = 1, secured: bool = False) -> Address:
-    """Return the address to listen on; raises BadValue, and Insecure when others reach it and that was not asked for.
+    """Return the address to listen on; raises BadValue, and Insecure when others can reach it without permission.
 
-    `ports` is how many in a row are needed; `secured` whether there are certificates.
+    `ports` is the number of consecutive ports needed; `secured` whether there are certificates.
     """
     address = parse_address(text, secured)
     if secured and insecure:
@@ -85,14 +85,14 @@ def check_listen(text: str, insecure: bool, ports: int = 1, secured: bool = Fals
         raise BadValue(f"no room for {ports} ports", text)
     if not address.is_loopback and not insecure and not secured:
         raise Insecure(
-            f"{address} is reached by other machines, and whoever reaches it takes part; give certificates by --pki "
-            "DIR, or say --insecure to mean it"
+            f"{address} is reached by other machines, and any process that reaches it takes part; give --pki "
+            "DIR with certificates, or --insecure to allow it"
         )
     return address
 
 
 def reachable(locators: list[str], wanted: Address) -> str:
-    """Return the locator that others should connect to, of those on which a session listens."""
+    """Return the locator for others to connect to, of those on which a session listens."""
     assert locators, "a listening session has a locator"
     if not wanted.is_wildcard:
         return locators[0]

@@ -1,4 +1,4 @@
-"""Errors that the world causes: bad input, a refused request, a broken rule of a peer.
+"""Errors caused from outside: bad input, a refused request, a protocol violation of a peer.
 
 A programmer's error is an assertion. Everything that comes from outside (a file, a packet, a request, an argument)
 and is not acceptable raises a `Refused` or a class made from it, whose text names the place, the value and the valid
@@ -12,16 +12,16 @@ from foosim.common.names import nearest_name
 
 CHOICES_MAX: Final = 24
 ABSENT: Final = object()
-"""Stands for a value that was not given, so that there is none to show."""
+"""Marks a value that was not given, so that there is none to show."""
 
 Read = TypeVar("Read")
 
 
 class Refused(Exception):
-    """Something from outside is not accepted; the text says what, where, and what would be."""
+    """Outside input is not accepted; the text has the place, the value, and the valid choices."""
 
     exit_code: ClassVar[int] = 3
-    """What a command exits with that it ends: 1 failed, 2 bad input, 3 refused."""
+    """Exit code of a command that raises it: 1 failed, 2 bad input, 3 refused."""
 
     def __init__(self, what: str) -> None:
         super().__init__(what)
@@ -29,13 +29,13 @@ class Refused(Exception):
 
 
 class Failed(Refused):
-    """What was asked for is in order and could not be done; the text says what stood in the way."""
+    """A valid request could not be carried out; the text has the obstacle."""
 
     exit_code = 1
 
 
 class BadValue(Refused):
-    """A value that is not valid: what is wrong with it, the value as it was given, the nearest valid one if any."""
+    """An invalid value: the problem, the value as given, the nearest valid one if any."""
 
     exit_code = 2
 
@@ -47,7 +47,7 @@ class BadValue(Refused):
 
 
 def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
-    """Return what `read` makes of a text; the BadValue that it raises names the place, such as an option."""
+    """Return `read` of a text; a BadValue that it raises names the place, such as an option."""
     try:
         return read(text)
     except BadValue as bad:
@@ -72,7 +72,7 @@ def describe(what: str, value: object, nearest: str | None = None) -> str:
 
 
 def show(value: object, length: int = 48) -> str:
-    """A value as it may stand in a message: one line, bounded, with control characters escaped."""
+    """A value formatted for a message: one line, bounded, with control characters escaped."""
     if isinstance(value, dict):
         return f"a mapping of {len(value)}"
     if isinstance(value, list | tuple):

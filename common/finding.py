@@ -11,7 +11,7 @@ Location = tuple[str | int, ...]
 class Finding:
     """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key.
 
-    `other` is the same problem at the other of two values that do not fit: it is what is told where that one was set.
+    `other` is the same problem at the other of two values that do not fit: reported if that one was set.
     """
 
     location: Location

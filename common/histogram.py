@@ -1,4 +1,4 @@
-"""How late things were, in a histogram: bounded memory, and exact enough for people."""
+"""A histogram of lags, with bounded memory and a bounded relative error."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 CELL_NS: Final = 10_000
 CELL_BITS: Final = 10
 LAG_CELLS: Final = 1_000_000
-"""10 s; what is later counts as that late."""
+"""10 s; larger lags count as this one."""
 
 
 @dataclass(slots=True)
@@ -16,7 +16,7 @@ class Lags:
     """Lags so far: cells of 10 us up to 10 ms, of 1/512 to 1/1024 of the lag up to 10 s."""
 
     cells: dict[int, int] = field(default_factory=dict)
-    """How many by the upper edge of their cell, in units of 10 us."""
+    """Counts by the upper edge of the cell, in units of 10 us."""
     count: int = 0
     max_ns: int = 0
 
@@ -29,7 +29,7 @@ class Lags:
         self.max_ns = max(self.max_ns, lag_ns)
 
     def quantile_ms(self, share: float) -> float:
-        """Return the lag, in ms, that `share` of them did not exceed (upper edge of its cell)."""
+        """Return the lag, in ms, that the fraction `share` does not exceed (upper edge of its cell)."""
         left = share * self.count
         for edge in sorted(self.cells):
             left -= self.cells[edge]
@@ -38,5 +38,5 @@ class Lags:
         return 0.0
 
     def as_json(self) -> dict[str, float]:
-        """Return what a result has of them, in ms."""
+        """Return the summary for a run's result, in ms."""
         return {"p50": self.quantile_ms(0.5), "p99": self.quantile_ms(0.99), "max": self.max_ns / 1e6}

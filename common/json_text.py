@@ -1,4 +1,4 @@
-"""JSON, for what people and scripts read."""
+"""JSON for people and scripts."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Keyed random draws: a number is a function of what it is for, never the next one of a running stream.
+"""Keyed random draws: a number is a function of its purpose, never the next one of a running stream.
 
 A key is made once for a purpose (`draw_key(seed, "link", source, destination)`); a draw takes the key and one or two
-counters (a sequence number, a tick) and gives eight 64-bit words. So no draw depends on another one having happened,
-on the order of arrival or on who asks. BLAKE2b (RFC 7693) gives the same words on every machine. The slots of a link
+counters (a sequence number, a tick) and gives eight 64-bit words. So no draw depends on other draws,
+on the order of arrival or on the caller. BLAKE2b (RFC 7693) gives the same words on every machine. The slots of a link
 are named and permanent (`Slot`): switching one impairment on shifts no other.
 """
 
@@ -15,7 +15,7 @@ from typing import Final
 _AS_WORDS: Final = struct.Struct("<8Q").unpack
 _OF_COUNTERS: Final = struct.Struct("<QQ").pack
 _KEYED: Final[dict[bytes, blake2b]] = {}
-"""What has taken in a key: a copy of it costs half of what a new one does."""
+"""A hash state with the key: copying it costs half as much as creating it."""
 _KEYED_MAX: Final = 65_536
 _NORMAL = NormalDist()
 
@@ -24,7 +24,7 @@ UNIT: Final = 2**64
 
 
 class Slot(IntEnum):
-    """The words of a link's draw and what each is for. Numbers are never reused."""
+    """The words of a link's draw and the purpose of each. Numbers are never reused."""
 
     LOSS = 0
     ERROR = 1

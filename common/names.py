@@ -1,4 +1,4 @@
-"""Names: what one may be called, and the nearest valid name for an error message.
+"""Names: their rules, and the nearest valid name for an error message.
 
 Names end up in file names, keys of the wire, captures and terminals: so they are short, lower case and plain.
 """
@@ -17,7 +17,7 @@ NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*$"
 NAME_RULE: Final = (
     f"a name is a lower case letter, then lower case letters, digits, - and _, at most {NAME_LENGTH_MAX} in all"
 )
-"""The same for people."""
+"""The same as a text for people."""
 ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
 SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
 CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
@@ -27,18 +27,18 @@ LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attac
 Team = Literal["red", "blue"]
 TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
 
-# The entities of the world that are no robots, and the processes that are neither node nor player: no robot may be
-# called like the first, no node, player or client like the second.
+# Reserved names: entities that are not robots, for robots; processes other than nodes and players, for nodes, players
+# and clients.
 ENTITY_NAMES_RESERVED: Final = ("ball", "world")
 PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
-# Channels that every robot, every rod, or every rover has: no sensor may be called so.
+# Channels that every robot, every rod, or every rover has; no sensor may have these names.
 CHANNEL_ECHO: Final = "echo"
 CHANNEL_POSITION: Final = "position"
 CHANNEL_DRIVE: Final = "drive"
 CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION, CHANNEL_DRIVE)
 
 SIMILAR: Final = 0.6
-"""From here on two texts are alike: 0 is nothing in common, 1 is equal but for capitals."""
+"""Similarity from which a name is suggested: 0 is nothing in common, 1 is equal but for capitals."""
 
 _NAME = re.compile(NAME_PATTERN)
 _SELECTOR = re.compile(SELECTOR_PATTERN)
@@ -56,7 +56,7 @@ def is_robot_name(text: str) -> bool:
 
 
 def is_selector(text: str) -> bool:
-    """True for what may select endpoints: a name in which * and ? stand for anything."""
+    """True for a pattern of endpoints: a name in which * and ? are wildcards."""
     return len(text) <= SELECTOR_LENGTH_MAX and _SELECTOR.fullmatch(text) is not None
 
 
@@ -68,9 +68,9 @@ def class_path_of(text: str) -> str | None:
 
 
 def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
-    """The choice that looks most like the value; None when none does.
+    """The choice most similar to the value; None when none is.
 
-    Among equals it is the one that begins most like the value, then the first by name.
+    Ties go to the longest common prefix, then to the first by name.
     """
     text = str(value)[: 2 * SELECTOR_LENGTH_MAX]
     best, best_likeness = None, (0.0, 0)
@@ -87,6 +87,6 @@ def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR
 
 
 def _common_start(one: str, other: str) -> int:
-    """How many first characters two texts share."""
+    """Length of the common prefix of two texts."""
     pairs = zip(one, other, strict=False)
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -1,4 +1,4 @@
-"""What the parts of a deployment have in common: their base, their names, and quantities that several of them have.
+"""Base class, names and shared quantities of the parts of a deployment.
 
 Quantities are strings with units in a file and SI numbers here; times are integer nanoseconds.
 """
@@ -15,7 +15,7 @@ Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=l
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
 Offset = Annotated[int, Quantity(units.TIME, "0 s", "1000 s")]
-"""By how much later than a multiple of its period something happens: whole ticks, below the period."""
+"""Offset of an event from the multiples of its period: whole ticks, below the period."""
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Gravity = Annotated[float, Quantity(units.ACCELERATION, "0 m/s2", "100 m/s2")]
@@ -34,7 +34,7 @@ RuleTime = Annotated[int, Quantity(units.TIME, "0 s", "1 h")]
 
 
 def default(text: str, alias: str | None = None) -> Any:
-    """Return a field with a default that is written, checked and documented as in a file."""
+    """Return a field whose default is written, checked and documented as in a file."""
     return Field(default=text, alias=alias, validate_default=True)
 
 

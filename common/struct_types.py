@@ -1,4 +1,4 @@
-"""What messages are made of: the types of their fields, bounded, and the two kinds of struct.
+"""Building blocks of messages: bounded field types, and the two kinds of struct.
 
 Decoding validates by these: negative counters, oversized texts, lists and bytes are refused.
 """
@@ -29,7 +29,7 @@ def _tag(class_name: str) -> str:
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, tag=_tag, forbid_unknown_fields=True, gc=False):
-    """What every message of the wire shares: array form, a tag with the version, no unknown fields."""
+    """Base of every wire message: array form, a tag with the version, no unknown fields."""
 
 
 class Item(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, gc=False):

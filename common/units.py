@@ -4,7 +4,7 @@ In a file every quantity is a string with its unit. In the code it is a float in
 integer count of nanoseconds, counts of ticks, which are integers, and rates, which are exact fractions of hertz.
 Numbers are read as exact fractions and rounded once, so `84 mm` is the float nearest to 0.084.
 
-`Quantity` is the annotation by which the deployment's models (deployment.py, table.py) use this.
+`Quantity` is the annotation for the fields of the deployment's models.
 """
 
 import math
@@ -26,7 +26,7 @@ NS_PER_S: Final = 1_000_000_000
 _NUMBER: Final = r"[+-]?[0-9]{1,20}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
 _RATIO: Final = r"[0-9]{1,20}/[1-9][0-9]{0,19}"
 _QUANTITY = re.compile(rf"({_NUMBER}|{_RATIO}) *([A-Za-z%\u00b0\u00b5].*)?")
-# Signs that people write in units, and what stands for them here.
+# Alternative characters in units, and their replacements.
 _SIGNS: Final = str.maketrans({"^": "", "\u00b2": "2", "\u00b0": "deg", "\u00b7": " ", "*": " ", "\u00b5": "u"})
 _DEGREE: Final = Fraction(math.pi) / 180
 
@@ -39,7 +39,7 @@ class Dimension:
     units: Mapping[str, Fraction]
     kind: Literal["float", "int", "fraction"] = "float"
     usual: str = ""
-    """The unit that people mean who write none; empty where that is the one that values are shown in."""
+    """The suggested unit for a number without one; empty where that is the unit that values are shown in."""
 
     @property
     def base(self) -> str:
@@ -48,12 +48,12 @@ class Dimension:
 
     @property
     def form(self) -> str:
-        """How a quantity is written."""
+        """Description of the accepted form."""
         return f"a number and one of {', '.join(self.units)}"
 
     @property
     def refusal(self) -> str:
-        """What is wrong with a text that is none."""
+        """Error text for a value of another form."""
         article = "an" if self.name[0] in "aeiou" else "a"
         return f"not {article} {self.name} ({self.form})"
 
@@ -160,7 +160,7 @@ def period_ticks(rate_hz: Fraction, tick_ns: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast simulated time may pass: as fast as it goes, or `factor` times the wall clock."""
+    """Pace of simulated time: unlimited, or `factor` times the wall clock."""
 
     kind: Literal["realtime", "fast"]
     factor: Fraction = Fraction(1)
@@ -246,7 +246,7 @@ class Quantity:
 
 
 def custom_error(bad: BadValue) -> PydanticCustomError:
-    """A BadValue in the form that pydantic collects; deployment.py reads it back."""
+    """A BadValue in the form that pydantic collects; deployment/schema_errors.py reads it back."""
     context = {} if bad.nearest is None else {"nearest": bad.nearest}
     return PydanticCustomError("bad_value", "{what}", {"what": bad.problem, **context})
 

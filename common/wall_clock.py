@@ -1,8 +1,7 @@
 """Wall time for people: the one place that reads it.
 
-It stands in logs, file names and run files; nothing of a run is decided by it, since wall clocks jump. Only the dates
-of certificates are compared with it. Deadlines and lags use
-the monotonic clock of a shell.
+It is used in logs, file names and run files, and compared with the dates of certificates. No decision of a run depends
+on it, since wall clocks jump: deadlines and lags use the monotonic clock of a shell.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The console beside a run: a process that `up` starts and ends, and that may die without harm to the run.
+"""The console of a run: a process that `up` starts and ends, and whose death does not affect the run.
 
-It is no process of the run: nobody waits for it, and nobody starts it again. It writes the addresses of its page into
+No process of the run waits for it, and it is not restarted. It writes the addresses of its page into
 the run's folder, where only the owner can read them.
 """
 
@@ -20,17 +20,17 @@ from foosim.runtime.run_folder import UNREADABLE, RunFolder
 
 CONSOLE: Final = "console"
 ADDRESSES: Final = "console.json"
-"""In the run's folder: the addresses of the page, and the line that says them."""
+"""In the run's folder: the addresses of the page, and the line that reports them."""
 LEAVE_S: Final = 3.0
-"""How long a console has to tell pages how the run has ended."""
+"""Time for a console to report the end of the run to its pages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A page that is to show the run."""
+    """A page that shows the run."""
 
     open: bool = False
-    """Have the browser of this machine show it."""
+    """Whether to open it in this machine's browser."""
     second: Path | None = None
     """The recording that follows the run."""
     offset: str | None = None
@@ -69,10 +69,10 @@ class ConsoleChild:
         self._folder, self._say, self._page = folder, say, page
         self._launcher = Launcher(folder.name)
         self._has_addresses = self._has_ended = False
-        """What was said of it."""
+        """The addresses and the ending that were reported."""
 
     def start(self) -> None:
-        """Start it, if there is to be one: the run can be found by now."""
+        """Start it, if requested. The run must be discoverable."""
         if self._page is None:
             return
         path = self._folder.path / ADDRESSES
@@ -87,10 +87,10 @@ class ConsoleChild:
         try:
             self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
         except Failed as failed:
-            self._say(f"{failed}; the run goes on without it")
+            self._say(f"{failed}; the run continues without it")
 
     def look(self) -> None:
-        """Say its addresses as soon as it has some, and how it ended when it has."""
+        """Report its addresses once they are known, and its ending."""
         child = self._launcher.children.get(CONSOLE)
         if child is None or self._has_ended:
             return
@@ -101,7 +101,7 @@ class ConsoleChild:
         if child.exit_code is not None:
             self._has_ended = True
             self._say(
-                f"console {child.ending}, and the run goes on; foosim-console {self._folder.name} starts another one; "
+                f"console {child.ending}, the run continues; foosim-console {self._folder.name} starts another one; "
                 f"its log is {child.log}"
             )
 
@@ -109,7 +109,7 @@ class ConsoleChild:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End it, once it has told its pages how the run has ended."""
+        """End it after it has reported the end of the run to its pages."""
         self._launcher.stop(LEAVE_S)
         self._launcher.close()
         (self._folder.path / ADDRESSES).unlink(missing_ok=True)

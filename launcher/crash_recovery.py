@@ -1,7 +1,6 @@
-"""What runs that ended uncleanly left: at the next start valid captures are made of theirs and the vHub's journals.
+"""Crash recovery: the next start makes complete captures for runs whose launcher died, from file and journal.
 
-A run whose launcher died with everything else has nobody to finish its capture. Its vHub's journal is in the run's
-folder and says where the capture is.
+The vHub's journal is in the run's folder and has the path of the capture.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
 def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> None:
-    """Recover the captures of runs of this user whose launcher is gone, a line each; the run `but` is left as it is.
+    """Recover the captures of this user's runs whose launcher is gone, logging a line each; skip the run `but`.
 
-    A vHub's journal goes when what is recovered is whole. What cannot be recovered stays, and is said.
+    The vHub's journal is deleted when the new capture is complete. A failed recovery is logged and deletes nothing.
     """
     for folder in left_runs():
         path = captured_at(folder)
@@ -31,7 +30,7 @@ def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> Non
         try:
             recovered = recover_capture(path, folder.journals)
         except JournalError:
-            continue  # its vHub lives, and finishes what it writes
+            continue  # its vHub lives and finishes the capture
         except Refused as error:
             say(f"run {folder.name} ended uncleanly, its capture cannot be recovered: {error}")
             continue
@@ -42,12 +41,12 @@ def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> Non
 
 
 def captured_at(folder: RunFolder) -> Path | None:
-    """Return where the capture of a run is, as its vHub's journal says; None without a journal or a capture."""
+    """Return the path of a run's capture from its vHub's journal; None without a journal or a capture."""
     for file in journal_files(folder.journals, VHUB):
         try:
             head = decode_any(HubRecord, next(read_records(file), b""))
         except (JournalError, Malformed):
-            continue  # another file may tell
+            continue  # another file may have it
         if isinstance(head, HeadRecord) and head.capture:
             return Path(head.capture)
     return None

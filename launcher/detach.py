@@ -1,4 +1,4 @@
-"""A run in the background: `up --detach` starts a launcher that nobody's terminal holds, and waits until it is up."""
+"""A run in the background: `up --detach` starts a launcher in a session of its own, and waits until it is up."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foosim.runtime.run_folder import RunFolder, create_run
 
 POLL_S: Final = 0.05
 LINES: Final = 20
-"""How much of its log is shown of a launcher that has ended."""
+"""Size of the log excerpt that is shown for a launcher that has ended."""
 
 
 def launcher_command(plan: Plan, capture: Path | None, run: str) -> list[str]:
@@ -26,7 +26,7 @@ def launcher_command(plan: Plan, capture: Path | None, run: str) -> list[str]:
 
 
 def detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
-    """Launch a run in the background; return its folder when clients can find it. Raises Failed when it has ended."""
+    """Launch a run in the background; return its folder when clients can find it. Raises Failed if it ends before."""
     folder = create_run(plan.deployment.world, run)
     path = folder.log("up")
     process = _launch(launcher_command(plan, capture, folder.name), path)
@@ -42,7 +42,7 @@ def detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
 
 
 def _launch(command: Sequence[str], log: Path) -> subprocess.Popen[bytes]:
-    """Start a command in a session of its own: no terminal's end reaches it."""
+    """Start a command in a session of its own, which outlives the terminal."""
     with log.open("ab") as file:
         return subprocess.Popen(
             [script(command[0]), *command[1:]],

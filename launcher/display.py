@@ -1,4 +1,4 @@
-"""What a person sees of a running system: a live table in a terminal, a plain line a second elsewhere.
+"""Display of a running system: a live table in a terminal, a plain line a second elsewhere.
 
 Both are pure functions of a status (`supervisor.status`); only `Display` knows a terminal.
 """
@@ -41,7 +41,7 @@ def lag_text(status: dict[str, Any]) -> str:
 
 
 def pace_text(status: dict[str, Any]) -> str:
-    """`0.32x (wanted 2x)`, or what it is doing instead of running."""
+    """`0.32x (wanted 2x)`, or its state when it does not run."""
     pace = str(status["pace"])
     if status["state"] != "running":
         return f"{pace}, {status['state']}"
@@ -50,7 +50,7 @@ def pace_text(status: dict[str, Any]) -> str:
 
 
 def world_texts(status: dict[str, Any]) -> list[str]:
-    """Return what there is to say of the world: score and ball of a table, the rovers of a hall."""
+    """Return a summary of the world: score and ball of a table, the rovers of a hall."""
     of_table = [score_text(status), ball_text(status)] if status["score"] else []
     return of_table + ([rovers_text(status)] if status["rovers"] else [])
 
@@ -71,7 +71,7 @@ def ball_text(status: dict[str, Any]) -> str:
 
 
 def recovery_text(entry: dict[str, Any]) -> str:
-    """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or who came (back)."""
+    """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or the process that joined."""
     name = entry["name"]
     texts = {
         "node": f"lost node {name} ({entry['reason']})",
@@ -87,7 +87,7 @@ def recovery_text(entry: dict[str, Any]) -> str:
 
 
 def recording_text(status: dict[str, Any]) -> str:
-    """Return what is wrong with the capture: `capture ended: ... (812 rows are not in it)`; empty when nothing is."""
+    """Return the error of the capture: `capture ended: ... (812 rows are not in it)`; empty when there is none."""
     recording = status["recording"]
     if not recording["problem"]:
         return ""
@@ -107,7 +107,7 @@ def closing_text(status: dict[str, Any]) -> str:
 def packets_text(status: dict[str, Any]) -> str:
     """`packets 22510 offered, 22390 delivered, 113 dropped`; empty where there were none.
 
-    While the vHub is away they are those that it told last; a supervisor that was started again may know of none yet.
+    While the vHub is away they are its last reported counts; a restarted supervisor may have none yet.
     """
     packets = status["packets"]
     if not packets["offered"]:
@@ -138,7 +138,7 @@ def render(status: dict[str, Any], links_max: int = LINKS_SHOWN_MAX) -> Renderab
 
 
 def fitted(status: dict[str, Any], console: Console) -> RenderableType:
-    """Return the table with as many links as the window has lines for: the last row, for all, stays in sight."""
+    """Return the table with as many links as the window has lines for; the total row stays visible."""
     whole = render(status)
     excess = len(console.render_lines(whole, pad=False)) - console.height
     if excess <= 0:
@@ -161,9 +161,9 @@ def _head(status: dict[str, Any]) -> Text:
 
 
 def _processes(status: dict[str, Any]) -> Table:
-    """Nodes with their hosts, where there are any, what they own, solve and how busy they are; then the others.
+    """Nodes with their hosts, if any, their entities and their load; then the other processes.
 
-    Of a table it is the share of the ball's ticks, of a hall the ticks in which a node solved a rover.
+    The load is a table's share of the ball's ticks, or a hall's ticks in which the node solved a rover.
     """
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
     processes = status["processes"]
@@ -189,7 +189,7 @@ def _processes(status: dict[str, Any]) -> Table:
 
 
 def _doing(process: dict[str, Any] | None) -> str:
-    """Return what a process waits for, or why it does not take part."""
+    """Return the name that a process waits for, or the reason why it does not take part."""
     if process is None:
         return "not here yet"
     return next((state for state in ("stopped", "lost") if process[state]), str(process["waiting_for"]))
@@ -224,7 +224,7 @@ def _links(status: dict[str, Any], links_max: int) -> Table:
 
 
 def _age_text(ages: list[list[Any]]) -> str:
-    """Return how old what goes by a link is when its receiver acts: of the one channel, or the oldest of several."""
+    """Return the age of a link's data when its receiver acts: of its one channel, or the oldest of several."""
     _, _, p50_ns, p99_ns = max(ages, key=lambda age: (age[3], age[2]), default=("", 0, -1, -1))
     return "" if p99_ns < 0 else f"{p50_ns / 1e6:.1f}, {p99_ns / 1e6:.1f} ms"
 
@@ -238,7 +238,7 @@ def render_text(status: dict[str, Any], width: int = 120) -> str:
 
 
 class Display:
-    """Shows statuses as they come, on a terminal as a live table, else as lines."""
+    """Shows statuses, on a terminal as a live table, else as lines."""
 
     EVERY_S_LIVE: Final = 0.25
     EVERY_S_PLAIN: Final = 1.0
@@ -264,18 +264,18 @@ class Display:
             self._live = None
 
     def show(self, status: dict[str, Any], now_s: float) -> None:
-        """Show the state of the run; `now_s` is a wall time that tells how fast it goes since the last one."""
+        """Show the state of the run; `now_s` is a wall time, for the rate since the last status."""
         now = (now_s, simulated_s(status))
         if self._shown is not None and now_s > self._shown[0]:
             status = {**status, "speed": (now[1] - self._shown[1]) / (now[0] - self._shown[0])}
-        self._shown = None if status["state"] == "starting" else now  # time that passed before is no one's pace
+        self._shown = None if status["state"] == "starting" else now  # earlier time does not count for the rate
         if self._live is not None:
             self._live.update(fitted(status, self._console), refresh=True)
         else:
             self.say(plain_line(status))
 
     def show_closing(self, status: dict[str, Any]) -> None:
-        """Show how far a run that has ended is with its capture."""
+        """Show the progress of an ended run's capture."""
         text = closing_text(status)
         if self._live is not None:
             self._live.update(Group(fitted(status, self._console), Text(text)), refresh=True)

@@ -1,4 +1,4 @@
-"""Whether a run can go on from its journals, and what to do when one is damaged: nobody goes on over what is lost."""
+"""Checks that a run's journals are undamaged before it resumes; the error states the command that helps."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from foosim.vhub.state.resume import last_tick_of
 
 
 def check_journals(folder: RunFolder, options: RunOptions) -> None:
-    """Raise Refused when a journal of a run is damaged, or has no record: where, what is left, and what to do.
+    """Raise Refused when a journal is damaged or empty; the text has the place, the last tick and the remedy.
 
-    The vHub's may be on another machine; then it looks at it itself.
+    If the vHub's journal is on another machine, the vHub checks it.
     """
     supervisor_records(folder, options)
     if any(path.stat().st_size for path in journal_files(folder.journals, VHUB)):
@@ -30,7 +30,7 @@ def check_journals(folder: RunFolder, options: RunOptions) -> None:
 
 
 def supervisor_records(folder: RunFolder, options: RunOptions) -> list[bytes]:
-    """Return the records that a supervisor goes on from. Raises Refused as `check_journals` does."""
+    """Return the records that a supervisor resumes from. Raises Refused as `check_journals` does."""
     return _checked(folder, options, SUPERVISOR, read_newest(folder.journals, SUPERVISOR), _last_commit)
 
 
@@ -53,7 +53,7 @@ def _checked(
         launch = folder.launch()
         capture = Path(launch.capture) if launch is not None and launch.capture else None
     arguments = replace(options, branch=None).arguments()
-    raise Refused(f"run {folder.name} cannot go on: {what}. {branch_command(arguments, capture)}")
+    raise Refused(f"run {folder.name} cannot be resumed: {what}. {branch_command(arguments, capture)}")
 
 
 def _tick(records: list[bytes], last_tick: Callable[[list[bytes]], int]) -> int:

@@ -1,9 +1,9 @@
-"""Which processes a launcher kills because they hang: decided from what it asked, what it was told, and the time.
+"""Liveness checks: decide from requests, statuses and the time which hanging processes the launcher kills.
 
-A supervisor is asked for the status once a second. Questions count from when it has said where it listens; until then
-it has `deadlines.start`, as a process needs that folds a long journal or whose machine is slow. A node or a vHub that
-the run has lost, and whose process lives, has a moment to come back by itself; before the run has begun it is left
-alone. Time in which the launcher itself stood still counts for nobody. Pure: times are arguments, in s.
+The launcher requests the supervisor's status once a second. Requests count once the supervisor has published its
+address; until then `deadlines.start` applies, for a long journal or a slow machine. A node or a vHub that the run has
+lost, and whose process lives, has a grace period to rejoin; before the run has begun it is not killed. Time in which
+the launcher itself was suspended does not count. Pure: times are arguments, in s.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from foosim.deployment.schema import Deadlines
 from foosim.runtime.standstill import Standstill
 
 UNANSWERED_MAX: Final = 5
-"""How many questions a supervisor may leave unanswered before its process is killed."""
+"""Number of unanswered requests after which the supervisor's process is killed."""
 QUESTION_S: Final = 1.0
-"""How long the answer to one may take."""
+"""Deadline of one request."""
 STALLED_S: Final = 1.0
-"""How long a process that is lost may take to come back by itself before it is killed."""
+"""Grace period in which a lost process can rejoin before it is killed."""
 CUT_OFF_S: Final = 10.0
-"""The same for one on another machine: it may only be cut off, and holds on until it is not."""
+"""The same for a process on another machine, which may only be disconnected."""
 LOOKS_MIN: Final = 2
-"""At how many looks a process took part before that is not taken for the part of the one before it."""
+"""Number of checks after which participation is attributed to this process, not to its predecessor."""
 LOOK_S_MAX: Final = 3.0
-"""How long at most the launcher is from one look to the next by itself: beyond that it was not given the processor."""
+"""Longest time between two checks; a longer gap means that the launcher was not scheduled."""
 
 
 def _ns(time_s: float) -> int:
@@ -33,7 +33,7 @@ def _ns(time_s: float) -> int:
 
 
 class OwnTime:
-    """A clock that stands while the launcher does not go round (`protocol.standstill`)."""
+    """A clock that stops while the launcher is suspended (`runtime.standstill`)."""
 
     def __init__(self, now_s: float) -> None:
         self._last_ns = _ns(now_s)
@@ -41,7 +41,7 @@ class OwnTime:
         self._stood_ns = 0
 
     def at(self, now_s: float) -> float:
-        """Return the time at a look, in s, less what the launcher itself stood still."""
+        """Return the time of a check, in s, less the launcher's own standstills."""
         due_ns, self._last_ns = self._last_ns + _ns(LOOK_S_MAX), _ns(now_s)
         self._stood_ns += self._standstill.look(due_ns, self._last_ns)
         return (self._last_ns - self._stood_ns) / 1e9
@@ -54,31 +54,31 @@ class SupervisorWatch:
         self._start_s = deadlines.start_ns / 1e9
         self._started_s = 0.0
         self.is_found = False
-        """Whether it has said where it listens."""
+        """Whether it has published its address."""
         self._unanswered = 0
 
     def started(self, now_s: float) -> None:
-        """Its process was started, perhaps again."""
+        """Its process was started or restarted."""
         self._started_s, self.is_found, self._unanswered = now_s, False, 0
 
     def found(self) -> None:
-        """It has said where it listens."""
+        """It has published its address."""
         self.is_found = True
 
     def answered(self) -> None:
-        """It has answered a question."""
+        """It has answered a request."""
         self._unanswered = 0
 
     def unanswered(self) -> None:
-        """It has not answered a question in time; before it listens it cannot."""
+        """It has not answered a request in time; does not count before it listens."""
         self._unanswered += self.is_found
 
     def why_killed(self, now_s: float) -> str:
-        """Return why its process is to be killed, for people; empty when it is not."""
+        """Return why its process is to be killed; empty when it is not."""
         if self._unanswered >= UNANSWERED_MAX:
             return f"it had not answered for {UNANSWERED_MAX * QUESTION_S:g} s"
         if not self.is_found and now_s - self._started_s >= self._start_s:
-            return f"it had not said where it listens within {self._start_s:g} s (deadlines.start)"
+            return f"it had not published its address within {self._start_s:g} s (deadlines.start)"
         return ""
 
 
@@ -88,15 +88,15 @@ class StalledWatch:
     def __init__(self, deadlines: Deadlines) -> None:
         self._start_s = deadlines.start_ns / 1e9
         self._here: dict[str, tuple[int, int]] = {}
-        """Of each name the process that took part last, and at how many looks it did."""
+        """By name: the process that took part last, and the number of checks at which it did."""
         self._lost: dict[str, tuple[int, float]] = {}
-        """Those that are lost though their processes live: which process, since when."""
+        """Lost processes that live: the process, and since when."""
 
     def look(self, status: Mapping[str, Any], pids: Mapping[str, int], away: set[str], now_s: float) -> dict[str, str]:
-        """Return whose processes are to be killed by a status of the run, and why, for people.
+        """Return the names of the processes to be killed by a status of the run, with the reasons.
 
         `pids` are the processes that live, by name; those of `away` are on other machines. One that was started since
-        its name was lost has not said hello yet, and has the time of a start for that.
+        its name was lost has not sent its hello yet, and has the deadline of a start.
         """
         processes = status["processes"] if status["begun"] else {}
         before, self._lost = self._lost, {}
@@ -117,6 +117,6 @@ class StalledWatch:
 
 
 def _reason(status: Mapping[str, Any], name: str) -> str:
-    """Return why a run has lost a process, as its account says."""
+    """Return the run's recorded reason for the loss of a process."""
     told = [entry["reason"] for entry in status["recoveries"] if entry["name"] == name and entry["what"] != "join"]
     return f" ({told[-1]})" if told else ""

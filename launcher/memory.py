@@ -1,8 +1,7 @@
-"""Whether the kernel killed processes for want of memory: its counters, and what they say of one that was killed.
+"""The kernel's counters of out-of-memory kills, and whether they explain the death of a process.
 
-A process that the kernel kills says nothing, and ends as by anybody's SIGKILL. Only counters tell: of its control group
-(version 2), and of the machine, where others may have been killed as well. The kernel's log names processes, and is for
-administrators.
+An out-of-memory kill looks like any SIGKILL. Only counters show it: those of the control group (version 2), and those
+of the machine, which include other processes. The kernel's log names processes, but only administrators can read it.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ COUNTER: Final = "oom_kill"
 
 
 class OomKills(NamedTuple):
-    """How many processes the kernel has killed for want of memory; 0 where it does not say."""
+    """Number of out-of-memory kills; 0 where the kernel does not report it."""
 
     group: int = 0
     """Of this process's control group, in which its children are, too, without groups below it."""
     machine: int = 0
 
     def since(self, before: OomKills) -> str:
-        """Return what is known of one that lived since `before`: where the kernel killed; empty for nowhere."""
+        """Return where the kernel has killed processes since `before`; empty for nowhere."""
         if self.group > before.group:
             return "in its control group"
         return "on this machine" if self.machine > before.machine else ""

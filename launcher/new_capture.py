@@ -1,4 +1,4 @@
-"""Where a run is captured: a file that is not there yet, in a folder that takes files, on a disk with room."""
+"""Checks of a new capture's path: no existing file, a writable folder, and enough free disk space."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class CaptureExists(Refused):
 
 
 def default_capture(world: str) -> Path:
-    """Return where a run is captured when nobody says where."""
+    """Return the default path of a run's capture."""
     stem = f"{world}-{wall_clock.now_stamp()}"
     names = (stem if number == 1 else f"{stem}-{number}" for number in range(1, 1000))
     return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not parts_at(path))
 
 
 def check_capture(path: Path, *, is_split: bool = False) -> Path:
-    """Return the path when nothing is there yet and its folder, made where missing, takes files; raises Refused.
+    """Return the path if no file exists there and its folder, created if missing, is writable; raises Refused.
 
-    Nor may there be, for one that is split, what is called as the files that it goes on in.
+    For a split capture, no file with the name of a later part may exist either.
     """
     try:
         for found in parts_at(path).values() if is_split or path.exists() else ():
@@ -41,7 +41,7 @@ def check_capture(path: Path, *, is_split: bool = False) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A folder that a run writes to: the nearest one that is there, and the room on its disk."""
+    """A folder that a run writes to: the nearest existing one, and the free space of its disk."""
 
     folder: Path
     there: Path
@@ -68,7 +68,7 @@ def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Pl
     goes_on = is_capture and settings.on_full == "continue_unlogged"
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     room = room_on_disk(there, settings.reserve_bytes)
-    then = "the run goes on without its capture" if goes_on else "the run ends"
+    then = "the run continues without its capture" if goes_on else "the run ends"
     return Place(folder, there, room, then, not goes_on)
 
 
@@ -85,7 +85,7 @@ def check_rooms(settings: Capture, capture: Path | None, runs: Path | None) -> l
         try:
             place = place_of(settings, folder, is_capture=is_capture)
         except OSError:
-            continue  # who writes there will tell
+            continue  # the writer reports the error
         text = f"{folder}: {place.room} (capture.reserve)"
         if place.is_refused:
             raise Refused(f"{text}: make room, or lower the reserve; nothing was started")

@@ -1,7 +1,7 @@
-"""How a run ended, as one JSON object, whoever is left to say it.
+"""The result of a run as one JSON object.
 
-The supervisor writes the result of a run that it ends. Where it did not, the launcher says what it knows: the last
-status that it was shown, why the run ended, and what is in the capture's file. What is not known is null.
+The supervisor writes the result of a run that it ends. Otherwise the launcher composes it from the last status, the
+reason of the end, and the capture's file. Unknown fields are null.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
 
 
 def result_without_supervisor(known: Mapping[str, Any], reason: str) -> dict[str, Any]:
-    """Return the result of a run of which no supervisor says how it ended; `known` is what was seen of it last."""
+    """Return the result of a run without a supervisor's result; `known` is the last status."""
     seen = {key: known[key] for key in _UNKNOWN if key in known}
     return {**_UNKNOWN, **seen, "reason": reason, "failed": True}
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a run ended: the JSON of its result, and what people should know."""
+    """Result of a run: its JSON, and its messages for people."""
 
     result: dict[str, Any]
     failed: bool
@@ -54,7 +54,7 @@ class Outcome:
 
 
 def ended_outcome(folder: RunFolder) -> Outcome:
-    """Return how a run ended that has a result."""
+    """Return the outcome of a run that has a result."""
     ended, launch = folder.result(), folder.launch()
     assert ended is not None, f"run {folder.name} has not ended"
     capture = None if launch is None or not launch.capture else Path(launch.capture)
@@ -64,7 +64,7 @@ def ended_outcome(folder: RunFolder) -> Outcome:
 
 
 def refused_result(resumed: str | None, run: str | None, reason: str) -> dict[str, Any]:
-    """Return the result of what was not begun: of a run that was to be resumed, with its capture, or of a new one."""
+    """Return the result of a run that did not begin: a resumed one, with its capture, or a new one."""
     if resumed is None or not run_exists(resumed):
         return result_without_supervisor({"run": resumed or run}, reason)
     launch = open_run(resumed).launch()
@@ -73,7 +73,7 @@ def refused_result(resumed: str | None, run: str | None, reason: str) -> dict[st
 
 
 def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | None) -> Outcome:
-    """Return what is known of a run that was left running."""
+    """Return the outcome of a run that was left running."""
     known = {"run": folder.name, **plan_facts(deployment), "capture": None if capture is None else str(capture)}
     name = folder.name
     line = f"run {name} is up; foosim-supervisor status --run {name} shows it, down --run {name} ends it"
@@ -81,7 +81,7 @@ def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | 
 
 
 def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals: Path | None = None) -> list[str]:
-    """Say where a capture is, whether it has its end, and what the result says to be wrong with it.
+    """Report a capture's path, whether it is finished, and its errors from the result.
 
     Of a run that has ended also how one without an end is completed from `journals`.
     """
@@ -98,7 +98,7 @@ def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals:
 
 
 def plan_facts(deployment: Deployment) -> dict[str, Any]:
-    """Return what is known of a run before it begins."""
+    """Return the result of a run before it begins."""
     return {"world": deployment.world, "seed": deployment.seed, "tick_ns": deployment.tick_ns}
 
 
@@ -121,5 +121,5 @@ def with_capture(result: Mapping[str, Any], capture: Path | None) -> dict[str, A
 
 
 def _rows_in(path: Path) -> int:
-    """Return how many ticks, packets, epochs and lines a capture has: what its writer counts."""
+    """Return the numbers of ticks, packets, epochs and lines of a capture, as its writer counts them."""
     return sum(1 for _ in Scan(path).messages(frozenset({TICK, PACKETS, EPOCHS, LOG})))

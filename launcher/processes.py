@@ -1,9 +1,9 @@
 """Starts the processes of a run, on this machine and through ssh on others, and ends them.
 
-Each child stands in a process group of its own, so that a Ctrl-C in the terminal reaches the launcher alone, has a log
-file, and dies with the launcher (`protocol.process` is the child's side of that). Children are started from the main
+Each child has a process group of its own, so that a Ctrl-C in the terminal reaches the launcher alone, has a log
+file, and dies with the launcher (`runtime.process` is the child's side of that). Children are started from the main
 thread: the kernel's signal at the parent's end is tied to the thread that forked. Of a process on another machine the
-child here is ssh, and its log is what that brings home: it ends with its standard input, which only the launcher holds.
+child here is ssh, which writes its output to the log; it ends when the launcher closes its standard input.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from foosim.runtime.process import STACK_SIGNAL
 POLL_S: Final = 0.02
 PLAYER: Final = "foosim-player"
 STACK_S: Final = 1.0
-"""How long a player that hangs may take to show where."""
+"""Time for a hanging player to log its stack."""
 LINES: Final = 30
-"""How much of a log's end tells why ssh ended."""
+"""Size of the log excerpt that is searched for ssh's error."""
 
 
 @dataclass(slots=True)
@@ -44,13 +44,13 @@ class Child:
     log: Path
     process: subprocess.Popen[bytes] = field(repr=False)
     remote: Remote | None = None
-    """The machine that it runs on when that is another one: `process` is the ssh that holds it."""
+    """The remote machine that it runs on, if any: `process` is then its ssh."""
     begin: int = 0
-    """Where its log begins, behind what those before it said."""
+    """Offset of its log, behind the logs of its predecessors."""
     oom_kills: OomKills = field(default_factory=OomKills)
     """How many processes the kernel had killed for want of memory when it was started."""
     oom_killed: str | None = None
-    """Where the kernel had killed for that by the time that its end was noticed; None before."""
+    """Where the kernel had killed processes when its end was noticed; None before."""
     killed: str = ""
     """Why the launcher killed it; empty when it did not."""
 
@@ -81,7 +81,7 @@ class Child:
         return self.how.text
 
     def kill(self, why: str) -> None:
-        """Kill it, of which people are told why; a player shows before where it hangs."""
+        """Kill it for a reason that is reported; a player logs its stack before."""
         self.killed = why
         if self.ask_for_stack():
             with suppress(subprocess.TimeoutExpired):
@@ -89,7 +89,7 @@ class Child:
         self.process.kill()
 
     def ask_for_stack(self) -> bool:
-        """Have a player on this machine write to its log where it hangs, and end by that; False for any other."""
+        """Make a player on this machine log its stack and end; False for any other process."""
         is_player = self.command[0] == PLAYER and self.remote is None
         if is_player:
             self.process.send_signal(STACK_SIGNAL)
@@ -97,15 +97,15 @@ class Child:
 
     @property
     def is_away(self) -> bool:
-        """Whether it ended because its machine could not be reached any more."""
+        """Whether it ended because its machine became unreachable."""
         return self.remote is not None and self.remote.is_away(self.exit_code or 0, self._tail(LINES))
 
     def last_lines(self, count: int = 3) -> list[str]:
-        """Return the end of its log, when it ended by itself: it may say why there."""
+        """Return the end of its log if it ended by itself: it may have the reason."""
         return self._tail(count) if (self.exit_code or 0) > 0 else []
 
     def let_go(self) -> None:
-        """End the standard input of one on another machine: whatever still lives there ends by that."""
+        """Close the standard input of a remote process, which ends its processes there."""
         if self.process.stdin is not None:
             self.process.stdin.close()
 
@@ -135,9 +135,9 @@ class Launcher:
         """The pipe's two ends: children read the first; only this process has the second, and never writes."""
 
     def start(self, name: str, command: Sequence[str], log: Path) -> Child:
-        """Start `command`, whose first word is one of foosim's commands, where this process belongs.
+        """Start `command`, whose first word is one of foosim's commands, on this process's machine.
 
-        Of a unit of systemd the child here only tells systemd there to start it, and ends when that has been said.
+        For a unit of systemd the child here only requests its start there, and then ends.
         """
         remote = self.remotes.get(name)
         if remote is not None:
@@ -186,7 +186,7 @@ class Launcher:
         return [child for child in self.children.values() if child.exit_code is None]
 
     def wait(self, seconds: float) -> bool:
-        """Wait until no child lives; False when the time is over before."""
+        """Wait until no child lives; False on timeout."""
         deadline = time.monotonic() + seconds
         while self.alive():
             if time.monotonic() >= deadline:
@@ -195,7 +195,7 @@ class Launcher:
         return True
 
     def stop(self, grace_s: float = GRACE_S) -> None:
-        """End what lives: SIGTERM, then, after the grace, SIGKILL; players that hang show before where."""
+        """End all children: SIGTERM, then, after the grace period, SIGKILL; hanging players log their stacks before."""
         self._signal(signal.SIGTERM)
         if not self.wait(grace_s):
             asked = [child for child in self.alive() if child.ask_for_stack()]
@@ -204,12 +204,12 @@ class Launcher:
             self.kill()
 
     def kill(self) -> None:
-        """End what lives at once."""
+        """Kill all children at once."""
         self._signal(signal.SIGKILL)
         self.wait(GRACE_S)
 
     def close(self) -> None:
-        """Give the pipe back; whoever should still live ends by it."""
+        """Close the pipe, which ends any child that still lives."""
         os.close(self._hold)
         os.close(self._end)
         for child in self.children.values():

@@ -1,4 +1,4 @@
-"""How a process ended, in words, and when it is started again: after a wait that doubles, and not for ever. Pure."""
+"""Descriptions of how a process ended, and its restarts with exponential back-off and a limit. Pure."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from foosim.runtime.command import REFUSED
 
 WAITS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)
 AWAY_S: Final = 4.0
-"""How long after one whose machine could not be reached; such ones are never given up."""
+"""Back-off for a process whose machine was unreachable; it is retried without a limit."""
 WINDOW_S: Final = 60.0
 """A process that ended this often within this time is given up."""
 NO_MEMORY: Final = (
     *("MemoryError", "can't start new thread", "Cannot allocate memory", "failed to map segment"),
     *("std::bad_alloc", "memory allocation of", "Memory allocation still failed"),
 )
-"""What Python, the system and its loader, C++, Rust and OpenBLAS say when they get no memory."""
+"""Messages of Python, the system and its loader, C++, Rust and OpenBLAS on a failed allocation."""
 WORDS_MAX: Final = 4_000
 
 
@@ -27,7 +27,7 @@ WORDS_MAX: Final = 4_000
 class Ending:
     """How a process ended: its exit code (-N: signal N), the end of its log, and what else is known.
 
-    `killed_by_us` is why its launcher killed it, empty when it did not; `oom_killed` says where the kernel has killed
+    `killed_by_us` is why its launcher killed it, empty when it did not; `oom_killed` is where the kernel has killed
     processes for want of memory while this one lived, which may have been others; empty for nowhere.
     """
 
@@ -41,12 +41,12 @@ class Ending:
 
     @property
     def is_by_signal(self) -> bool:
-        """Whether a signal ended it: of itself it would not have."""
+        """Whether a signal ended it, and not the process itself."""
         return self.code < 0 or (self.is_remote and self.code > BY_SIGNAL)
 
     @property
     def text(self) -> str:
-        """`was killed by SIGKILL, not by foosim`: to stand behind the name of the process."""
+        """`was killed by SIGKILL, not by foosim`: follows the name of the process."""
         if self.killed_by_us:
             return f"was killed by up: {self.killed_by_us}"
         if self.code < 0:
@@ -62,7 +62,7 @@ class Ending:
 
     @property
     def last_words(self) -> str:
-        """The last line of its log, without time and name; it may say why it ended."""
+        """The last line of its log, without time and name; it may have the reason."""
         line = self.log[-1].strip() if self.log else ""
         head, found, words = line.partition(": ")
         return (words if found and head[:4].isdigit() and "Z " in head else line)[:WORDS_MAX]
@@ -80,16 +80,16 @@ class _Restarts:
 
 
 class Restarts:
-    """What is to be started again, and when, by name."""
+    """The processes to restart, and when, by name."""
 
     def __init__(self) -> None:
         self._by_name: dict[str, _Restarts] = {}
 
     def ended(self, name: str, now_s: float, at_once: bool = False, is_away: bool = False) -> float | None:
-        """A process has ended: return after how many seconds it is started again, None when it is given up.
+        """Record the end of a process: return its back-off in s, None when it is given up.
 
-        `at_once`: the run stands still without it, so the first two times it is not waited at all.
-        `is_away`: because its machine could not be reached, which says nothing against the process.
+        `at_once`: the run waits for it, so the first two restarts have no back-off.
+        `is_away`: its machine was unreachable, which does not count against the process.
         """
         known = self._by_name.setdefault(name, _Restarts())
         if is_away:
@@ -107,11 +107,11 @@ class Restarts:
         return wait_s
 
     def give_up(self, name: str) -> None:
-        """This process is not to be started again: it would end in the same way."""
+        """Do not restart this process: it would end in the same way."""
         self._by_name.setdefault(name, _Restarts()).failed = True
 
     def forget(self, name: str) -> None:
-        """Somebody wants this process: what ended before does not count any more."""
+        """Clear this process's history, on an operator's request."""
         self._by_name.pop(name, None)
 
     def has_ended(self, name: str) -> bool:
@@ -119,12 +119,12 @@ class Restarts:
         return name in self._by_name
 
     def is_known(self, name: str) -> bool:
-        """Whether the end of this process has been told and is not over: it waits, or is given up."""
+        """Whether this process waits for its restart or is given up."""
         known = self._by_name.get(name)
         return known is not None and (known.failed or known.due_s is not None)
 
     def due(self, now_s: float) -> list[str]:
-        """Take what is to be started now, in name order."""
+        """Take the processes that are due, in name order."""
         waiting = {name: known for name, known in sorted(self._by_name.items()) if known.due_s is not None}
         due = [name for name, known in waiting.items() if known.due_s is not None and known.due_s <= now_s]
         for name in due:

@@ -1,6 +1,6 @@
-"""Whether a run whose launcher is gone can go on: asked before anything is started, so that the reason is said at once.
+"""Checks before anything is started that a run whose launcher is gone can be resumed.
 
-Looked at are both journals, whole (`journal_check`), and the capture's files.
+It reads both journals entirely (`journal_check`), and the capture's files.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
 def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None, *, has_hub_here: bool) -> None:
-    """Raise Refused, with what is wrong and the command that begins a new run, when a run cannot go on.
+    """Raise Refused, with the reason and the command that begins a new run, when a run cannot be resumed.
 
-    `options` are those that it was started with. The vHub's journal and the capture are looked at where it runs on this
+    `options` are those that it was started with. The vHub's journal and the capture are checked if it runs on this
     machine.
     """
     if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
-        where = f"run {folder.name} has no journal to go on from in {folder.journals}"
+        where = f"run {folder.name} has no journal to resume from in {folder.journals}"
         raise Refused(f"{where}{_new_run(folder, options, capture)}")
     try:
         check_journals(folder, options)
@@ -38,11 +38,11 @@ def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None
             _check_hub(folder, capture)
     except (JournalError, CaptureError, Malformed) as error:
         then = _new_run(folder, options, capture)
-        raise Refused(f"run {folder.name} cannot go on: {error}{then}") from None
+        raise Refused(f"run {folder.name} cannot be resumed: {error}{then}") from None
 
 
 def _new_run(folder: RunFolder, options: RunOptions, capture: Path | None) -> str:
-    """Return how a new run begins: with the last frame of the capture, where it is this run's and has one."""
+    """Return the command that begins a new run, from the capture's last frame if the capture is this run's."""
     if capture is not None and parts_at(capture):
         first = first_there(capture)
         with suppress(CaptureError):
@@ -52,7 +52,7 @@ def _new_run(folder: RunFolder, options: RunOptions, capture: Path | None) -> st
 
 
 def _check_hub(folder: RunFolder, capture: Path | None) -> None:
-    """Raise what says why the vHub could not go on from its journal, with its capture."""
+    """Raise the error that would prevent the vHub from resuming from its journal and capture."""
     files = journal_files(folder.journals, VHUB)
     if not files:
         if capture is not None and parts_at(capture):

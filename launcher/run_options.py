@@ -1,4 +1,4 @@
-"""The options of a run: as the commands take them, as they are handed on to its processes, as its folder keeps them."""
+"""The options of a run: parsed from the command line, passed to its processes, stored in its folder."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ class RunOptions:
         return given
 
     def pki_arguments(self) -> list[str]:
-        """Return where the certificates are, as each process of the run is told it."""
+        """Return the certificates' folder as an argument for each process of the run."""
         return [] if self.pki is None else ["--pki", str(self.pki.absolute())]
 
 
 def launch_of(options: RunOptions, capture: Path | None) -> Launch:
-    """Return the options of a run, and its capture, as they are kept in its folder: with absolute paths."""
+    """Return the options and the capture of a run as stored in its folder, with absolute paths."""
     kept = replace(
         options,
         file=options.file.absolute(),
@@ -76,7 +76,7 @@ def launch_of(options: RunOptions, capture: Path | None) -> Launch:
 
 
 def launched_options(folder: RunFolder) -> RunOptions:
-    """Return the options of a run as they are kept in its folder. Raises Refused when there are none to be read."""
+    """Return the options stored in a run's folder. Raises Refused when there are none."""
     launch = folder.launch()
     path = folder.path / LAUNCH_FILE
     if launch is None and not path.exists():
@@ -90,7 +90,7 @@ def launched_options(folder: RunFolder) -> RunOptions:
         return msgspec.json.decode(launch.options, type=RunOptions, dec_hook=_to_path)
     except msgspec.DecodeError as error:
         reason = f"{path} was written by another version of foosim, or is damaged: {error}"
-        raise Refused(f"run {folder.name} cannot go on with the options that it had: {reason}") from None
+        raise Refused(f"run {folder.name} cannot be resumed with its options: {reason}") from None
 
 
 def _to_path(kind: type, value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Signals that end a process, counted instead: a launcher ends its run in order first."""
+"""Counts signals that would end the process, so that a launcher can end its run in order."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def counted_signals(count: Callable[[], None]) -> Iterator[None]:
-    """Call `count` at each Ctrl-C (and what means the same) instead of being ended by it."""
+    """Call `count` at each Ctrl-C, SIGTERM or SIGHUP instead of ending."""
 
     def take(number: int, frame: object) -> None:
         count()

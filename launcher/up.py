@@ -1,7 +1,7 @@
 """`up`: starts all processes of a run, here and on other machines, shows the run, and ends it in order.
 
-It decides nothing of the run: supervisor, vHub, nodes and players are its children and do the work; it starts them,
-looks at them, asks the supervisor for the status that it shows, and hands on a Ctrl-C.
+Supervisor, vHub, nodes and players are its children and run the simulation; it starts and monitors them, requests the
+status that it shows, and forwards a Ctrl-C.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ from foosim.vhub.links.summary_text import start_lines
 from foosim.world.initial_state import NEW_RUN
 
 POLL_S: Final = 0.02
-"""How often a run that starts is looked at."""
+"""Polling period while a run starts."""
 WATCH_S: Final = 0.1
-"""How often one that runs is: what it takes is taken from the run."""
+"""Polling period while it runs; polling costs the run time."""
 END_S: Final = 20.0
-"""How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
+"""Deadline of an ordered end before processes are stopped: the vHub closes the capture."""
 LEAVE_S: Final = 1.0
-"""How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
+"""Deadline of the other processes after the supervisor's end, which waits for the vHub's capture."""
 AWAY_S: Final = 10.0
-"""The same for those on other machines, where an end takes a moment to be known."""
+"""The same for other machines, whose process ends are noticed later."""
 LOST_S: Final = 3.0
-"""How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
+"""Time for the supervisor to notice the end of a child; it does not know one that never sent a hello."""
 ENDED: Final = ("ended", "failed")
 """States of a run that only waits for its vHub to close the capture."""
 
@@ -58,7 +58,7 @@ T = TypeVar("T")
 
 
 class Killed(Exception):
-    """A second Ctrl-C: everything was killed. The text says so, and where the unfinished capture is."""
+    """A second Ctrl-C: all processes were killed. The text has the path of the unfinished capture."""
 
     def __init__(self, text: str, result: Mapping[str, Any]) -> None:
         super().__init__(text)
@@ -77,9 +77,9 @@ class Up:
         resumed: RunFolder | None = None,
         console: Page | None = None,
     ) -> None:
-        """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with.
+        """`capture` is the path of its capture; None captures nothing. `run` names it, `resumed` is the run to resume.
 
-        `console` is the page that is served beside the run.
+        `console` is the page that is served with the run.
         """
         self.plan = plan
         self.capture = capture
@@ -93,11 +93,11 @@ class Up:
         self._launcher = Launcher(self.folder.name, remotes, units)
         self._console = ConsoleChild(self.folder, display.say, console)
         self._not_home = ""
-        """Why the capture was not brought home from the machine on which it was written."""
+        """Why the capture was not fetched from the machine on which it was written."""
         self._interrupts = 0
         self._ending_s = 0.0
         self._is_told = False
-        """Whether the supervisor was told to end the run."""
+        """Whether the supervisor was requested to end the run."""
         self._lost: Child | None = None
         self._lost_s = 0.0
         self._has_begun = self._has_ended = False
@@ -108,24 +108,24 @@ class Up:
         self._stalled_watch = StalledWatch(plan.deployment.deadlines)
         self._control: Control | None = None
         self._status: dict[str, Any] = {}
-        """The last that the supervisor has told."""
+        """The supervisor's last status."""
         self._stopped: set[str] = set()
-        """Nodes that somebody stopped."""
+        """Nodes that an operator stopped."""
         self._wanted: set[str] = set()
         """Nodes that are to be started when they have ended."""
         self._starts: dict[str, int] = {}
-        """How often somebody asked for a node to be started, as far as it was done."""
+        """Number of handled start requests, by node."""
         self._told = 0
-        """How many of the run's recoveries were shown."""
+        """Number of the run's recoveries that were shown."""
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
-        with counted_signals(self._count), self.display, self._console:  # whose pages learn how it ended
+        with counted_signals(self._count), self.display, self._console:  # its pages show the end of the run
             try:
                 if self._start():
                     self._watch()
                 if self._can_resume:
-                    self._launcher.kill()  # who is told to end would end the capture
+                    self._launcher.kill()  # a process that ends in order would finish the capture
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
@@ -136,14 +136,14 @@ class Up:
 
     @property
     def _can_resume(self) -> bool:
-        """Whether nothing has ended the run, though its supervisor is gone, or has not begun to go on with it."""
+        """Whether the run can be resumed: its supervisor is gone or has not resumed it, and nothing has ended it."""
         is_gone = self._launcher.children[SUPERVISOR].exit_code is not None
         return self.folder.result() is None and (is_gone or (self._is_resumed and not self._has_begun))
 
     # --- starting ----------------------------------------------------------------------------------------------------
 
     def _start(self) -> bool:
-        """Start the processes, each as soon as it can connect; False when the run was over before all had started."""
+        """Start each process as soon as it can connect; False when the run was over before all had started."""
         options, folder, display = self.plan.options, self.folder, self.display
         supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
         self._launch(SUPERVISOR, supervisor)
@@ -208,7 +208,7 @@ class Up:
             self._supervisor_watch.started(self._own_time.at(time.monotonic()))
 
     def _own_info(self) -> RunInfo | None:
-        """Return what the run file says, once it is that of the supervisor that is our child."""
+        """Return the contents of the run file, once our supervisor has written it."""
         info = self.folder.info()
         return info if info is not None and info.pid == self._launcher.children[SUPERVISOR].process.pid else None
 
@@ -217,7 +217,7 @@ class Up:
         return info if info is not None and info.radio else None
 
     def _await(self, value: Callable[[], T | None]) -> T | None:
-        """Return what `value` gives as soon as it is something; None when the run is over, or is to end, before."""
+        """Return the first value of `value` that is not None; None when the run is over, or is to end, before."""
         while self._goes_on():
             found = None if self._ending_s else value()
             if found is not None:
@@ -246,7 +246,7 @@ class Up:
                 time.sleep(WATCH_S)
 
     def _connect(self, stack: ExitStack) -> Control | None:
-        """Connect to the supervisor; None when it has ended before: the run was short, or somebody killed it."""
+        """Connect to the supervisor; None when it has ended before: the run was short, or it was killed."""
         info, supervisor = self._own_info(), self._launcher.children[SUPERVISOR]
         if info is None:
             return None
@@ -282,7 +282,7 @@ class Up:
         self._end_stalled(status)
 
     def _start_wanted(self, starts: dict[str, int]) -> None:
-        """Start the nodes that somebody asked for since: one that was stopped, waits for its turn, or was given up."""
+        """Start the nodes requested since: stopped ones, ones in back-off, and ones that were given up."""
         for name, count in starts.items():
             child = self._launcher.children.get(name)
             if child is None or count <= self._starts.get(name, 0) or name in self._stopped:
@@ -296,13 +296,13 @@ class Up:
         self._wanted -= self._stopped
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
-        """Say what is new, once it is over."""
+        """Show new recoveries once they are complete."""
         while self._told < len(recoveries) and recoveries[self._told]["outage_ms"] is not None:
             self.display.say(recovery_text(recoveries[self._told]))
             self._told += 1
 
     def _end_stalled(self, status: dict[str, Any]) -> None:
-        """Kill a process that hangs: the run goes on without it, and a new one can take part."""
+        """Kill a process that hangs: the run continues without it, and a new one can take part."""
         alive = {child.name: child for child in self._launcher.alive()}
         pids = {name: child.process.pid for name, child in alive.items()}
         away = {name for name, child in alive.items() if child.remote is not None}
@@ -311,7 +311,7 @@ class Up:
             self._kill(alive[name], why)
 
     def _end_stalled_supervisor(self, supervisor: Child) -> None:
-        """Kill a supervisor that hangs: a new one goes on with the run."""
+        """Kill a supervisor that hangs: a new one resumes the run."""
         if not self._supervisor_watch.is_found and self._own_info() is not None:
             self._supervisor_watch.found()
         why = self._supervisor_watch.why_killed(self._own_time.at(time.monotonic()))
@@ -324,7 +324,7 @@ class Up:
             child.kill(why)
 
     def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
-        """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
+        """Restart a supervisor that ended before the run did; False when the run is over, or it is given up."""
         over = self._ending_s or self._has_ended or self.folder.result() is not None
         began = self.folder.info() is not None or supervisor.how.is_by_signal
         if over or not began or supervisor.exit_code in (DONE, REFUSED):
@@ -335,9 +335,9 @@ class Up:
         return SUPERVISOR not in self._restarts.failed
 
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
-        """Start processes again that ended while the run goes on; who ends again and again, or is refused, is given up.
+        """Restart processes that ended before the run did; give up those that fail repeatedly or are refused.
 
-        `knows`: a status has just told which nodes are stopped, and whether the run has begun.
+        `knows`: a new status has reported which nodes are stopped, and whether the run has begun.
         """
         may_judge = self._has_begun or knows or self._control is None
         for child in self._launcher.ended() if may_judge else ():
@@ -357,7 +357,7 @@ class Up:
         else:
             self._wanted.discard(child.name)
             wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
-        after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
+        after = f"restarts in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
             is_node = child.name in self.plan.deployment.nodes
             after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
@@ -370,10 +370,10 @@ class Up:
             self._start_child(name, command, child.log)
 
     def _comes_back(self, child: Child) -> bool:
-        """Whether the run waits for this process, which has ended, and another one takes its place.
+        """Whether the run waits for a replacement of this process, which has ended.
 
-        Before the first tick that is one that something else has ended: who ends by himself then says what is wrong. A
-        player that is not to be restarted is no exception: it has not acted, so that it has nothing to forget.
+        Before the first tick this holds for a process that something else has ended: one that failed reports why. A
+        player that is not to be restarted is included: it has not acted, so it loses no state.
         """
         if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
             return False
@@ -392,13 +392,13 @@ class Up:
         return may_restart and is_lost and child.name not in self._restarts.failed
 
     def _vhub_again(self) -> list[str]:
-        """Return how the vHub is started again: where clients know it to be."""
+        """Return the command that restarts the vHub, at the address that clients know."""
         info = self.folder.info()
         assert info is not None
         return self._vhub_command(info)
 
     def _goes_on(self) -> bool:
-        """Look after the children and the Ctrl-C; False when the supervisor has ended."""
+        """Handle ended children and Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
             raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
@@ -408,7 +408,7 @@ class Up:
             if self._supervisor_comes_back(supervisor, now_s):
                 self._restart_ended(now_s)
                 return True
-            if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
+            if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since the last check
                 self._look_for_lost(now_s)
             return False
         self._end_stalled_supervisor(supervisor)
@@ -431,18 +431,18 @@ class Up:
         return not self._ending_s or now_s < self._ending_s + END_S
 
     def _ends_run(self, child: Child) -> bool:
-        """Whether the run cannot go on without this child, which has ended."""
+        """Whether the run cannot continue without this child, which has ended."""
         return child.exit_code != DONE and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:
-        """Note the first child that ended as none should; one that was killed before those that ended because of it."""
+        """Record the first child that ended unexpectedly; a killed one precedes those that ended because of it."""
         if self._lost is None:
             bad = [child for child in self._launcher.ended() if self._ends_run(child) and child.name != SUPERVISOR]
             self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
             self._lost_s = now_s
 
     def _tell(self, supervisor: Child) -> None:
-        """Have the supervisor end the run, as `down` does; before it has a run file, the signal would just kill it."""
+        """Request the end of the run, as `down` does; before the run file exists, a signal kills the supervisor."""
         if self.folder.info() is None:
             return
         self._is_told = True
@@ -453,7 +453,7 @@ class Up:
         supervisor.process.send_signal(signal.SIGTERM)
 
     def _outcome(self) -> Outcome:
-        """Say how it ended. Where the supervisor does not, nothing has ended it: it can be resumed."""
+        """Report how it ended. Without a supervisor's result nothing has ended it: it can be resumed."""
         ended = self.folder.result()
         if self._lost is None and ended is None:
             self._lost = self._launcher.children[SUPERVISOR]
@@ -463,7 +463,7 @@ class Up:
         if ended is None:
             result = self.unended(reason)
             may_resume = (self._is_resumed or self._has_begun) and NEW_RUN not in reason
-            then = f"; foosim-supervisor up --resume {self.folder.name} goes on with it" if may_resume else ""
+            then = f"; foosim-supervisor up --resume {self.folder.name} resumes it" if may_resume else ""
             line = f"the run did not end in order{then}"
         else:
             result = {**ended, "reason": reason, "failed": True} if reason and not ended["failed"] else ended
@@ -476,12 +476,12 @@ class Up:
         return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:
-        """Return the result of a run that nobody has ended."""
+        """Return the result of a run without an ordered end."""
         known = {"run": self.folder.name, **plan_facts(self.plan.deployment), **self._status}
         return with_capture(result_without_supervisor(known, reason), self.capture)
 
     def _lost_lines(self, result: Mapping[str, Any]) -> list[str]:
-        """Say which child ended before the run did, and show the end of its log; where the log of one to blame is."""
+        """Report the child that ended before the run did, with the end of its log, and the path of the log to blame."""
         child = self._lost
         if child is None:
             blamed = self._launcher.children.get(result["reason"].partition(" ")[0])
@@ -489,7 +489,7 @@ class Up:
         return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
 
     def _capture_lines(self) -> list[str]:
-        """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
+        """Report the capture's path, and whether it is finished, which a process that was killed did not do."""
         journals = None if VHUB in self._launcher.remotes else self.folder.journals
         lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])

@@ -1,9 +1,9 @@
-"""Attends a rehearsal from a thread of its own: shows its progress, and does not let a player that hangs hold it up.
+"""Watchdog thread of a rehearsal: reports progress, and interrupts a player that hangs.
 
-A player that does not return is interrupted by a signal, as a person's Ctrl-C would: its stack is logged, and the run
-ends in order. Where that does not help, since it is in C code or catches whatever is raised, `on_stuck` is called from
-the thread. C code that keeps the interpreter's lock stops this thread, too: then a timer of faulthandler's, which this
-thread winds up again and again, ends the process. It rests while a Ctrl-Z has stopped all.
+A player that does not return is interrupted by a signal, as by Ctrl-C: its stack is logged, and the run ends in order.
+If that fails, because the player is in C code or catches every exception, the thread calls `on_stuck`. C code that
+holds the interpreter lock stops this thread, too: then a faulthandler timer, which this thread keeps resetting, ends
+the process. The timer is suspended while Ctrl-Z has stopped the process.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from foosim.rehearsal.system import System
 
 INTERRUPT: Final = signal.SIGUSR1
 INTERRUPTS_MAX: Final = 3
-"""How often a player is interrupted, a second apart, before it is given up."""
+"""Number of interrupts, one second apart, before a player is declared stuck."""
 AGAIN_S: Final = 1.0
 WIND_S: Final = 1.0
-"""How often the last timer is wound up."""
+"""Period at which the faulthandler timer is reset."""
 STARVED_S: Final = 20.0
-"""How much longer than a player may take this thread gets no turn before the process is ended."""
+"""Margin beyond a player's deadline after which the faulthandler timer ends the process."""
 
 
 class Attendant:
-    """Looks on a system while it runs: use it as a context."""
+    """Watches a system while it runs: use it as a context."""
 
     def __init__(
         self,
         system: System,
-        say: Callable[[str], None] | None = None,
+        report: Callable[[str], None] | None = None,
         on_stuck: Callable[[str], None] | None = None,
     ) -> None:
-        """`say` takes lines of progress; `on_stuck` is told of a player that cannot be interrupted, and may end the
+        """`report` gets progress lines; `on_stuck` is called for a player that cannot be interrupted and may end the
         process."""
         self._onlooker = Onlooker(system.supervisor.state, time.monotonic())
-        self._system, self._say, self._on_stuck = system, say, on_stuck
+        self._system, self._report, self._on_stuck = system, report, on_stuck
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._attend, name="attendant", daemon=True)
         self._reason = ""
@@ -52,7 +52,7 @@ class Attendant:
         self._before: Callable[[int, FrameType | None], object] | int | None = None
         self._ends_process = on_stuck is not None
         self._wound_s = 0.0
-        self._winding = threading.RLock()  # a Ctrl-Z may come while the timer is wound up
+        self._winding = threading.RLock()  # a Ctrl-Z may arrive while the timer is reset
         self._can_interrupt = threading.current_thread() is threading.main_thread()
         stops = signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
         self._rests = self._ends_process and self._can_interrupt and stops
@@ -86,8 +86,8 @@ class Attendant:
                 self._wound_s = now_s
                 self._wind()
             line = self._onlooker.look(now_s, at_work)
-            if line and self._say is not None:
-                self._say(line)
+            if line and self._report is not None:
+                self._report(line)
             self._reason = self._onlooker.overdue(at_work)
             if not self._reason:
                 self._interrupts = 0
@@ -96,14 +96,14 @@ class Attendant:
                 self._end_player()
 
     def _wind(self) -> None:
-        """Have the process end, with its stack, when this is not called again for longer than a player may take."""
+        """Reset the timer that ends the process and prints its stack once a player's deadline has passed."""
         if self._ends_process:
             limit_s = self._onlooker.allowed_s + STARVED_S
             with self._winding:
                 faulthandler.dump_traceback_later(limit_s, exit=True, file=sys.__stderr__ or 2)
 
     def _stop(self, number: int, frame: FrameType | None) -> None:
-        """Stop, as a Ctrl-Z asks, without the timer; it begins anew when the process goes on."""
+        """Stop on Ctrl-Z with the timer off; restart the timer when the process continues."""
         with self._winding:
             faulthandler.cancel_dump_traceback_later()
             signal.signal(signal.SIGTSTP, signal.SIG_DFL)
@@ -112,7 +112,7 @@ class Attendant:
         self._wind()
 
     def _end_player(self) -> None:
-        """Interrupt the player that hangs; give it up when that has not helped."""
+        """Interrupt the hanging player; after the last interrupt, call `on_stuck`."""
         if self._can_interrupt and self._interrupts < INTERRUPTS_MAX:
             self._interrupts += 1
             thread = threading.main_thread().ident
@@ -124,6 +124,6 @@ class Attendant:
             stuck(self._reason)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """In the thread of the player: raise within it, if it is still in the same turn."""
+        """In the player's thread: raise, if the player is still in the same turn."""
         if self._reason and self._onlooker.overdue(self._system.at_work):
             raise Unanswered(self._reason)

@@ -1,7 +1,7 @@
 """The in-memory bus of a rehearsal: messages by virtual time, routed by the table of channels.
 
-What the processes put on Zenoh goes here, the same bytes on the same keys. Delivery can be delayed, reordered and lost
-by seed; without such settings it takes no time and keeps order.
+Carries the same bytes on the same keys as Zenoh. Delivery can be delayed, reordered and lost by seed; without such
+settings it is immediate and in order.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from foosim.protocol.channels import Channel
 
 @dataclass(frozen=True)
 class Weather:
-    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
+    """Impairments of the bus: each message takes `delay_ns` plus up to `spread_ns`; `loss` is its loss probability.
 
-    With `repeat` it comes twice.
+    `repeat` is the probability that it is delivered twice.
     """
 
     seed: int = 0
@@ -36,7 +36,7 @@ LATE_NS: Final = 2_000_000_000
 
 @dataclass(frozen=True)
 class Traced:
-    """One thing that a process did, as a test wants to see it: `what` is journal, publish or receive."""
+    """One action of a process, recorded for tests: `what` is journal, publish or receive."""
 
     now_ns: int
     process: str
@@ -44,7 +44,7 @@ class Traced:
     channel: str
     payload: bytes
     name: str = ""
-    """Whom the channel's key names."""
+    """The process that the channel's key names."""
 
 
 Message = tuple[int, int, str, Channel, str, bytes]
@@ -60,43 +60,43 @@ class Bus:
         self._key = draw_key(weather.seed, "bus")
         self._heap: list[Message] = []
         self._readers: dict[tuple[str, str], list[str]] = {}
-        """By the channel's key and whom it names, empty for those who read all that comes on it."""
+        """By channel key and addressed process; the empty name holds the readers of the whole channel."""
         self._mute: dict[str, int] = {}
         self._deaf: dict[str, int] = {}
         self._repeat_until_ns = 0
         self._clogged: dict[str, int] = {}
-        """Until when nobody hears a process, it hears nobody, and what goes either way waits."""
+        """Virtual times until which a process's output is dropped, its input is dropped, and both are delayed."""
 
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
-        """Let a process read channels: all that comes on them, or only what is addressed to it."""
+        """Subscribe a process to channels: to all messages, or only to those addressed to it."""
         for channel, own in reads:
             readers = self._readers.setdefault((channel.key, process if own else ""), [])
             if process not in readers:
                 readers.append(process)
 
-    def cut_off(self, process: str, until_ns: int, *, says: bool = True, hears: bool = True) -> None:
-        """Lose all that a process says, all that it is told, or both, until a virtual time."""
-        for ways, cut in ((self._mute, says), (self._deaf, hears)):
+    def cut_off(self, process: str, until_ns: int, *, output: bool = True, input_: bool = True) -> None:
+        """Drop a process's output, its input, or both, until a virtual time."""
+        for ways, cut in ((self._mute, output), (self._deaf, input_)):
             if cut:
                 ways[process] = max(until_ns, ways.get(process, 0))
 
     def clog(self, process: str, until_ns: int) -> None:
-        """Keep all that a process says and is told until a virtual time; nothing is lost."""
+        """Delay all input and output of a process until a virtual time; nothing is lost."""
         self._clogged[process] = max(until_ns, self._clogged.get(process, 0))
 
     def repeat_until(self, until_ns: int) -> None:
-        """Bring all that is said until a virtual time once more, after up to `LATE_NS`."""
+        """Deliver every message sent until a virtual time a second time, after up to `LATE_NS`."""
         self._repeat_until_ns = until_ns
 
     def heal(self) -> None:
-        """From now on nothing is lost, late, cut or clogged."""
+        """End all loss, delay, repetition and disconnection."""
         self.weather = CALM
         self._repeat_until_ns = 0
         for ways in (self._mute, self._deaf, self._clogged):
             ways.clear()
 
     def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
-        """Send a message at `at_ns`; every reader but the sender gets it."""
+        """Send a message at `at_ns` to every reader except the sender."""
         if self._mute and at_ns < self._mute.get(sender, 0):
             return
         if self._clogged:
@@ -127,7 +127,7 @@ class Bus:
         heapq.heappush(self._heap, (at_ns, self.sent, reader, channel, name, payload))
 
     def next_ns(self) -> int:
-        """Return when the next message arrives; far beyond any run when none is on its way."""
+        """Return when the next message arrives; a time beyond any run when none is in flight."""
         return self._heap[0][0] if self._heap else limits.COUNTER_MAX
 
     @property

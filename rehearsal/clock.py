@@ -1,6 +1,6 @@
-"""The clocks of a rehearsal's processes: each has a monotonic one of its own, as machines have.
+"""The clocks of a rehearsal's processes: one monotonic clock per process, as on separate machines.
 
-They differ in where they began and a little in their speed; no two processes may compare them.
+They differ in offset and slightly in rate, so times of two processes are not comparable.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ MILLION = 1_000_000
 
 @dataclass
 class Clock:
-    """One process's clock: what it shows at virtual time 0, and how much faster it goes."""
+    """One process's clock: its reading at virtual time 0, and its rate error."""
 
     offset_ns: int = 0
     drift_ppm: int = 0
 
     def at(self, virtual_ns: int) -> int:
-        """Return what it shows at a virtual time."""
+        """Return its reading at a virtual time."""
         return virtual_ns + self.offset_ns + virtual_ns * self.drift_ppm // MILLION
 
     def when(self, clock_ns: int) -> int:
-        """Return the first virtual time at which it shows at least this."""
+        """Return the first virtual time at which its reading is at least this."""
         passed_ns = clock_ns - self.offset_ns
         if not self.drift_ppm:
             return passed_ns

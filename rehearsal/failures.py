@@ -1,6 +1,6 @@
-"""How a rehearsal fails, for a fault of ours.
+"""Errors of a rehearsal that are faults of foosim.
 
-They are apart from who raises them, since a compiled module has no classes of assertions.
+They have a module of their own, since a compiled module cannot define subclasses of AssertionError.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Ctrl-C in a rehearsal: the first one ends it in order, a second one at once."""
+"""Ctrl-C in a rehearsal: the first ends the run in order, the second at once."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from foosim.rehearsal.system import System
 
 
 class Interrupts:
-    """Counts Ctrl-C while a rehearsal runs. Use it as a context; only the main thread is told of signals."""
+    """Counts Ctrl-C while a rehearsal runs. Use it as a context; only the main thread receives signals."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
+    def __init__(self, report: Callable[[str], None]) -> None:
         self.count = 0
-        self._say = say
+        self._report = report
         self._system: System | None = None
         self._is_told = threading.current_thread() is threading.main_thread()
 
@@ -33,7 +33,7 @@ class Interrupts:
             signal.signal(signal.SIGINT, self._before)
 
     def attend(self, system: System) -> None:
-        """Have a Ctrl-C end this rehearsal."""
+        """Make Ctrl-C end this rehearsal."""
         self._system = system
 
     def last_line(self, capture: Path | None, *, is_finished: bool) -> str:
@@ -49,4 +49,4 @@ class Interrupts:
         if self.count > 1 or system is None:
             raise KeyboardInterrupt
         system.soon(lambda: system.request("down"))
-        self._say("ending the rehearsal; a second Ctrl-C ends it at once")
+        self._report("ending the rehearsal; a second Ctrl-C ends it at once")

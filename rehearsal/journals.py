@@ -1,6 +1,4 @@
-"""The journal of a rehearsal's vHub: its records in memory, how far the capture is, how a vHub ends while it writes,
-and what is left of both when its machine is lost.
-"""
+"""The in-memory journal of a rehearsal's vHub, with its capture position, crashes during a write and machine loss."""
 
 from __future__ import annotations
 
@@ -12,26 +10,26 @@ from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
 from foosim.vhub.state.resume import Captured, Past, recall
 
 Ending = Literal["now", "torn", "unsaid"]
-"""When a vHub dies: at once; while it writes its next record, which is torn then; behind that, with nothing said."""
+"""When a vHub dies: at once; during its next write, which leaves a torn record; after it, before publishing."""
 ENDINGS: Final[tuple[Ending, ...]] = get_args(Ending)
 HEADS_KEPT: Final = 5
 
 
 class HubJournal:
-    """What the vHubs of a rehearsal have written."""
+    """The records that a rehearsal's vHubs have written."""
 
     def __init__(self) -> None:
         self.records: list[bytes] = []
         self.captured_tick = -1
         self.captured_epoch = 0
         self.machine = "machine-1"
-        """Which one it is written on; another one after a machine was lost, as one that was started again."""
+        """The machine that holds the journal; another one after a machine loss."""
         self.ending: Ending | None = None
-        """How the vHub ends at its next record; None: it does not."""
+        """How the vHub dies at its next record; None: it does not."""
         self._heads: list[int] = []
 
     def append(self, record: bytes) -> None:
-        """Write a record; what no fold needs any more goes."""
+        """Write a record; drop those that no fold needs."""
         if isinstance(decode_any(HubRecord, record), HeadRecord):
             self._heads.append(len(self.records))
             if len(self._heads) > HEADS_KEPT:
@@ -41,7 +39,7 @@ class HubJournal:
         self.records.append(record)
 
     def lose(self, count: int) -> int:
-        """The machine is lost with its last records, as far as a tick is left; return how many these are."""
+        """Lose the machine with its last records, keeping at least one tick; return how many records were lost."""
         found = [decode_any(HubRecord, raw) for raw in self.records]
         ticks = [(at, record.tick) for at, record in enumerate(found) if isinstance(record, TickRecord)]
         if not ticks:
@@ -54,7 +52,7 @@ class HubJournal:
         return lost
 
     def past(self, hub: HubCore, run: str) -> Past | None:
-        """Return what a new vHub goes on from; None when it is the first."""
+        """Return the records that a new vHub resumes from; None for the first vHub."""
         assert hub.deployment is not None
         captured = Captured(self.captured_tick, self.captured_epoch)
         return recall(hub.deployment, run, self.records, captured, hub.deployment.deadlines.client_back_ns)

@@ -1,4 +1,4 @@
-"""Machines of a rehearsal that are lost with what had not reached their disks."""
+"""Loss of a rehearsal's machine with the journal records that had not reached its disk."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from foosim.supervisor.records import CommitRecord, Record
 
 
 def lose_hub(system: System, records: int, back_ns: int = HUB_BACK_NS) -> None:
-    """Lose the vHub's machine with the last records of its journal; it is started again after a while."""
+    """Lose the vHub's machine with the last records of its journal; the vHub is restarted after a delay."""
     if channels.VHUB not in system.processes or system.hub.ended is not None:
         return
     system.hub_journal.lose(records)

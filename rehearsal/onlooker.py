@@ -1,7 +1,7 @@
-"""What one sees who looks on a rehearsal: a line of progress each second, and a player that does not return.
+"""Progress of a rehearsal in wall time: a line each second, and detection of a player that does not return.
 
-A rehearsal is one process on virtual time, so who has the turn is who is waited for, and no deadline of its cores can
-pass meanwhile. Pure: the caller tells what time it is.
+A rehearsal is one process on virtual time, so the process in turn blocks all others, and no deadline of a core can
+expire meanwhile. Pure: the caller passes the time.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from foosim.world.frame import Frame
 
 LINE_S: Final = 1.0
 LOOK_S: Final = 0.05
-"""How often it is looked."""
+"""Sampling period."""
 STOOD_S: Final = 4 * LOOK_S
-"""A longer time between two looks is one in which this process was not given the processor: it counts for no player."""
+"""A longer gap between two samples means that this process was not scheduled; it is not charged to a player."""
 
 
 def reached(state: RunState) -> str:
-    """How far a run is: `3.20 s of 20.00 s`."""
+    """Progress of a run: `3.20 s of 20.00 s`."""
     tick_s = state.deployment.tick_ns / 1e9
     last = state.settings.last_tick
     return f"{(state.frame.tick - state.first_tick) * tick_s:.2f} s of {(last - state.first_tick) * tick_s:.2f} s"
 
 
 class Onlooker:
-    """Looks on one rehearsal."""
+    """Samples one rehearsal."""
 
     def __init__(self, state: RunState, now_s: float) -> None:
         self._state = state
         self._line_s = self._looked_s = now_s
         self._line_tick = state.frame.tick
         self._turns: Counter[str] = Counter()
-        """Whose turn it was how often when it was looked, since the last line."""
+        """Number of samples per process in turn, since the last line."""
         self._turn = -1
         self._in_turn_s = 0.0
 
     def look(self, now_s: float, at_work: AtWork) -> str:
-        """Note who is at work; return a line when it is time for one, else an empty string."""
+        """Sample the process in turn; return a line when one is due, else an empty string."""
         elapsed_s, self._looked_s = now_s - self._looked_s, now_s
         is_same = at_work.acts and at_work.turns == self._turn
         self._in_turn_s = self._in_turn_s + min(elapsed_s, STOOD_S) if is_same else 0.0
@@ -58,13 +58,13 @@ class Onlooker:
 
     @property
     def allowed_s(self) -> float:
-        """How long a player's turn may take at this stage of the run: the first ones import its module."""
+        """Deadline of a player's turn at this stage of the run: the first turns import its module."""
         state, deadlines = self._state, self._state.deployment.deadlines
         first_ns = deadlines.start_ns if state.frame.tick == state.first_tick else 0
         return max(first_ns, deadlines.lockstep_fast_ns) / 1e9
 
     def overdue(self, at_work: AtWork) -> str:
-        """Return what is said of a player that has not returned within its deadline; empty when none is overdue."""
+        """Return a message about a player that has not returned within its deadline; empty when none is overdue."""
         deadlines = self._state.deployment.deadlines
         is_first = at_work.tick < 0
         allowed_ns = deadlines.start_ns if is_first else deadlines.lockstep_fast_ns

@@ -1,4 +1,4 @@
-"""Who asks the supervisor of a rehearsal for something, once or again until it is answered."""
+"""Operators and viewers of a rehearsal: requests to the supervisor, sent once or repeated until answered."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ OPERATOR: Final = "operator"
 
 
 class People:
-    """What was asked for. `later(after_ns, action)` is for asking again."""
+    """The requests of a run. `later(after_ns, action)` schedules a repetition."""
 
     def __init__(self, bus: Bus, later: Callable[[int, Callable[[], object]], None]) -> None:
         self.answers: dict[str, Answer] = {}
         self.asked: dict[str, str] = {}
-        """The verb of what was requested and not given up, by id."""
+        """The verb of each request that was not given up, by id."""
         self._bus = bus
         self._later = later
         self._requests = 0
         self.viewed: list[bytes] = []
-        """What was shown of the run, as it came."""
+        """The views received, in order of arrival."""
         bus.subscribe(OPERATOR, (*channels.OPERATOR_READS, *channels.VIEW_READS))
 
     def request(
         self, verb: str, again_ns: int, arguments: dict[str, Any], who: str = OPERATOR, *, only_looks: bool = False
     ) -> str:
-        """Ask for something, every `again_ns` until it is answered (0: once); return the request's id.
+        """Send a request, every `again_ns` until it is answered (0: once); return the request's id.
 
-        Who `only_looks` asks as a viewer does.
+        With `only_looks` it is sent as a viewer's.
         """
         self._requests += 1
         identity = f"request-{self._requests}"
@@ -45,12 +45,12 @@ class People:
         return identity
 
     def give_up(self, verb: str) -> None:
-        """Ask no more for what is not answered yet."""
+        """Stop repeating unanswered requests."""
         for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
             self.asked.pop(identity)
 
     def hear(self, channel: Channel, payload: bytes) -> None:
-        """Take an answer, or what is shown."""
+        """Handle an answer or a view."""
         if channel is channels.VIEW:
             self.viewed.append(payload)
         elif channel is channels.ANSWER:

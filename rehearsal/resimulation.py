@@ -1,7 +1,6 @@
-"""The world computed again from orders and deliveries alone, on any number of nodes: what `verify` compares with.
+"""Re-simulation of a world from orders and deliveries alone, on any number of nodes; used by `verify`.
 
-The nodes are those of a run, with their cores, parts and engines; supervisor and vHub are replaced by what the capture
-says they said.
+The nodes have the cores, parts and engines of a run; messages from the capture replace the supervisor and the vHub.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ SOURCE = "capture"
 
 
 class Replica:
-    """Nodes of a deployment, fed tick by tick. `frame` is the world so far."""
+    """Nodes of a deployment, advanced tick by tick. `frame` is the present frame."""
 
     def __init__(
         self,
@@ -58,7 +57,7 @@ class Replica:
         self._begin(self.frame)
 
     def _begin(self, frame: Frame) -> None:
-        """Go on from a frame, in an epoch of its own."""
+        """Continue from a frame, in a new epoch."""
         self.frame = frame
         self._epoch += 1
         owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
@@ -72,7 +71,7 @@ class Replica:
         self._settle()
 
     def set_back(self, frame: Frame) -> None:
-        """Go on from another frame of the same run. What the nodes know of its ticks stays true."""
+        """Continue from another frame of the same run. The nodes' records of its ticks stay valid."""
         self._begin(frame)
 
     @property
@@ -82,7 +81,7 @@ class Replica:
         return core.member.simulation
 
     def step(self, edits: Sequence[Edit], delivered: Sequence[Delivered]) -> Frame:
-        """Compute the next frame from what the order and the vHub gave to this tick."""
+        """Compute the next frame from this tick's order and deliveries."""
         tick = self.frame.tick
         layout = layout_after(self.frame.layout, edits)
         if layout is not self.frame.layout:
@@ -97,13 +96,13 @@ class Replica:
         return self.frame
 
     def sense(self) -> list[RobotPacket]:
-        """Return what all robots send at the frame, in (robot, index) order."""
+        """Return the packets that all robots send at the frame, in (robot, index) order."""
         core, _ = next(iter(self._nodes.values()))
         packets, _ = core.stepper(self.frame.layout).sense(self.frame, self.frame.layout.robots)
         return packets
 
     def rebuild_engines(self) -> None:
-        """Replace all engines by new ones."""
+        """Replace all engines with new ones."""
         for _, solver in self._nodes.values():
             solver.rebuild()
 
@@ -118,7 +117,7 @@ class Replica:
         self._bus.put(SOURCE, channel, name, payload, 0)
 
     def _settle(self) -> None:
-        """Let the nodes take turns until nobody has anything to say."""
+        """Run the nodes in turn until none has a message to send."""
         while not self._bus.is_empty:
             _, _, receiver, channel, name, payload = self._bus.pop()
             if receiver == SOURCE:

@@ -33,7 +33,7 @@ from foosim.world.initial_state import Start
 
 @dataclass(slots=True)
 class Rehearsed:
-    """What a rehearsal gave: the JSON object of `up`, and D(tick) for every tick from 1 on, as 32 bytes each."""
+    """Result of a rehearsal: the JSON object of `up`, and D(tick) for every tick from 1 on, 32 bytes each."""
 
     json: dict[str, Any]
     digests: list[bytes] = field(default_factory=list)
@@ -41,7 +41,7 @@ class Rehearsed:
 
 
 def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
-    """Return the robots of n1 to nN: those with bodies dealt first, then those without, each in name order."""
+    """Return the robots of n1 to nN, dealt in turn: first those with bodies, then those without, each in name order."""
     bodies = sorted(name for name, robot in deployment.robots.items() if robot.model == "rod")
     others = sorted(set(deployment.robots) - set(bodies))
     dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
@@ -57,7 +57,7 @@ def with_nodes(text: str, name: str, nodes: int, sets: Sequence[str] = ()) -> st
     return apply_sets(text, name, [f"nodes={{{flow}}}", *sets])
 
 
-def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
+def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
     text: str,
     name: str,
     ticks: int,
@@ -76,8 +76,8 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
     `start` is a frame of another run to begin with (`capture.start_frame.read_branch`). `prepare` is called with the
-    built system before it runs: a test's or notebook's place to ask for things at ticks.
-    `folder` is the one that the text's file is in: where the files are that it refers to (None: the present one).
+    built system before it runs, so that a test or notebook can schedule requests.
+    `folder` is the base of the relative file paths in the text (None: the current folder).
     `progress` gets a line each second of wall time, from another thread. A player that does not answer within
     `deadlines.lockstep_fast` is interrupted, where this is called from the main thread, and the run ends in order; for
     one that cannot be interrupted `on_stuck` gets the result, from another thread, and should end the process.
@@ -139,14 +139,14 @@ def _run(
     finally:
         system.close()
         if writer is not None:
-            writer.leave()  # who is interrupted leaves it without an end
+            writer.leave()  # an interrupted rehearsal leaves it unfinished
     if writer is not None:
         _check_room(writer, Level.OUT)
     return told()
 
 
 def _check_room(writer: CaptureWriter, worst: Level) -> None:
-    """Raise CaptureError when the capture is at its end and the deployment does not want to go on without one."""
+    """Raise CaptureError when the capture is full and the deployment requires one."""
     if writer.stops_world and writer.state.level >= worst:
         raise CaptureError(f"the rehearsal ends, its capture is full: {writer.state.text}")
 
@@ -154,7 +154,7 @@ def _check_room(writer: CaptureWriter, worst: Level) -> None:
 def _open_capture(
     path: Path, deployment: Deployment, text: str, name: str, settings: Settings, run: RunSettings
 ) -> CaptureWriter:
-    """Open a capture that gets all closings and log lines of a rehearsal."""
+    """Open a capture that receives all closings and log lines of a rehearsal."""
     metadata = {"run": run.run, "pace": str(run.pace), "fingerprint": library_fingerprint().hex()}
     metadata |= origin_metadata(run.origin)
     writer = CaptureWriter(path, deployment, name, text, metadata)

@@ -1,4 +1,4 @@
-"""How to rehearse, and what a rehearsal knows of each of its processes."""
+"""Settings of a rehearsal, and its state of each process."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from foosim.world.frame import Frame
 
 @dataclass
 class Process:
-    """One process of the rehearsal: its core, and what a shell would know."""
+    """One process of the rehearsal: its core, and the state that a shell would have."""
 
     name: str
     core: Any
     turn: Callable[[int], None]
     slow_ns: int = 0
-    """Virtual time that each of its turns takes which says something."""
+    """Virtual time that each turn takes in which it publishes something."""
     busy_until_ns: int = 0
     wake_ns: int = 0
-    """When it is woken next, if nothing comes before."""
+    """When it is woken next, if no message arrives before."""
     inbox: deque[Message] = field(default_factory=deque)
-    """What came while it was busy, in order of arrival."""
+    """Messages that arrived while it was busy, in order of arrival."""
     took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
-    """Told how long its turns took, as a shell tells."""
+    """Called with the duration of each turn, as a shell does."""
     clock: Clock = field(default_factory=Clock)
     due_ns: int = 0
-    """When its loop means to look again at the latest, by its own clock."""
+    """Latest planned wake-up of its loop, by its own clock."""
     standstill: Standstill = field(default_factory=lambda: Standstill(0))
     stood: Callable[[int, int], None] = lambda stood_ns, now_ns: None
-    """Told for how long its loop stood still, as a shell tells."""
+    """Called with the duration of each standstill of its loop, as a shell does."""
 
     def begin(self, virtual_ns: int) -> None:
-        """Its loop begins to go round."""
+        """Start its loop."""
         self.due_ns = self.clock.at(virtual_ns)
         self.standstill = Standstill(self.due_ns)
 
     def look(self, virtual_ns: int) -> int:
-        """Its loop goes round, which may have stood still: return the time on its clock."""
+        """Run one pass of its loop, reporting a standstill; return the time on its clock."""
         now_ns = self.clock.at(virtual_ns)
         stood_ns = self.standstill.look(self.due_ns, now_ns)
         if stood_ns:
@@ -59,45 +59,45 @@ class Process:
 
 @dataclass
 class AtWork:
-    """Whose turn it is: for whoever looks on from another thread."""
+    """The process in turn, readable from another thread."""
 
     name: str = ""
     tick: int = -1
-    """The tick that a player acts at; -1 while it is at none."""
+    """The tick at which a player acts; -1 outside of ticks."""
     acts: bool = False
-    """Whether it is a player's own code."""
+    """Whether the player's own code runs."""
     turns: int = 0
-    """How many there have been; while it is the same number, it is the same turn."""
+    """Number of turns so far; an equal number identifies the same turn."""
 
 
 @dataclass
 class Settings:
-    """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
+    """Settings of a rehearsal beside the deployment. `slow_ns` is by process name."""
 
     run: str = "rehearsal"
     ticks: int = 0
     weather: Weather = CALM
     slow_ns: Mapping[str, int] = field(default_factory=dict)
     clocks: Mapping[str, Clock] = field(default_factory=dict)
-    """By process; who has none here goes by virtual time."""
+    """By process; processes without an entry use virtual time."""
     clients: Mapping[str, Callable[[ClientCore], Callable[[int], None]]] = field(default_factory=dict)
-    """Lockstep clients beside the players, by name: each gets its core and gives its turn."""
+    """Lockstep clients beside the players, by name: each takes its core and returns its turn function."""
     factory: EngineFactory | None = None
     hub: type[HubCore] = HubCore
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
     keeps_journals: bool = False
-    """Whether the supervisor's journal is kept, so that it can be started again."""
+    """Whether the supervisor's journal is kept, so that it can be restarted."""
     restart_ns: int = 0
-    """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
+    """Virtual time after which a refused node is restarted, as a launcher does; 0: it is not."""
     observer: Observer | None = None
     observes: Collection[str] = ("journal", "publish", "receive")
-    """What the observer is told of."""
+    """The actions that the observer receives."""
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
     on_epoch: Callable[[Epoch], None] | None = None
     closing: Callable[[HubCore, int], bool] = lambda hub, passed_ns: True
-    """Whether the vHub has closed its capture, and in its `recording` how far it is, so long after the run's end."""
+    """State of the vHub's capture, including `recording`, this long after the run's end."""
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

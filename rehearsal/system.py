@@ -1,7 +1,7 @@
 """The whole system in one process on virtual time: the same cores, table of channels and codec as the processes.
 
-Supervisor, vHub, nodes and players take turns by what the bus brings and by their deadlines. A process may be slow on
-the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked something at a tick.
+Supervisor, vHub, nodes and players take turns by messages and deadlines. A process may be slow on
+the virtual clock (`slow_ns`), have its engines rebuilt, or receive a request at a tick.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
 HUB_BACK_NS: Final = 300_000_000
-"""After how long a vHub that ended is there again, as a launcher starts it."""
+"""Time after which a vHub that ended is restarted, as by a launcher."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -60,7 +60,7 @@ class System:
         self._boots_of_players = 0
         self.at_work = AtWork()
         self.healed = False
-        """Whether a test has said that nothing new is to happen."""
+        """Whether a test has ended all faults."""
         self.flipped: set[str] = set()
         """Nodes whose memory a test has changed."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
@@ -70,10 +70,10 @@ class System:
         self._frames: list[Frame] = []
         """Committed in the present turn of the supervisor."""
         self._dying: dict[str, int] = {}
-        """Processes that end amid their next actions: how many of these they still perform."""
+        """Processes that end amid their next actions: how many actions they still perform."""
         self._boots = 0
         self._soonest_ns = self._last_commit_ns = 0
-        """No process is woken before the first, as far as is known without looking at each."""
+        """A lower bound of the next wake-up of any process."""
         self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
@@ -95,7 +95,7 @@ class System:
         self._hub_back_ns = HUB_BACK_NS
 
     def enter(self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]) -> None:
-        """Let a process in, which takes part from now on."""
+        """Add a process, which takes part from now on."""
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
         process.clock = self._clock(name)
@@ -106,7 +106,7 @@ class System:
         return self._clocks.setdefault(name, Clock())
 
     def now_of(self, name: str) -> int:
-        """Return what a process's clock shows now."""
+        """Return the present reading of a process's clock."""
         return self._clock(name).at(self.bus.now_ns)
 
     def _enter_supervisor(self) -> None:
@@ -119,7 +119,7 @@ class System:
         self._hub_hears(True)
 
     def _enter_hub(self, fingerprint: bytes) -> None:
-        """Let a vHub in, which goes on from the journal of the one before."""
+        """Add a vHub, which resumes from its predecessor's journal."""
         self._boots += 1
         start = f"boot-{self._boots}", fingerprint, self.now_of(channels.VHUB)
         hub = self.hub = self.settings.hub(*start, machine=self.hub_journal.machine)
@@ -184,13 +184,13 @@ class System:
             solver.close()
 
     def _is_soonest_known(self) -> bool:
-        """Look when the next process is to be woken; False when it is later than was thought."""
+        """Find the next wake-up; False when it is later than the lower bound."""
         soonest_ns = min([max(process.wake_ns, process.busy_until_ns) for process in self.processes.values()])
         known, self._soonest_ns = soonest_ns == self._soonest_ns, soonest_ns
         return known
 
     def _deliver(self) -> None:
-        """Hand the next message of the bus to its receiver, or put it behind what waits there already."""
+        """Hand the next message of the bus to its receiver, or append it to the receiver's inbox."""
         message = self.bus.pop()
         process = self.processes.get(message[2])
         if process is None:
@@ -202,7 +202,7 @@ class System:
             self._hand(process, message)
 
     def _catch_up(self) -> None:
-        """Hand the oldest message that waits to a process that is free again."""
+        """Hand the oldest waiting message to a process that is free again."""
         process = min(self._behind.values(), key=lambda process: process.busy_until_ns)
         message = process.inbox.popleft()
         if not process.inbox:
@@ -210,7 +210,7 @@ class System:
         self._hand(process, message)
 
     def _hand(self, process: Process, message: Message) -> None:
-        """Let a process take one message and do what follows from it."""
+        """Let a process receive one message and perform its actions."""
         _, _, _, channel, name, payload = message
         self._begin_turn(process)
         if self._traces_receive:
@@ -220,7 +220,7 @@ class System:
         process.turn(now_ns)
         if (
             process.slow_ns and self._core_deadline_ns(process) <= self.bus.now_ns
-        ):  # no backlog keeps it from its heartbeat
+        ):  # a backlog does not delay its heartbeat
             process.core.wake(now_ns)
             process.turn(now_ns)
         self._perform(process)
@@ -234,7 +234,7 @@ class System:
                 self.wake(process)
 
     def wake(self, process: Process) -> None:
-        """Let a process do what is due by time."""
+        """Wake a process and perform its actions."""
         self._begin_turn(process)
         now_ns = process.look(self.bus.now_ns)
         process.core.wake(now_ns)
@@ -249,23 +249,23 @@ class System:
         self.at_work.turns += 1
 
     def take_turn(self, process: Process) -> None:
-        """Let a process do what follows from what has happened to it."""
+        """Advance a process and perform its actions."""
         self._begin_turn(process)
         process.turn(process.clock.at(self.bus.now_ns))
         self._perform(process)
         self._plan_wake(process)
 
     def _core_deadline_ns(self, process: Process) -> int:
-        """Return when a core has something to do next, in virtual time."""
+        """Return a core's next deadline, in virtual time."""
         core, clock = process.core, process.clock
         if core is self.supervisor:
             return clock.when(core.deadline_ns(clock.at(self.bus.now_ns)))
         return clock.when(core.deadline_ns())
 
     def _plan_wake(self, process: Process) -> None:
-        """After a turn: see when the process has something to do by time, as its loop does.
+        """After a turn: read the process's next deadline, as its loop does.
 
-        The supervisor's deadline counts from now: it may come sooner by what happens, and never later.
+        The supervisor's deadline counts from now: events can make it earlier, never later.
         """
         wake_ns = self._core_deadline_ns(process)
         if process.core is self.supervisor:
@@ -275,7 +275,7 @@ class System:
         self._soonest_ns = min(self._soonest_ns, process.wake_ns)
 
     def _perform(self, process: Process) -> None:
-        """Perform what a core asked for, in order."""
+        """Perform a core's actions, in order."""
         actions = process.core.actions
         if not actions:
             return
@@ -306,7 +306,7 @@ class System:
             self._close(process, leaves_ns)
 
     def _close(self, process: Process, begun_ns: int) -> None:
-        """The vHub closes its capture, shows how far it is, and says farewell."""
+        """Close the vHub's capture, reporting its progress, and send its farewell."""
         hub = self.hub
 
         def turn(now_ns: int) -> None:
@@ -319,19 +319,19 @@ class System:
         turn(begun_ns)
 
     def leave(self, name: str) -> None:
-        """A process has ended: what is on its way to it is lost."""
+        """Remove an ended process; messages in flight to it are lost."""
         self.processes.pop(name)
         self._behind.pop(name, None)
         if name == channels.SUPERVISOR:
             self._hub_hears(False)
 
     def _hub_hears(self, is_alive: bool) -> None:
-        """The vHub sees the supervisor come or go."""
+        """Report the supervisor's presence to the vHub."""
         if channels.VHUB in self.processes:
             self.hub.orphan.hear(is_alive, self.now_of(channels.VHUB))
 
     def _keep(self, now_ns: int, process: Process, action: Any) -> None:
-        """Hand what is written or said to those who asked for it."""
+        """Hand journal records, messages and log lines to the settings' callbacks."""
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
@@ -359,7 +359,7 @@ class System:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload, name))
 
     def _tell_commits(self, was_cut: bool) -> None:
-        """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
+        """Report the committed frames; a commit that a crashed supervisor had not journalled does not count."""
         frames = self._frames.copy()
         self._frames.clear()
         written = fold(self.supervisor.state.deployment, self.journal).frame.tick if was_cut else frames[-1].tick
@@ -368,21 +368,21 @@ class System:
                 self._last_commit_ns = self.bus.now_ns
                 if self.settings.on_commit is not None:
                     self.settings.on_commit(frame)
-                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
+                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, like all outside events
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
         tick = self.supervisor.state.frame.tick
         return f"stuck at tick {tick}: nodes wait for {nodes}, vHub for {self.hub.waiting_for!r}"
 
-    # --- from outside ------------------------------------------------------------------------------------------------
+    # --- faults and requests -----------------------------------------------------------------------------------------
 
     def at_tick(self, tick: int, action: Callable[[], object]) -> None:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
     def soon(self, action: Callable[[], object]) -> None:
-        """Call `action` between two turns; a signal handler may say so."""
+        """Call `action` between two turns; safe in a signal handler."""
         self._next.append(action)
 
     def later(self, after_ns: int, action: Callable[[], object]) -> None:
@@ -396,7 +396,7 @@ class System:
         self.soon(action)
 
     def _enter_clients(self) -> None:
-        """Let in the players of the deployment and the lockstep clients of the rehearsal."""
+        """Add the players of the deployment and the lockstep clients of the rehearsal."""
         for name, player in sorted(self.supervisor.state.deployment.players.items()):
             assert player.lockstep, "a rehearsal has lockstep players only"
             self._enter_player(name, "boot")
@@ -405,7 +405,7 @@ class System:
             self.enter(name, core, client(core), channels.CLIENT_READS)
 
     def _enter_player(self, name: str, boot: str) -> None:
-        """Let a player's process in, with new memory; where the player's code fails, it says so and ends."""
+        """Add a player's process, with new memory; if the player's code fails, it reports the error and ends."""
         core = ClientCore(name, boot, self.now_of(name))
         loop = self.players[name] = PlayerLoop(core, load_player)
 
@@ -424,14 +424,14 @@ class System:
         self.processes[name].stood = core.rest
 
     def _client_gone(self, name: str) -> None:
-        """Have the vHub see that a client's presence has ended."""
+        """Report the end of a client's presence to the vHub."""
         hub = self.processes.get(channels.VHUB)
         if hub is not None:
             self.hub.client_gone(name, hub.clock.at(self.bus.now_ns))
             self.take_turn(hub)
 
     def kill(self, name: str) -> None:
-        """End a node, a player or the supervisor at once: what is on its way to it is lost; it is seen to go."""
+        """End a node, a player or the supervisor at once: messages in flight to it are lost, its presence ends."""
         self.leave(name)
         if name in self.players:
             self._client_gone(name)
@@ -440,7 +440,7 @@ class System:
             self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
-        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        """End the supervisor amid its next turn, after it has performed so many of its actions."""
         self._dying[name] = actions
 
     def is_dying(self, name: str) -> bool:
@@ -448,7 +448,7 @@ class System:
         return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node, a player or the supervisor again, with a new boot; the supervisor goes on from its journal."""
+        """Restart a node, a player or the supervisor, with a new boot; the supervisor resumes from its journal."""
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
@@ -465,7 +465,7 @@ class System:
         self.wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:
-        """A process that is refused ends; its launcher starts another one after a while."""
+        """End a refused process; restart it after a delay, as a launcher does."""
         if self.solvers.get(name) is not refused:
             return
         self.leave(name)
@@ -474,7 +474,7 @@ class System:
         self.pause(name, self.settings.restart_ns)
 
     def kill_hub(self, ending: Ending = "now", back_ns: int = HUB_BACK_NS) -> None:
-        """End the vHub's process, at once or at its next record; another one is started after a while."""
+        """End the vHub's process, at once or at its next record; restart it after a delay."""
         if channels.VHUB not in self.processes or self.hub_journal.ending or self.hub.ended is not None:
             return
         self._hub_back_ns = back_ns
@@ -484,7 +484,7 @@ class System:
             self.hub_journal.ending = ending
 
     def _end_hub(self) -> None:
-        """What the vHub had not done yet is not done; the others see its connections close."""
+        """End the vHub: its pending actions are dropped, and the others see its connections close."""
         self._leave_hub()
         self._supervisor_sees_gone(channels.VHUB)
 
@@ -503,7 +503,7 @@ class System:
             self.take_turn(client)
 
     def _hub_again(self, refused: HubCore) -> None:
-        """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
+        """End a refused vHub, which was never present to the supervisor, and restart it after a delay."""
         if self.hub is refused and channels.VHUB in self.processes:
             self._hub_back_ns = self.settings.restart_ns
             self._leave_hub()
@@ -519,18 +519,18 @@ class System:
         return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
 
     def pause(self, name: str, for_ns: int) -> None:
-        """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""
+        """Stop a process for some virtual time, as SIGSTOP and SIGCONT do; its messages wait."""
         process = self.processes[name]
         process.busy_until_ns = max(process.busy_until_ns, self.bus.now_ns + for_ns)
         process.wake_ns = max(process.wake_ns, process.busy_until_ns)
 
     def resume(self, name: str) -> None:
-        """Let a process go on that was stopped."""
+        """Continue a stopped process."""
         process = self.processes[name]
         process.busy_until_ns = process.wake_ns = self._soonest_ns = self.bus.now_ns
 
     def set_forward(self, name: str, by_ns: int) -> None:
-        """Let a process's clock jump, as when its machine slept."""
+        """Let a process's clock jump, as when its machine was suspended."""
         self._clock(name).offset_ns += by_ns
         process = self.processes.get(name)
         if process is not None:
@@ -539,5 +539,5 @@ class System:
             process.due_ns = due_ns
 
     def request(self, verb: str, *, again_ns: int = 0, **arguments: Any) -> str:
-        """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
+        """Send a request to the supervisor, every `again_ns` until it answers (0: once); return the request's id."""
         return self.people.request(verb, again_ns, arguments)

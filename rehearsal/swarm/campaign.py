@@ -1,8 +1,8 @@
 """Rehearsals under random faults, by seed: the real cores of all processes, on virtual time, in bad weather.
 
-A seed decides the number of nodes, their clocks, the weather on the bus and when which fault happens. The laws are
-checked at whatever is written, said and closed; then everything heals, and the run must go on and be finished with
-everybody back. A failing seed is one command.
+A seed decides the number of nodes, their clocks, the impairments of the bus and the time and kind of each fault. The
+laws are checked at every journal record, message and closing; then all faults end, and the run must finish with all
+processes present. A failing seed is reproduced with one command.
 """
 
 from __future__ import annotations
@@ -51,26 +51,26 @@ from foosim.world.frame import Frame
 FAULTS: Final[tuple[int, ...]] = (8, 20)
 NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)
 HEALED_PACE: Final = "0.02x"
-"""100 ms a tick: slow enough that all are back before the end."""
+"""100 ms a tick: slow enough that all processes are back before the end."""
 PROGRESS_NS: Final = 10_000_000_000
-"""When all is healed the next tick is committed within this virtual time."""
+"""After healing, the next tick is committed within this virtual time."""
 BOUNDS_EVERY: Final = 50
-"""How many ticks apart everything is looked at that processes keep: a look takes as long as some ticks."""
+"""Interval in ticks between checks of the memory bounds: a check takes as long as several ticks."""
 IDLE_NS: Final = 60_000_000_000
-"""Before, with all that goes on, within this."""
+"""The same limit during faults."""
 WORLDS: Final = 4
-"""How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
+"""Number of worlds; seed modulo this number selects one."""
 PROBER: Final = "prober"
 SMALL: Final[tuple[str, ...]] = (
     "engine=pure",
     "substeps=1",
     f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
 )
-"""What is computed is the same, with fewer steps to it, and robots are asked for echoes."""
+"""Overrides that keep the computation, with fewer steps, and add echo channels."""
 OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
 """The ball of a table rolls from the start."""
 BY_PERIOD: Final[tuple[str, ...]] = ("act=period", "arrivals={}", "rate=100 Hz")
-"""Players that act at arrival do so in the last world; in others they have ticks of their own: both kinds are flown."""
+"""In the last world players act at arrival, in the others at ticks of their own: both kinds are tested."""
 PATIENT: Final[tuple[str, ...]] = (
     "deadlines.tick_lost=5 s",
     "deadlines.lockstep_fast=24 h",
@@ -78,13 +78,13 @@ PATIENT: Final[tuple[str, ...]] = (
     "deadlines.client_back=24 h",
     "deadlines.start=24 h",
 )
-"""A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
+"""With a tenth of its messages lost, a process can need longer to join than on a lossless link."""
 RESTART_NS: Final = 500 * MS
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a seed stands for."""
+    """The plan of a seed."""
 
     seed: int
     nodes: int
@@ -103,9 +103,9 @@ class Plan:
 
 
 def plan_of(seed: int, ticks: int = TICKS) -> Plan:
-    """Return the plan of a seed: nodes, clocks, weather, and from 8 to 20 faults, of three kinds at least.
+    """Return the plan of a seed: nodes, clocks, bus impairments, and 8 to 20 faults of at least three kinds.
 
-    A longer run has as many more of them.
+    Their number grows with the length of the run.
     """
     dice = Dice(seed)
     nodes = dice.one_of(NODES)
@@ -139,7 +139,7 @@ def _later(fault: Fault, ticks: int) -> Fault:
 
 
 class Prober:
-    """A lockstep client that asks robots for echoes, each with a number of its own, and counts what comes back."""
+    """A lockstep client that sends numbered echo requests to robots and counts the replies."""
 
     OF_TABLE: Final[tuple[str, ...]] = ("blue.goal", "camera", "red.midfield")
 
@@ -148,11 +148,11 @@ class Prober:
         self._joined = False
         self._sent = 0
         self._back: dict[bytes, int] = {}
-        """The echoes that have come, with the tick at which they did."""
+        """The echoes received, with the tick of their arrival."""
         self._robots: list[str] = []
 
     def step(self, now_ns: int) -> None:
-        """Join, and answer each Go with a question."""
+        """Join, and answer each Go with an echo request."""
         core = self._core
         if core.deployment is None or core.ended:
             return
@@ -175,7 +175,7 @@ class Prober:
 
 
 class WatchedNode(NodeCore):
-    """A node that lets the laws see from what it makes its frames."""
+    """A node that lets the laws check the inputs of its frames."""
 
     def _enter(self, frame: Frame, now_ns: int) -> None:
         if self._barrier is not None:
@@ -193,7 +193,7 @@ class WatchedNode(NodeCore):
 
 @dataclass(slots=True)
 class Flown:
-    """How a seed went. `broken` is empty when all laws held and the run was finished."""
+    """Result of a seed. `broken` is empty when all laws held and the run finished."""
 
     seed: int
     nodes: int
@@ -205,7 +205,7 @@ class Flown:
     joins: int = 0
     restarts: int = 0
     seen: int = 0
-    """Things that were written or said, each of them checked."""
+    """Number of journal records and messages that were checked."""
     virtual_s: float = 0.0
     broken: str = ""
     chain: str = ""
@@ -225,7 +225,7 @@ def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
 
 
 class Flight:
-    """One seed under way: the system, the laws that watch it, and its healing."""
+    """One running seed: the system, its invariants, and its healing."""
 
     def __init__(self, text: str, name: str, plan: Plan, settings: Settings) -> None:
         text, alone = worlds(text, name, plan.nodes, plan.seed % WORLDS)
@@ -255,7 +255,7 @@ class Flight:
         self.system.at_tick(plan.healed_tick, self._heal)
 
     def run(self) -> None:
-        """Run to the end; raise Broken for a law that does not hold, or what a core asserts."""
+        """Run to the end. Raises Broken for a law that does not hold, and AssertionError of a core."""
         try:
             self.system.run()
             end = self.system.supervisor.state.end
@@ -279,15 +279,15 @@ class Flight:
         self._last_commit_ns = self.system.bus.now_ns
         if frame.tick % BOUNDS_EVERY == 0:
             large = [text for process in self.system.processes.values() for text in too_large(process.core)]
-            hold(not large, f"at tick {frame.tick} what is kept grows: {', '.join(large)}")
+            hold(not large, f"at tick {frame.tick} memory bounds are exceeded: {', '.join(large)}")
 
     def _heal(self) -> None:
-        """Fine weather from now on: who is down comes up, who is slow is quick, who stood still goes on."""
+        """End all faults: start stopped processes, restore speeds and resume paused processes."""
         system = self.system
         self._healed_ns = self._last_commit_ns = system.bus.now_ns
         system.healed = True
         system.bus.heal()
-        system.people.give_up("rate")  # or one that was lost before comes after this one
+        system.people.give_up("rate")  # or an earlier, delayed request would arrive after this one
         ask(system, "rate", pace=HEALED_PACE)
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
@@ -305,7 +305,7 @@ class Flight:
 
 @lru_cache(maxsize=4 * WORLDS)
 def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
-    """Return the chain of a world in which nothing happens."""
+    """Return the digest chain of a run without faults."""
     flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
     flight.run()
     return flight.system.supervisor.state.chain
@@ -314,7 +314,7 @@ def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
 def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
     """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores.
 
-    Where no fault changes the world, it has to be that of the run in which nothing happened (law 3).
+    Where no fault changes the world, it has to equal that of the run without faults (law 3).
     """
     plan = plan_of(seed, ticks)
     flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
@@ -323,9 +323,9 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks
         flight.run()
         if not CHANGES_THE_WORLD & {*plan.kinds}:
             same = flight.system.supervisor.state.chain == undisturbed(text, name, seed % WORLDS, ticks)
-            hold(same, "the world is not the one that would have been")
+            hold(same, "the world differs from that of the run without faults")
     except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
-        flown.broken = f"{type(error).__name__}: {error}"  # what a core raises would have ended its process
+        flown.broken = f"{type(error).__name__}: {error}"  # an exception of a core would have ended its process
     system, told = flight.system, flight.system.supervisor.state.recovered
     flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.state.chain.hex(), flight.seen
     flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9

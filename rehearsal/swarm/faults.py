@@ -1,6 +1,6 @@
-"""What happens to a rehearsal of the swarm: one function for each kind of fault, in a table.
+"""Faults of the swarm: one function for each kind, in a table.
 
-A kind draws what it needs from the seed's dice and gives a fault: a tick, words for people, and what is done then. To
+A kind draws from the seed's dice and returns a fault: a tick, a description, and an action. To
 add a kind, add a function and its row.
 """
 
@@ -20,11 +20,11 @@ from foosim.rehearsal.system import System
 
 TICKS: Final = 208
 HEALED_TICK: Final = 180
-"""From here on nothing new happens, and what is down comes up."""
+"""From this tick on no fault starts, and stopped processes are restarted."""
 MS: Final = 1_000_000
 HOUR_NS: Final = 3_600_000 * MS
 ASK_AGAIN_NS: Final = 150 * MS
-"""How often who asks for something asks again until it is answered."""
+"""Period at which an unanswered request is repeated."""
 PUSH_MAX: Final = 0.8
 """In N s: a push may give the table's ball of 21 g no more than its speed limit of 40 m/s."""
 
@@ -54,7 +54,7 @@ class Dice:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that happens when frame `tick` is committed."""
+    """A fault that starts when frame `tick` is committed."""
 
     tick: int
     kind: str
@@ -67,17 +67,17 @@ def _tick(dice: Dice) -> int:
 
 
 def _here(name: str, do: Callable[[System], object]) -> Callable[[System], object]:
-    """Return what is done to a process only while it is there."""
+    """Return an action on a process that is skipped while the process is absent."""
     return lambda system: do(system) if name in system.processes else None
 
 
 def ask(system: System, verb: str, **arguments: object) -> str:
-    """Ask the supervisor for something until it answers; return the request's id."""
+    """Repeat a request to the supervisor until it is answered; return the request's id."""
     return system.request(verb, again_ns=ASK_AGAIN_NS, **arguments)
 
 
 def _unless_healed(system: System, do: Callable[[], object]) -> None:
-    """Do what was planned for later, if it is not too late."""
+    """Perform a scheduled action, unless healing has begun."""
     if not system.healed:
         do()
 
@@ -96,20 +96,20 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _end(system: System, name: str, names: Sequence[str]) -> None:
-    """Kill a node; one is started at once if none is left, since no further tick would be committed."""
+    """Kill a node; start one at once if none is left, since no further tick would be committed."""
     system.kill(name)
     if _is_none_left(system, names):
         system.start(name)
 
 
 def _is_none_left(system: System, names: Sequence[str]) -> bool:
-    """Whether no node is there that may take part."""
+    """Whether no node is present that may take part."""
     stopped = system.supervisor.state.roster.stopped
     return not any(name in system.processes and name not in stopped for name in names)
 
 
 def _leave_one(system: System, names: Sequence[str]) -> None:
-    """Start a node if none is left: those that are to come back wait for ticks that nobody would compute."""
+    """Start a node if none is left: scheduled restarts wait for ticks that no node would compute."""
     if _is_none_left(system, names):
         stopped = system.supervisor.state.roster.stopped
         name = next((name for name in names if name not in stopped), names[0])
@@ -118,7 +118,7 @@ def _leave_one(system: System, names: Sequence[str]) -> None:
 
 
 def revive(system: System, name: str) -> None:
-    """Start a process unless it is there."""
+    """Start a process unless it is present."""
     if name not in system.processes:
         system.start(name)
 
@@ -138,7 +138,7 @@ def _stop(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _flip(dice: Dice, names: Sequence[str]) -> Fault:
-    """A cosmic ray: one number of one node's frame changes. The others must not follow it."""
+    """A memory error: one number of one node's frame changes. The other nodes must keep theirs."""
     name, place = dice.one_of(names), dice.unit()
 
     def do(system: System) -> None:
@@ -153,7 +153,7 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))
 
 
-# --- processes stand still, are slow, go by another clock ------------------------------------------------------------
+# --- processes pause, are slow, have a clock that jumps --------------------------------------------------------------
 
 
 def _pause(dice: Dice, names: Sequence[str]) -> Fault:
@@ -178,7 +178,7 @@ def _slow(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _clock(dice: Dice, names: Sequence[str]) -> Fault:
-    """A machine slept: its monotonic clock jumps. The supervisor's only by less than makes all others silent."""
+    """The monotonic clock jumps, as after a suspend. The supervisor's jump is shorter than its heartbeat timeouts."""
     name = dice.one_of([*names, channels.VHUB, channels.SUPERVISOR])
     by_ns = dice.between(MS, 400 * MS if name == channels.SUPERVISOR else HOUR_NS)
     what = f"the clock of {name} jumps by {by_ns / 1e9:.3f} s"
@@ -193,13 +193,13 @@ def _cut(dice: Dice, names: Sequence[str]) -> Fault:
     ways = dice.one_of((("both ways", True, True), ("to others", True, False), ("from others", False, True)))
 
     def do(system: System) -> None:
-        system.bus.cut_off(name, system.bus.now_ns + for_ms * MS, says=ways[1], hears=ways[2])
+        system.bus.cut_off(name, system.bus.now_ns + for_ms * MS, output=ways[1], input_=ways[2])
 
     return Fault(_tick(dice), "cut", f"cut {name} off {ways[0]} for {for_ms} ms", do)
 
 
 def _clog(dice: Dice, names: Sequence[str]) -> Fault:
-    """Processes are clogged one after the other and unclogged in another order: what was held up comes in a heap."""
+    """Delays all messages of several processes; the delays end in another order, and the messages arrive at once."""
     chosen = [name for name in (*names, channels.VHUB, channels.SUPERVISOR) if dice.unit() < 0.5] or [names[0]]
     times = [(name, dice.between(0, 50), dice.between(60, 600)) for name in chosen]
 
@@ -212,13 +212,13 @@ def _clog(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
-    """For a while everything is said once more, much later."""
+    """For a while every message is delivered a second time, much later."""
     for_ms = dice.one_of((20, 100, 400))
 
     def do(system: System) -> None:
         system.bus.repeat_until(system.bus.now_ns + for_ms * MS)
 
-    return Fault(_tick(dice), "late", f"all that is said within {for_ms} ms comes once more, late", do)
+    return Fault(_tick(dice), "late", f"repeat all messages of {for_ms} ms, late", do)
 
 
 # --- people ----------------------------------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
-    """Sometimes as hard as one may, twice in one tick: then the ball goes into quarantine."""
+    """Sometimes at the permitted maximum, twice in one tick: then the ball goes into quarantine."""
     hard = dice.one_of((0.04, 0.04, 0.04, 4.0))
     impulse = [hard * (dice.unit() - 0.5) for _ in range(3)]
     size = hypot(*impulse)
@@ -262,7 +262,7 @@ def _push(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
-    """Somebody pauses the run, steps a little, changes the pace, and lets it go on."""
+    """Pause the run, step it, change the pace, and resume it."""
     for_ms, ticks, pace = dice.between(1, 400), dice.between(1, 5), dice.one_of(("fast", "1x", "20x"))
 
     def do(system: System) -> None:
@@ -282,7 +282,7 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
-    """Go on when all that was asked for before is answered: what comes late would undo what comes after."""
+    """Resume when all earlier requests are answered: a late one would undo a later one."""
     if all(identity in system.answers for identity in asked):
         do(system)
     else:
@@ -305,7 +305,7 @@ def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _revive_supervisor(system: System, down_ms: int) -> None:
-    """Start the supervisor when it has ended; it has not while it had nothing to do since."""
+    """Start the supervisor once it has ended, which happens only with its next actions."""
     if channels.SUPERVISOR in system.processes:
         system.later((down_ms + 1) * MS, partial(_revive_supervisor, system, down_ms))
     else:
@@ -319,7 +319,7 @@ def _hub(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _both(dice: Dice, names: Sequence[str]) -> Fault:
-    """Supervisor and vHub end at once; both go on from their journals, whichever of them is back first."""
+    """Supervisor and vHub end together; both resume from their journals, in either order."""
     hub_ms, down_ms = dice.between(20, 300), dice.one_of((1, 40, 400, 2_000))
 
     def do(system: System) -> None:
@@ -333,7 +333,7 @@ def _both(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
-    """A player's process is killed and started again; sometimes the run has gone on without it by then."""
+    """A player's process is killed and restarted; sometimes the run has continued without it by then."""
     place, back_ms, left_ms = dice.unit(), dice.one_of((1, 40, 400, 2_000)), dice.one_of((0, 0, 20, 200))
     which = f"player {place:.2f} of all ends, for {back_ms} ms"
     what = f"{which}; the run waits {left_ms} ms at 20x" if left_ms else which
@@ -357,7 +357,7 @@ def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _give_up_waiting(system: System, name: str) -> None:
-    """The time is over that a run in realtime waits for a player: in a swarm deadlines are as long as it lasts."""
+    """Expire a realtime run's deadline for a player: in a swarm, deadlines last as long as the run."""
     session, releases = system.hub.sessions.by_name.get(name), system.hub.releases
     if session is not None and session.away_ns >= 0 and releases is not None and releases.factor:
         session.away_ns = system.now_of(channels.VHUB)
@@ -384,14 +384,14 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
 }
 KINDS: Final = list(FAULT_OF)
 LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
-"""Of sixteen seeds those, by their remainder, that also have players that are lost: by dice of their own, so that
-others are the same. Those of 7 and 15 are in the last world, where players act at arrival, those of 10 are not."""
+"""Remainders modulo 16 of the seeds that also lose players. The losses have separate dice, so that they do not change
+the other faults. 7 and 15 are in the last world, where players act at arrival; 10 is not."""
 CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player"})
-"""Kinds after which the world is another one. After all others it is the one that would have been."""
+"""Kinds that change the world. All others leave it bit-identical."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
-"""Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""
+"""Kinds of which a seed has at most one: if all nodes had changed frames, none would be right."""
 
 
 def loses_players(seed: int) -> bool:
-    """Whether a seed also has players that are lost."""
+    """Whether a seed also loses players."""
     return seed % 16 in LOSES_PLAYERS

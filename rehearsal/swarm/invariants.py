@@ -1,8 +1,8 @@
-"""The laws as a watch over a rehearsal: told of everything that is written and said, it raises at the first breach.
+"""Checks the laws on every journal record and message of a rehearsal, and raises at the first breach.
 
-It keeps a history of its own, from what processes wrote and said alone, and asks at each thing whether it may follow
-on it: who may write what, what is final, what has to be written first. Each committed tick is computed again by a
-replica, and at the end the journals are folded and compared with those who wrote them.
+The checker keeps its own history, from records and messages alone, and checks each new one against it: the permitted
+writer, finality, and journal before publication. A replica computes each committed tick again. At the end the journals
+are folded and compared with the state of their writers.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from foosim.world.initial_state import initial_frame
 
 
 class Laws:
-    """Watches a run; raises Broken at the first thing that must not be. `ticks` are those that it saw whole."""
+    """Checks a run; raises Broken at the first breach. `ticks` counts those that it saw complete."""
 
     def __init__(self, replica: Replica, deployment: Deployment) -> None:
         self.ticks = 0
@@ -50,22 +50,22 @@ class Laws:
         self._epochs: set[bytes] = set()
         self._commits: dict[int, bytes] = {}
         self._parts: dict[tuple[int, int], dict[str, tuple[bytes, Part]]] = {}
-        """By (epoch, tick) and node: the one thing that it may say there."""
+        """By (epoch, tick) and node: its part, of which there may be one only."""
         self._ordered: dict[int, list[Edit]] = {}
-        """What journalled requests change, by tick."""
+        """Edits of journalled requests, by tick."""
         self._orders: dict[int, bytes] = {}
         self._said_epoch: dict[str, int] = {}
-        """The newest epoch of which each node has said a part."""
+        """The newest epoch of which each node has published a part."""
         self._stopped: list[str] = []
         self._answers: dict[tuple[str, str], bytes] = {}
         self._chosen = deployment.owners()
-        """The owner of each robot by the deployment, or by who moved it last."""
+        """The owner of each robot by the deployment or the last move."""
         self._untold: list[Recovered] = []
-        """Losses and returns that are written, and of which no commit has told."""
+        """Journalled losses and returns that no commit has reported."""
         self._told: dict[int, list[Recovered]] = {}
-        """What each commit has told, by tick."""
+        """Losses and returns that each commit has reported, by tick."""
         self._captured_told: set[int] = set()
-        """The ticks of which the capture has it."""
+        """The ticks whose losses and returns are in the capture."""
         self._journals: dict[str, list[bytes]] = {channels.SUPERVISOR: [], channels.VHUB: []}
         self._readers: Mapping[tuple[str, str], Callable[[Traced], None]] = {
             ("journal", channels.SUPERVISOR): self._supervisor_writes,
@@ -82,15 +82,15 @@ class Laws:
 
     @property
     def committed(self) -> int:
-        return next(reversed(self._commits), -1)  # they come one after the other
+        return next(reversed(self._commits), -1)  # they arrive in order
 
     def see(self, traced: Traced) -> None:
-        """Look at one thing that a process did."""
+        """Check one action of a process."""
         reader = self._readers.get((traced.what, traced.channel or traced.process))
         if reader is not None:
             reader(traced)
 
-    # --- what is written -------------------------------------------------------------------------------------------
+    # --- journals --------------------------------------------------------------------------------------------------
 
     def _supervisor_writes(self, traced: Traced) -> None:
         self._journals[channels.SUPERVISOR].append(traced.payload)
@@ -128,7 +128,7 @@ class Laws:
         self._chains[tick] = chain_next(self._chains[tick - 1], commit.digest)
         parts = self._parts.get((epoch, tick), {})
         hold(sorted(parts) == self._rosters[epoch], f"commit {tick}: parts of {sorted(parts)} in epoch {epoch}")
-        hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that nobody ordered")
+        hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that no order had")
         digest = self._input_digest(tick, commit.edits)
         strange = [node for node, (_, part) in parts.items() if part.input_digest != digest]
         hold(not strange, f"commit {tick} is made of parts of {strange}, with another input digest")
@@ -139,26 +139,26 @@ class Laws:
             self._parts.pop(old)
 
     def _tells(self, commit: Commit) -> None:
-        """Whoever was lost or came is told of by the commit behind it, once, in the order of the journal."""
+        """The next commit reports each loss and return, once, in the order of the journal."""
         told = [replace(entry, outage_ns=-1) for entry in commit.recovered]
-        hold(told == self._untold, f"commit {commit.tick} tells of {told}, and {self._untold} were written")
+        hold(told == self._untold, f"commit {commit.tick} reports {told}, the journal has {self._untold}")
         self._untold.clear()
         if commit.recovered:
             self._told[commit.tick] = commit.recovered
 
     def _input_digest(self, tick: int, edits: list[Edit]) -> bytes:
-        """Return what all parts of frame `tick` have to start from."""
+        """Return the input digest that all parts of frame `tick` must have."""
         delivered = self.packets.said.get(tick - 1)
         hold(delivered is not None, f"frame {tick} before the deliveries of the tick before")
         return input_digest_of(self._digests[tick - 1], edits, delivered or b"")
 
     def _check_ahead(self, tick: int) -> None:
-        """Whoever runs ahead of the commits has the frame that is committed then, unless its memory was changed."""
+        """A node ahead of the commits has the frame that is committed later, unless its memory was changed."""
         for each in [parts for (_, ahead), parts in self._parts.items() if ahead == tick]:
             for node, (_, part) in each.items():
                 expected = self._input_digest(tick, self._ordered.get(tick - 1, []))
                 right = node in self.flipped or part.input_digest == expected
-                hold(right, f"{node} goes on from another frame {tick - 1} than the committed one")
+                hold(right, f"{node} continues from another frame {tick - 1} than the committed one")
 
     def _begins(self, epoch: Epoch, raw: bytes) -> None:
         hold(epoch.epoch > self.epoch, f"epoch {epoch.epoch} after {self.epoch}")
@@ -179,7 +179,7 @@ class Laws:
             hold(record.commit == self._commits.get(record.tick), f"the vHub closes tick {record.tick} uncommitted")
             self.packets.closes(record, self._digests[record.tick])
 
-    # --- what is said ----------------------------------------------------------------------------------------------
+    # --- messages --------------------------------------------------------------------------------------------------
 
     def _part(self, traced: Traced) -> None:
         part = decode(Part, traced.payload)
@@ -192,7 +192,7 @@ class Laws:
         hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")
 
     def _order(self, traced: Traced) -> None:
-        """Law 3: order k says the same in every epoch, and what requests change is journalled before."""
+        """Law 3: order k is equal in every epoch, and the edits of requests are journalled before."""
         order = decode(Order, traced.payload)
         hold(order.epoch == self.epoch, f"order {order.tick} of epoch {order.epoch} in epoch {self.epoch}")
         last = order.tick + order.following
@@ -204,10 +204,10 @@ class Laws:
 
     def _commit(self, traced: Traced) -> None:
         tick = decode(Commit, traced.payload).tick
-        hold(traced.payload == self._commits.get(tick), f"commit {tick} is said, and not or otherwise written")
+        hold(traced.payload == self._commits.get(tick), f"commit {tick} is not published as journalled")
 
     def _epoch_said(self, traced: Traced) -> None:
-        hold(traced.payload in self._epochs, "epoch is said before it is written")
+        hold(traced.payload in self._epochs, "epoch is published before it is journalled")
 
     def _deliveries(self, traced: Traced) -> None:
         self.packets.delivers(decode(Deliveries, traced.payload), traced.payload)
@@ -216,8 +216,8 @@ class Laws:
         """The same request, the same answer."""
         answer = decode(Answer, traced.payload)
         key = answer.sender, answer.id
-        if answer.result == b"{}":  # any other is a status, which changes
-            hold(self._answers.get(key) == traced.payload, f"{key} is answered, and not or otherwise written")
+        if answer.result == b"{}":  # any other answer is a status, which changes
+            hold(self._answers.get(key) == traced.payload, f"{key} is answered, but not journalled or differently")
 
     def _down(self, traced: Traced) -> None:
         down = decode_any(Go | Down, traced.payload)
@@ -228,19 +228,19 @@ class Laws:
         if isinstance(up, Done):
             self.packets.answers(up, traced.payload)
 
-    # --- what comes of it ------------------------------------------------------------------------------------------
+    # --- results ---------------------------------------------------------------------------------------------------
 
     def close(self, closing: Closing) -> None:
-        """Compute the tick again from what led to it: the frame must be the same to the last bit."""
+        """Compute the tick again from its inputs: the frame must be bit-identical."""
         frame = closing.frame
         self.packets.fates(closing)
         told = self._told.get(frame.tick, [])
         self._captured_told.add(frame.tick)
-        hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, commits tell {told}")
+        hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, not with {told}")
         if frame.tick != self._replica.frame.tick + 1:
             return  # frame 0, or the last one of a run that ended before all was closed
         again = self._replica.step(closing.edits, closing.delivered)
-        hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
+        hold(again.digest == closing.digest, f"frame {frame.tick} is not the one that its inputs give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
         self.packets.senses(again, self._replica)
         stray = strays(self._deployment, again)
@@ -248,7 +248,7 @@ class Laws:
         self.ticks = frame.tick
 
     def end(self, system: System, nodes: int) -> None:
-        """When all has healed: everybody is back, everything is answered, and the journals give what is there."""
+        """After healing: all processes are back, all requests are answered, and the folded journals equal the state."""
         supervisor = system.supervisor
         hold(supervisor.state.chain == self._chains[self.committed], "the chain is not that of the committed frames")
         members = [f"n{number}" for number in range(1, nodes + 1)]
@@ -258,7 +258,7 @@ class Laws:
         asked = [identity for identity in system.people.asked if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
         untold = self._told.keys() - self._captured_told
-        hold(not untold, f"what ticks {sorted(untold)} tell is not in the capture")
+        hold(not untold, f"losses and returns of ticks {sorted(untold)} are not in the capture")
         history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
         hold(
             history.chain == self._chains[self.committed] and history.frame.digest == supervisor.state.frame.digest,

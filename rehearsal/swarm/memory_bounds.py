@@ -1,8 +1,7 @@
-"""What a core keeps is bounded: a walk over everything that it holds, which names what has grown too large.
+"""Memory bounds of cores: a walk over all their containers, which names those that exceed their bound.
 
-Nothing that a core keeps may grow with the ticks of a run. So a container may have as many things as there are ticks
-that others still ask for, some times over, unless the table here says by what it is bounded instead. A container that
-is new is watched without being named anywhere.
+No container of a core may grow with the ticks of a run. The default bound is a multiple of the ticks that other
+processes can still request; the table has the other bounds. A new container is checked without an entry.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
     "Held._messages": limits.HELD_MESSAGES_MAX,
     "RunState.answers": ANSWERS_KEPT,
-    "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
+    "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in the result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
     "_Memory._newer": PAIRS_KEPT,
     "_Memory._older": PAIRS_KEPT,
-    "Propagation._ways": limits.CLIENTS_MAX,  # a pair that talks, or hears
+    "Propagation._ways": limits.CLIENTS_MAX,  # pairs of sender and receiver
     "Propagation._places": limits.CLIENTS_MAX,
     "Propagation._reaches": LOSS_MAX_DB + 1,  # of fixed length
     "_Lattice._cells": CELLS_KEPT,
@@ -42,10 +41,10 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Fabric.radios": limits.CLIENTS_MAX,
     "HubState._receivers": limits.ENTITIES_MAX,
     "Transit._by_source": limits.ENTITIES_MAX,
-    "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
-    "Air._flights": 1 << 14,  # what is on air: of a broadcast one for each who hears it
+    "HubState._flights": 1 << 14,  # arrivals by tick: each of many clients may receive from all others
+    "Air._flights": 1 << 14,  # transmissions on air: one for each receiver of a broadcast
     "AirState.on_air": 1 << 14,
-    "RadioState.waiting": 1 << 14,  # as much as its queue takes
+    "RadioState.waiting": 1 << 14,  # the capacity of its queue
     "Process.report": limits.CLIENTS_MAX,  # a line a link
     "Fabric.asked": EVENTS_MAX,
     "Timeline._events": 2 * EVENTS_MAX,
@@ -54,17 +53,17 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Timeline.cuts": 1 << 16,  # an hour of chaos has some 10,000
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
-"""By class and attribute: containers of something else than ticks."""
+"""By class and attribute: containers that ticks do not bound."""
 CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight)
-"""What does not grow, or is of one frame."""
+"""Types that do not grow, or belong to one frame."""
 SIMPLE: Final = frozenset({bool, bytes, float, int, str, type(None)})
-"""What holds nothing."""
+"""Types without contents."""
 REMEMBERED: Final[tuple[type[Any], ...]] = (LinkState, RadioState, AirState)
-"""Messages do not grow; these are structs that do."""
+"""Messages do not grow; these structs do."""
 
 
 def too_large(core: object) -> list[str]:
-    """Return what a core holds that is larger than it may be, each as `Class.attribute has n of m`."""
+    """Return the containers of a core that exceed their bound, each as `Class.attribute has n of m`."""
     return [
         f"{where} has {size} of {BOUNDS.get(where, KEPT_MAX)}"
         for where, size in sizes(core)
@@ -73,7 +72,7 @@ def too_large(core: object) -> list[str]:
 
 
 def sizes(core: object) -> list[tuple[str, int]]:
-    """Return the size of every container that a core holds, however deep, by class and attribute."""
+    """Return the size of every container of a core, at any depth, by class and attribute."""
     found: list[tuple[str, int]] = []
     seen: set[int] = set()
     todo: list[tuple[str, Any]] = [("", core)]

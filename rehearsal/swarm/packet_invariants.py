@@ -1,4 +1,4 @@
-"""The laws of packets: what the vHub takes, judges, delivers and releases, watched from outside."""
+"""The laws of packets: acceptance, fates, deliveries and accounts of the vHub, checked from its messages."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from foosim.world.sampling import Sampling
 Key = tuple[str, str, int, int]
 """A packet: source, destination, sequence number, copy."""
 LOST_TICKS_MAX: Final = 1000
-"""More than a machine that is lost takes with it: what led to fates that come again is kept for so long."""
+"""Ticks for which the inputs of fates are kept: more than a machine loss undoes."""
 OPEN: Final[tuple[str, ...]] = ("", IN_FLIGHT)
-"""What stands for a cause where a packet was not dropped."""
+"""The cause of a packet that was not dropped."""
 
 
 def hold(law: bool, what: str) -> None:
@@ -34,7 +34,7 @@ def hold(law: bool, what: str) -> None:
 
 
 class PacketLaws:
-    """Watches packets. `said` are the deliveries of each tick as nodes take them, the bytes that are final."""
+    """Checks packets. `said` has the deliveries of each tick as nodes receive them, the final bytes."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.closed = -1
@@ -50,20 +50,20 @@ class PacketLaws:
         self._go_ticks: dict[str, int] = {}
         self._dones: dict[tuple[str, str, int], bytes] = {}
         self._answered: dict[int, dict[str, list[Sent]]] = {}
-        """What clients answered to a tick that is not closed, by tick and client."""
+        """The Dones of ticks that are not closed, by tick and client."""
         self._reached: dict[int, list[Key]] = {}
-        """What robots were told by the deliveries behind a tick."""
+        """Packets delivered to robots after a tick."""
         self._received: dict[int, dict[str, list[Key]]] = {}
-        """What clients were told at a tick."""
+        """Packets sent to clients at a tick."""
         self._owed: dict[tuple[str, int], list[Key] | None] = {}
-        """Of who left owing, by client and tick, whose Go was not said: what it had, None until the tick is kept."""
+        """For clients that left with a Done due and an unsent Go, by tick: its packets, None until the closing."""
         self._fates: dict[Key, tuple[int, str]] = {}
         """By packet: the tick at which its fate was final, and the cause."""
 
     # --- the vHub's side ---------------------------------------------------------------------------------------------
 
     def closes(self, record: TickRecord, digest: bytes) -> None:
-        """A record: the next tick, from samples of the committed frame, with nothing that clients sent left out."""
+        """A record: the next tick, from samples of the committed frame, with all packets that clients sent."""
         tick = record.tick
         hold(tick == self.closed + 1, f"the vHub closes tick {tick} after {self.closed}")
         self.closed = tick
@@ -94,12 +94,12 @@ class PacketLaws:
         )
 
     def delivers(self, deliveries: Deliveries, raw: bytes) -> None:
-        """Law 3: deliveries are written before they are said, and then they never change. Law 4: each packet once."""
+        """Law 3: deliveries are journalled before they are published, and never change. Law 4: each packet once."""
         for tick in range(deliveries.tick, deliveries.last + 1):
             payload = raw if tick == deliveries.tick else encode(Deliveries(tick, []))
             written = self._written.get(tick)
-            hold(written is not None, f"deliveries {tick} are said before they are written")
-            hold(written == payload, f"deliveries {tick} are said otherwise than they are written")
+            hold(written is not None, f"deliveries {tick} are published before they are journalled")
+            hold(written == payload, f"deliveries {tick} are published differently than journalled")
             if tick not in self.said:
                 self.said[tick] = payload
                 self._reach(tick, deliveries.packets if tick == deliveries.tick else [])
@@ -118,7 +118,7 @@ class PacketLaws:
     def fates(self, closing: Closing) -> None:
         """Law 5: each packet has one fate; a robot's has the number of its tick and place.
 
-        What has not reached its receiver is in the count of what was dropped: receivers were told all the rest.
+        A packet that has not reached its receiver counts as dropped: all others were delivered.
         """
         self._came(closing)
         for flight in closing.fates:
@@ -130,7 +130,7 @@ class PacketLaws:
                 hold(flight.sent_ns == sent, f"packet {key} of a robot has another tick's number")
 
     def _came(self, closing: Closing) -> None:
-        """Every packet that counts as delivered was in a message to its receiver, and no other was."""
+        """Exactly the packets that count as delivered were in messages to their receivers."""
         tick = closing.frame.tick
         robots: list[Key] = []
         clients: dict[str, list[Key]] = {}
@@ -139,12 +139,12 @@ class PacketLaws:
                 to = flight.destination
                 of_it = robots if to in self._deployment.robots else clients.setdefault(to, [])
                 of_it.append((flight.source, to, flight.sequence, flight.copy))
-        hold(robots == self._reached.get(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
+        hold(robots == self._reached.get(tick, []), f"deliveries {tick + 1} are not the delivered packets")
         for name, owed in self._owed:
             if owed == tick:
                 self._owed[name, tick] = clients.pop(name, [])
         told = {name: keys for name, keys in self._received.get(tick, {}).items() if keys}
-        hold(clients == told, f"what clients were told at tick {tick} is not what counts as delivered")
+        hold(clients == told, f"the packets sent to clients at tick {tick} are not those that count as delivered")
         self._reached.pop(tick - LOST_TICKS_MAX, None)
         self._received.pop(tick - LOST_TICKS_MAX, None)
 
@@ -153,12 +153,12 @@ class PacketLaws:
         samples = self._samples.pop(frame.tick, [])
         taken = world_packets(samples, frame.digest, frame, self._sampling)
         sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else replica.sense()
-        hold(taken is None or taken == sensed, f"what robots sent at tick {frame.tick} is not what they sense")
+        hold(taken is None or taken == sensed, f"robots' packets at tick {frame.tick} are not those of their sensors")
 
     # --- the clients' side -------------------------------------------------------------------------------------------
 
     def downlink(self, client: str, down: Go | Down, raw: bytes) -> None:
-        """Downlinks are numbered one after the other, and each number stands for one thing."""
+        """Downlinks are numbered consecutively, and each number identifies one content."""
         known = self._downlinks.setdefault(client, {})
         if down.number not in known:
             keys = [(packet.source, client, packet.sequence, packet.copy) for packet in down.packets]
@@ -166,7 +166,7 @@ class PacketLaws:
             owed = self._owed.pop((client, down.tick), None)
             hold(owed is None or owed == keys, f"downlink {down.number} of {client} is not what its Go had")
         hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
-        hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
+        hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} has two contents")
         if isinstance(down, Go):
             hold(down.tick <= self.closed + 1, f"Go {down.tick} before tick {down.tick - 1} is written")
             known_tick = self._go_ticks.setdefault(client, -1)
@@ -174,7 +174,7 @@ class PacketLaws:
             self._go_ticks[client] = down.tick
 
     def _owes(self, client: str, tick: int) -> None:
-        """A client has left owing the Done of a tick: what its Go had is said from here on as what needs no answer."""
+        """A client has left with a Done due: its Go's packets are sent as a message that needs no answer."""
         known = self._downlinks.setdefault(client, {})
         number, raw = next(reversed(known.items()), (0, b""))
         said = decode_any(Go | Down, raw) if raw else None
@@ -184,7 +184,7 @@ class PacketLaws:
             known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False))
 
     def answers(self, done: Done, raw: bytes) -> None:
-        """A lockstep client's answer to a tick is one; a process that takes another's place answers for itself."""
+        """A lockstep client has one Done per tick; a process that replaces another one sends its own."""
         said = self._dones.setdefault((done.name, done.boot, done.tick), raw)
         hold(said == raw, f"{done.name} has two Dones of {done.tick}")
         if done.tick > self.closed:
@@ -194,7 +194,7 @@ class PacketLaws:
 
     @staticmethod
     def account(state: HubState) -> None:
-        """Law 5: offered = delivered + dropped + in flight, in all and for every link; copies are in none of these."""
+        """Law 5: offered = delivered + dropped + in flight, in total and by link; copies are in none of these."""
         packets, flying = state.packets, [flight for flight in state.in_flight() if flight.copy == 0]
         hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
         links = list(state.fabric.states.values())
@@ -203,11 +203,11 @@ class PacketLaws:
         hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
 
     def end(self, system: System) -> None:
-        """Every packet that was offered has its fate, so has every copy, and every downlink has come."""
+        """Every offered packet and every copy has a fate, and every downlink has arrived."""
         state = system.hub.state
         assert state is not None
         self.account(state)
-        hold(not self._owed, f"what these had left owing was never said: {sorted(self._owed)}")
+        hold(not self._owed, f"packets of these open Gos were never sent: {sorted(self._owed)}")
         hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
         counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
         fates = {key: cause for key, (_, cause) in self._fates.items() if key[3] == 0}
@@ -223,7 +223,7 @@ class PacketLaws:
                 dropped[source, destination] += link.dropped
         hold(dict(by_link) == dropped, f"receivers lack {by_link}, links count {dropped} as dropped")
         told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}
-        hold(counted == told, f"fates {counted}, the account says {told}")
+        hold(counted == told, f"fates {counted}, the account has {told}")
         for name, process in system.processes.items():
             if isinstance(process.core, ClientCore):
                 statistics = process.core.statistics()

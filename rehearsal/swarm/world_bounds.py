@@ -1,4 +1,4 @@
-"""Where the things of a world may be: what the laws look at in every frame, whichever kind of world it is."""
+"""Bounds of a world's entities, checked in every frame, for each kind of world."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from foosim.world.scenes.obstacles import obstacles_of
 
 
 def strays(deployment: Deployment, frame: Frame) -> list[str]:
-    """Return what is not where it may be in a frame, in words."""
+    """Return descriptions of the entities of a frame that are out of bounds."""
     return _stray_rovers(deployment, frame) if deployment.is_hall else _stray_balls(deployment, frame)
 
 
 def _stray_balls(deployment: Deployment, frame: Frame) -> list[str]:
-    """What is not in quarantine is in the world and no faster than the model promises."""
+    """Entities outside of quarantine are in the world and within the model's speed limit."""
     table = deployment.table
     margin, limit = table.rules.out_margin, table.ball.speed_limit
     found = []

@@ -126,7 +126,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--seed", "-1"), 2, "seed: "),
         (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT), 'nowhere:x'"),
         (("--listen", "127.0.0.1:65535"), 2, "no room for 2 ports"),
-        (("--listen", "0.0.0.0"), 3, "say --insecure to mean it"),
+        (("--listen", "0.0.0.0"), 3, "or --insecure to allow it"),
         (("--run", "Über"), 2, "--run: a name is a lower case letter, then"),
         (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
         (
@@ -290,7 +290,7 @@ def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Comman
     done = command("up", TABLE, "--pki", folder, "--insecure")
     assert done.code == 2 and "--insecure and --pki exclude each other" in done.err
     done = command("up", TABLE, "--listen", "tls/127.0.0.1")
-    assert done.code == 2 and "needs certificates: say where they are by --pki DIR" in done.err
+    assert done.code == 2 and "needs certificates: give their folder by --pki DIR" in done.err
     done = command("up", TABLE, "--listen", "tcp/127.0.0.1:7400", "--pki", folder)
     assert done.code == 2 and "nearest is tls/127.0.0.1:7400" in done.err
     assert not runs_folder().exists(), "nothing was started"

@@ -37,7 +37,7 @@ def test_this_machine_alone_reaches_a_loopback_address(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["0.0.0.0", "[::]:5", "192.168.1.4:5", "lab-3.example.org", "localhost.example.org"])
 def test_what_others_reach_has_to_be_meant(text: str) -> None:
-    with pytest.raises(Insecure, match="say --insecure to mean it"):
+    with pytest.raises(Insecure, match="or --insecure to allow it"):
         check_listen(text, insecure=False)
     assert check_listen(text, insecure=True) == parse_address(text)
 

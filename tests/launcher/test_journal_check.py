@@ -123,7 +123,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 ) -> None:
     where = damage(folder, stem, 30)
     text = refused(folder)
-    assert text.startswith(f"run rehearsal cannot go on: {where} behind it; tick "), text
+    assert text.startswith(f"run rehearsal cannot be resumed: {where} behind it; tick "), text
     told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
     assert told is not None and 10 < int(told[1]) <= 30
     words = shlex.split(told[2])
@@ -149,7 +149,7 @@ def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: Run
     next(records)
     path.write_bytes(path.read_bytes()[: records.valid_bytes - 1])
     what = f"no file of the journal of supervisor in {folder.journals} has a whole record"
-    assert refused(folder).startswith(f"run rehearsal cannot go on: {what}. A new run begins")
+    assert refused(folder).startswith(f"run rehearsal cannot be resumed: {what}. A new run begins")
 
 
 def test_what_helps_is_said_where_there_is_no_capture(folder: RunFolder, tmp_path: Path) -> None:

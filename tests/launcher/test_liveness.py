@@ -53,7 +53,7 @@ def test_a_supervisor_that_never_listens_has_the_time_of_a_start() -> None:
     for started_s in (0.0, 1000.0):
         watch.started(started_s)
         assert watch.why_killed(started_s + START_S - 0.1) == ""
-        said = "it had not said where it listens within 60 s (deadlines.start)"
+        said = "it had not published its address within 60 s (deadlines.start)"
         assert watch.why_killed(started_s + START_S) == said
 
 

@@ -133,9 +133,9 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
     folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
     problems = {
         "whole": "",
-        "supervisor gone": f"run mine has no journal to go on from in {folder.journals}",
+        "supervisor gone": f"run mine has no journal to resume from in {folder.journals}",
         "supervisor": f"{left.journal(SUPERVISOR)}: byte ",
-        "no journal": f"run mine cannot go on: {left.journal(SUPERVISOR)}: no journal of this version",
+        "no journal": f"run mine cannot be resumed: {left.journal(SUPERVISOR)}: no journal of this version",
         "vhub gone": f"the vHub's journal is gone from {folder.journals}",
         "vhub": f"{left.journal(VHUB)}: ",
         "capture": f"{capture}: no MCAP file",
@@ -174,7 +174,7 @@ def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_tha
     plan, folder = make_plan(RunOptions(TABLE, sets=("engine=pure",))), left.folder
     settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
     damage(left.journal(SUPERVISOR))
-    with pytest.raises(Refused, match=r"run mine cannot go on: .*head of the file is damaged"):
+    with pytest.raises(Refused, match=r"run mine cannot be resumed: .*head of the file is damaged"):
         history_of(settings, plan.deployment, folder, records)
     left.journal(SUPERVISOR).write_bytes(b"")
     begun = history_of(settings, plan.deployment, folder, records)

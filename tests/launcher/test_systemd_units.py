@@ -142,7 +142,7 @@ def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
 
 def test_hosts_have_to_reach_the_supervisor() -> None:
     file = DEPLOY / "cluster.yaml"
-    with pytest.raises(Refused, match="say --insecure to mean it"):
+    with pytest.raises(Refused, match="or --insecure to allow it"):
         make_plan(RunOptions(file))
 
     def check(listen: str, *sets: str) -> None:

@@ -62,7 +62,7 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     assert ends() == 8, "once for the word, and once again after the first wait"
     up._start_wanted({"red": 1, "blue": 1})
     assert ends() == 9, "a word is heard once"
-    assert said.getvalue().count("starts again in 0.5 s") == 2
+    assert said.getvalue().count("restarts in 0.5 s") == 2
     up._launcher.close()
 
 

@@ -320,7 +320,7 @@ def test_an_epoch_of_before_is_no_answer_to_a_supervisor_that_was_started_again(
             losses.append(traced.now_ns)
             bus, epoch = systems[0].bus, systems[0].supervisor.state.epoch_payload
             bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, epoch, bus.now_ns)
-            bus.cut_off(channels.VHUB, bus.now_ns + MS, hears=False)
+            bus.cut_off(channels.VHUB, bus.now_ns + MS, input_=False)
 
     def restart(system: System) -> None:
         systems.append(system)

@@ -161,7 +161,7 @@ def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
             readies.append(traced.now_ns)
             if len(readies) == 1:
                 bus, last = systems[0].bus, epochs[-1]
-                bus.cut_off("n2", traced.now_ns + 1, hears=False)
+                bus.cut_off("n2", traced.now_ns + 1, input_=False)
                 bus.put(SUPERVISOR, channels.EPOCH, last.name, last.payload, traced.now_ns)
 
     faults = [(100, systems.append), (100, pause("n2", 1_500))]

@@ -158,7 +158,7 @@ def test_a_cut_of_the_vhubs_host_costs_no_client(hears: bool, says: bool, pace: 
 
     def cut(system: System) -> None:
         until_ns = system.bus.now_ns + 3_000 * MS
-        system.bus.cut_off(VHUB, until_ns, says=not says, hears=not hears)
+        system.bus.cut_off(VHUB, until_ns, output=not says, input_=not hears)
         system.later(1_100 * MS, partial(lose_clients, system))
         system.later(1_200 * MS, partial(system._hub_hears, False))
         system.later(1_200 * MS, partial(system._supervisor_sees_gone, VHUB))

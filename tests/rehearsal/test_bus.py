@@ -40,10 +40,10 @@ def say(bus: Bus, *names: str) -> list[tuple[int, str]]:
 
 def test_a_process_is_cut_off_one_way_or_both(bus: Bus) -> None:
     assert say(bus, "n1", "n2") == [(NOW_NS, "n2"), (NOW_NS, "n1")]
-    bus.cut_off("n1", UNTIL_NS, hears=False)
+    bus.cut_off("n1", UNTIL_NS, input_=False)
     assert say(bus, "n1", "n2") == [(NOW_NS, "n1")]
     bus.heal()
-    bus.cut_off("n1", UNTIL_NS, says=False)
+    bus.cut_off("n1", UNTIL_NS, output=False)
     assert say(bus, "n1", "n2") == [(NOW_NS, "n2")]
     bus.cut_off("n1", UNTIL_NS)
     assert say(bus, "n1", "n2") == []

@@ -245,7 +245,7 @@ def test_a_supervisor_that_was_started_again_knows_no_lease_and_tells_the_vhub_s
 def test_a_vhub_that_has_missed_that_nobody_looks_is_told_again() -> None:
     run = Run().at(20, "watch", links=[LINK]).at(60, "watch")
     bus = run.system.bus
-    run.do(60, lambda: bus.cut_off(channels.VHUB, bus.now_ns + 1, says=False)).go()
+    run.do(60, lambda: bus.cut_off(channels.VHUB, bus.now_ns + 1, output=False)).go()
     assert [watched.links for watched in run.told] == [[LINK], [], []]
     assert not run.system.hub.watching.links
 

@@ -61,15 +61,15 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert folder.result() is None
     flip(folder.journals, channels.VHUB)
     with pytest.raises(
-        Refused, match=r"run far cannot go on: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@last"
+        Refused, match=r"run far cannot be resumed: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@last"
     ):
         plan_again(folder)
     flip(folder.journals, channels.VHUB)
     (journal,) = journal_files(folder.journals, channels.VHUB)
     journal.rename(journal.with_suffix(".away"))
     code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
-    why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}. A new run begins with the last "
-    why += f"captured frame: foosim-supervisor up {house.table} "
+    why = f"run far cannot be resumed: the vHub's journal is gone from {folder.journals}. A new run begins with the "
+    why += f"last captured frame: foosim-supervisor up {house.table} "
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
     assert last_json(out)["capture"] == str(house.folder / "far.mcap")
     journal.with_suffix(".away").rename(journal)
@@ -97,7 +97,7 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     shutil.copytree(folder.journals, house.folder / "whole")
     tear(folder.journals, channels.VHUB, 60)
     code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
-    assert code == 1 and folder.result() is None and "goes on with it" not in err
+    assert code == 1 and folder.result() is None and "resumes it" not in err
     told = re.fullmatch(
         r".*: vhub has lost the end of its journal: it ends at tick (\d+), deliveries are known up to tick (\d+)\. "
         r"A new run begins with the last captured frame: (.*)",

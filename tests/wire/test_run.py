@@ -183,7 +183,7 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
     said, _, where = content["reason"].partition(": SystemExit: 0 ")
     assert (code, content["failed"], where) == (1, True, place), err
     assert said.startswith("player-red failed at tick ") and content["reason"] in err
-    assert "player-blue was killed by SIGKILL" in err and "starts again in 0.5 s" in err
+    assert "player-blue was killed by SIGKILL" in err and "restarts in 0.5 s" in err
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     log = (run / "logs" / "player-red.log").read_text()
     assert "Traceback (most recent call last):" in log and "LookupError: tripped" in log

@@ -44,7 +44,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation, "--pki", stranger)
     assert code == 3 and "its certificate is not accepted here" in error
     code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation)
-    assert code == 2 and "needs certificates: say where they are by --pki DIR" in error
+    assert code == 2 and "needs certificates: give their folder by --pki DIR" in error
     code, _, error = house.ask("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
     assert code == 3 and "has no certificate of node.green; it has: client.hand, node.blue" in error
     control.down()
