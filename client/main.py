@@ -63,7 +63,7 @@ class PlayerProcess:
         self._loop.show_progress(progress)
         self._loop.turn = self._turn
         self._loop.on_alive, self._loop.stood = self._on_alive, self.crew.rest
-        for wire in self._absent:  # who is alone waits for its downlinks itself; of several queues nobody can
+        for wire in self._absent:  # a single player waits for its downlinks itself; several queues cannot be waited for
             wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
         self._absent[0].watch_alive(VHUB)
 
@@ -72,7 +72,7 @@ class PlayerProcess:
         try:
             self._loop.run(lambda: self.stopped or self.crew.is_over)
         except PlayerError:
-            self._loop.perform()  # the vHub is told, and the log has where
+            self._loop.perform()  # the vHub has the reason, the log the place
             raise
         code = self.crew.leave()
         self._loop.perform()
@@ -90,7 +90,7 @@ class PlayerProcess:
         self.crew.step(now_ns)
 
     def _be_present(self) -> None:
-        """Show who has been let in."""
+        """Report the players that were admitted."""
         welcome = {core.name for core in self.crew.cores if core.deployment is not None}
         for wire in self._absent:
             if wire.name in welcome:
@@ -110,7 +110,7 @@ class Fleet:
         self._players = players
 
     def run(self) -> int:
-        """Take part until the end; return the greatest exit code. Raises what a player that failed raised."""
+        """Take part until the end; return the greatest exit code. Raises the error of a player that failed."""
         with ThreadPoolExecutor(len(self._players)) as pool:
             running = [pool.submit(player.run) for player in self._players]
             for ended in as_completed(running):
@@ -132,7 +132,7 @@ def run_players(
 ) -> int:
     """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
 
-    Raises Refused when there is nobody to connect to, PlayerError when a class cannot be loaded or fails.
+    Raises Refused when no vHub can be reached, PlayerError when a class cannot be loaded or fails.
     """
     for name in names:
         if not is_name(name):
