@@ -1,4 +1,4 @@
-"""Client library: what a controller's author imports.
+"""Client library: the public API for controllers.
 
 `connect` (in `client`) is for programs and people; `player` and `players` for controllers that `up` starts.
 """

@@ -1,8 +1,8 @@
 """Imports the classes of players before a run begins, in a process that may fail.
 
-A module of somebody's own may print, raise, exit, crash or hang when it is imported. So a fork of this process imports
-it: it has the interpreter and what this one has imported already, which costs milliseconds, and whatever happens in it
-stays there. What it prints goes to standard error. Classes of foosim are imported here.
+A user's module may print, raise, exit, crash or hang when it is imported. So a fork of this process imports it: the
+fork inherits the imported modules, costs milliseconds, and isolates failures. Its output goes to standard error.
+Classes of foosim are imported here.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ BLOCK_BYTES: Final = 1 << 16
 
 
 class Fault(NamedTuple):
-    """What is wrong with a class path, and one that might be meant."""
+    """A problem of a class path, and the path that might be meant."""
 
     problem: str
     nearest: str | None = None
 
 
 def player_findings(deployment: Deployment, names: Iterable[str], limit_s: float = inf) -> list[Finding]:
-    """Return what is wrong with the classes of these players, each at its place in the deployment.
+    """Return the problems of these players' classes, each at its place in the deployment.
 
     All modules together may take as long as `deadlines.start`, and no longer than a limit.
     """
@@ -56,7 +56,7 @@ def player_findings(deployment: Deployment, names: Iterable[str], limit_s: float
 
 
 def class_faults(paths: Iterable[str], limit_s: float, which: str = "") -> dict[str, Fault]:
-    """Return what is wrong with class paths, by path; what is right is left out. `which` names the limit."""
+    """Return the problems of class paths, by path; valid paths are left out. `which` names the limit."""
     each = sorted(set(paths))
     found = {path: _look(path) for path in each if path.startswith(OURS)}
     waiting = [path for path in each if path not in found]
@@ -82,7 +82,7 @@ def _look(path: str) -> Fault | None:
 
 
 def _forked(paths: Sequence[str], until_s: float) -> tuple[list[Fault | None], str]:
-    """Look at paths in a fork; return what it told of them before it ended, and how it ended: empty when it hung."""
+    """Check paths in a fork; return its results and how it ended: empty when it hung."""
     reading, writing = os.pipe()
     parent = os.getpid()
     child = os.fork()
@@ -148,7 +148,7 @@ def _how(status: int) -> str:
 
 
 def _tell(paths: Sequence[str], writing: int, parent: int) -> None:
-    """Look at each path and write a line of it; never return."""
+    """Check each path and write a line for it; never return."""
     code = 1
     try:
         os.setpgid(0, 0)

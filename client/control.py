@@ -45,7 +45,7 @@ _MAY: Final = {"operator": "an operator", "viewer": "a viewer or an operator"}
 
 
 class RequestRefused(Refused):
-    """The supervisor would not do it; the text says why."""
+    """The supervisor refused; the text has the reason."""
 
 
 class NoAnswer(Failed):
@@ -62,12 +62,12 @@ class Control:
         give_up: Callable[[], bool] = lambda: False,
         role: Role = "operator",
     ) -> None:
-        """Connect to the simulation plane's address; raises ConnectError when nobody is there, or at `give_up`.
+        """Connect to the simulation plane's address; raises ConnectError when it is not reachable, or at `give_up`.
 
         `credentials` are an operator's, where the run has certificates. A `viewer` (whose credentials may also be a
         viewer's) can ask for what changes nothing: status, describe, watch.
         """
-        # Under its certificate a person may speak by any name that begins with his own and a dot.
+        # A certificate permits any name that begins with its own and a dot.
         stem = f"{role}-{os.getpid()}-" if credentials is None else f"{credentials.name}."
         self._role = role
         self._name = f"{stem}{os.urandom(4).hex()[:7]}"
@@ -91,7 +91,7 @@ class Control:
     def ask(
         self, verb: str, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False, **arguments: Any
     ) -> Answer:
-        """Ask for something and return the answer. Raises RequestRefused, or NoAnswer at the timeout or at `give_up`.
+        """Send a request and return the answer. Raises RequestRefused, or NoAnswer at the timeout or at `give_up`.
 
         A supervisor that is started again meanwhile gets the same request, and gives the same answer.
         """
@@ -113,7 +113,7 @@ class Control:
         return content
 
     def describe(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
-        """Return what one has to know to read frames, as `supervisor.viewing` makes it. Raises NoAnswer."""
+        """Return the description that is needed to read frames, of `supervisor.viewing`. Raises NoAnswer."""
         content = decode_json(self.ask("describe", timeout_s, give_up).result)
         assert isinstance(content, dict), content
         return content
@@ -215,12 +215,12 @@ def add(
 
 
 def remove(name: str, run: str | None = None) -> Answer:
-    """Remove what was added."""
+    """Remove an added entity."""
     return _ask(run, "remove", name=name)
 
 
 def move(robot: str, node: str, run: str | None = None) -> Answer:
-    """Have another node own a robot; the world does not notice."""
+    """Move a robot to another node; the world does not change."""
     return _ask(run, "move", robot=robot, node=node)
 
 
@@ -251,7 +251,7 @@ def network(event: dict[str, Any], run: str | None = None) -> Answer:
 
 
 def _check_finite(what: str, numbers: Iterable[float]) -> None:
-    """Raise BadValue for a number that JSON cannot say."""
+    """Raise BadValue for a number that JSON cannot represent."""
     for number in numbers:
         if not math.isfinite(number):
             raise BadValue(f"{what}: not a finite number", number)

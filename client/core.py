@@ -1,10 +1,10 @@
-"""The core of a client: takes messages and the time, and keeps its side of the talk with the vHub.
+"""The core of a client: takes messages and the time, and keeps its side of the session with the vHub.
 
-Hello until it is answered, Join until something new is heard, and again whenever nothing new has come for a second. In
-lockstep `go` is the Go that waits for an answer, and `done` answers it: stop and wait, so that a Go that comes again
-gets the same bytes again. A free-running client takes `arrivals` and sends when it likes; what it sent is kept until
-the vHub has recorded it. Downlinks are numbered: repeats are dropped, gaps counted. When the vHub is gone (`hub_gone`)
-all starts again with hello, and goes on where it was.
+Hello is repeated until it is answered, Join until a new message arrives, and again after each second without one. In
+lockstep `go` is the Go that waits for an answer, and `done` answers it: stop and wait, so that a repeated Go gets the
+same bytes again. A free-running client takes `arrivals` and sends at any time; its packets are kept until the vHub has
+recorded them. Downlinks are numbered: repeats are dropped, gaps counted. When the vHub is gone (`hub_gone`) the session
+restarts with hello and resumes at its numbers.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 
 AGAIN_NS: Final = 200_000_000
-"""After how long hello is said again; a Join's wait doubles from there, up to a second."""
+"""Period of a repeated hello, and first back-off of a repeated Join, which doubles up to a second."""
 AWAY_AGAIN_NS: Final = 50_000_000
-"""The same while the vHub is gone: the run waits for who comes back."""
+"""The same while the vHub is gone: the run waits for returning clients."""
 NEVER_NS: Final = limits.COUNTER_MAX
 GAPS_KEPT: Final = 1024
-"""How many numbers of missing downlinks are remembered, so that a late one is told from a repeat."""
+"""Numbers of missing downlinks that are kept, to distinguish a late one from a repeat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class ClientStatistics:
 
 
 class ClientCore:
-    """One client's state machine. `actions` is what the shell performs next."""
+    """One client's state machine. `actions` are those that the shell performs next."""
 
     def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
         """`world` is empty when the client takes whatever world it finds."""
@@ -84,7 +84,7 @@ class ClientCore:
         self.refusal = ""
         self.go: Go | None = None
         self.arrivals: deque[Received] = deque()
-        """What has reached a free-running client and was not taken yet, in order."""
+        """Packets that have reached a free-running client and were not taken yet, in order."""
         self.tick = -1
         """The newest tick that the vHub has named."""
         self.ended = False
@@ -99,7 +99,7 @@ class ClientCore:
         self._join: Join | None = None
         self._lost_ns = NEVER_NS
         self._gone = 0
-        """How often the vHub was gone. What one of before said to a hello of before is no answer."""
+        """Number of losses of the vHub. An answer to a hello from before the last one is ignored."""
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
         self._period = self._offset = 0
@@ -123,7 +123,7 @@ class ClientCore:
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; what does not fit is counted and dropped."""
+        """Handle one message; an invalid one is counted and dropped."""
         self._now_ns = max(self._now_ns, now_ns)
         try:
             if name != self.name:
@@ -138,7 +138,7 @@ class ClientCore:
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def wake(self, now_ns: int) -> None:
-        """Say again what has not been answered, when it is due."""
+        """Repeat unanswered messages that are due."""
         self._now_ns = max(self._now_ns, now_ns)
         if now_ns >= self._lost_ns:
             self.lost, self._lost_ns = True, NEVER_NS
@@ -154,7 +154,7 @@ class ClientCore:
 
     @property
     def _hello_ns(self) -> int:
-        """When hello or Join is said next."""
+        """When hello or Join is sent next."""
         waits = self.welcome is None or self.is_away or self._join is not None
         return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
 
@@ -163,7 +163,7 @@ class ClientCore:
         return min(self._hello_ns, self._lost_ns, self._resend_ns)
 
     def hub_gone(self, now_ns: int) -> None:
-        """The vHub's presence has ended: say hello until it is back. What is sent meanwhile is kept."""
+        """The vHub's presence has ended: repeat hello until it is back. Packets sent meanwhile are kept."""
         if self.deployment is None or self.ended:
             return
         self._gone += 1
@@ -181,7 +181,7 @@ class ClientCore:
             self._again_ns = now_ns
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The client's own loop stood still for so long: the vHub could not come back to it (`standstill`)."""
+        """Exclude a standstill of the client's own loop from the vHub's deadline (`runtime.standstill`)."""
         if self._lost_ns != NEVER_NS and self.deployment is not None:
             self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._patience_ns(self.deployment))
 
@@ -205,7 +205,7 @@ class ClientCore:
         offset_ticks: int = 0,
         arrivals: Iterable[tuple[str, str]] = (),
     ) -> None:
-        """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
+        """Take part: in lockstep every `period_ticks`, or free-running with 0; subscribe to these (endpoint, channel).
 
         Its ticks are those that leave the remainder `offset_ticks`, which is below the period. With `arrivals`, which
         are some of what it hears, they are those at which a packet of these arrives, or a period has passed.
@@ -228,7 +228,7 @@ class ClientCore:
         self._again_ns = self._now_ns + AGAIN_NS
 
     def done(self, packets: Sequence[Outgoing]) -> None:
-        """Answer the Go that waits, with what is sent at its tick. Raises UnknownName or PacketError, and waits on."""
+        """Answer the open Go with the packets of its tick. Raises UnknownName or PacketError, and the Go stays open."""
         assert self.go is not None and self.deployment is not None, "nothing to answer"
         # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
         sent = self._numbered(packets, self.go.tick * self.deployment.tick_ns)
@@ -266,7 +266,7 @@ class ClientCore:
             self._publish(encode(Up(self.name, self.boot, part)))
 
     def fail(self, reason: str, trace: str = "") -> None:
-        """Say that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
+        """Report that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
         if trace:
             self.actions.append(Say("error", trace))
         self.actions.append(Say("error", reason))
@@ -294,7 +294,7 @@ class ClientCore:
         self._downlink = welcome.downlink
 
     def _return(self, welcome: ClientWelcome, before: ClientWelcome) -> None:
-        """Go on with a vHub that is back: join as before, and send what it has not recorded."""
+        """Resume with a vHub that is back: join as before, and send the packets that it has not recorded."""
         if welcome.run != before.run:
             self._refused(f"the vHub is back with run {welcome.run}, this client was in {before.run}")
             return
@@ -368,7 +368,7 @@ class ClientCore:
         self._overflowed += max(0, len(down.packets) - room)
 
     def _is_new(self, downlink: Go | Down) -> bool:
-        """Whether a downlink has not come before; one that nobody asked for is refused."""
+        """Whether a downlink is new; one that was not requested is refused."""
         if self.welcome is None:
             raise Malformed("a downlink before the welcome")
         if downlink.number > self._downlink or downlink.number in self._gaps:
@@ -406,7 +406,7 @@ class ClientCore:
         ]
 
     def _recorded(self, sequence: int) -> None:
-        """Forget what the vHub has recorded."""
+        """Drop the packets that the vHub has recorded."""
         kept = self._unrecorded
         if kept and kept[0].sequence <= sequence:
             self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX
@@ -416,7 +416,7 @@ class ClientCore:
             self._resend_ns = NEVER_NS
 
     def _resend(self, whole: bool) -> None:
-        """Send again what is not recorded: all of it, or the first message's worth."""
+        """Repeat the packets that are not recorded: all, or as many as fit one message."""
         for part in split(self._unrecorded, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part)))
             if not whole:

@@ -1,4 +1,4 @@
-"""What can be wrong on a client's side, as typed errors whose text names the valid choices."""
+"""Errors of a client, whose text names the valid choices."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class ConnectionRefused(Refused):
 
 
 class ConnectionFailed(Refused):
-    """Nobody answered at the address, or the connection to the vHub is gone."""
+    """No answer at the address, or the connection to the vHub is gone."""
 
 
 class NotJoined(Refused):
-    """Something was asked of a client that needs `lockstep` or `listen` first, or that cannot follow it."""
+    """A call that needs `lockstep` or `listen` first, or that cannot follow it."""
 
     exit_code = 2
 
 
 class RunEnded(Refused):
-    """The run is over: nothing can be sent, and nothing comes any more."""
+    """The run is over: nothing can be sent or received."""

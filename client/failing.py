@@ -1,4 +1,4 @@
-"""What is said of a player whose own code raised: who, when, what, and where in the user's own files."""
+"""Error reports of players whose own code raised: player, time, error, and the place in the user's files."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Unanswered(BaseException):
 
 
 def failed(where: str, error: BaseException, module: str) -> PlayerFailed:
-    """Return what ends a player of the class of `module`; `where` says who failed and when."""
+    """Return the error that ends a player of the class of `module`; `where` has the player and the time."""
     return PlayerFailed(f"{where}: {describe(error)}{place_of(error, module)}", _trace_of(error))
 
 
 def tell_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
-    """Have a player's core say why its process ends."""
+    """Make a player's core report why its process ends."""
     trace = error.trace if isinstance(error, PlayerFailed) else ""
     core.fail(str(error), _trace_of(error) if isinstance(error, Unanswered) else trace)
 
@@ -48,7 +48,7 @@ def _trace_of(error: BaseException) -> str:
 
 
 def describe(error: BaseException) -> str:
-    """An error of somebody's own code on one line, bounded."""
+    """An error of user code on one line, bounded."""
     kind, text = type(error).__name__, "its text cannot be made"
     with suppress(Exception):  # the user's own code, too
         said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it

@@ -1,4 +1,4 @@
-"""Finds the class that a deployment names as `module:Class`, and says what is wrong with it without calling it."""
+"""Finds the class that a deployment names as `module:Class`, and checks it without calling it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN_MAX: Final = 100
 
 
 class ClassPathError(PlayerError):
-    """A class path that leads to no player: `problem` says why, `nearest` is one that might be meant."""
+    """A class path that leads to no player: `problem` is the reason, `nearest` a path that might be meant."""
 
     def __init__(self, path: str, problem: str, nearest: str | None = None) -> None:
         super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest!r}" if nearest else ""))
@@ -36,7 +36,7 @@ class ClassPathError(PlayerError):
 
 
 def load_player(path: str) -> Callable[..., Any]:
-    """Import the class that `module:Class` names and return it. Raises ClassPathError, which says what is wrong."""
+    """Import the class that `module:Class` names and return it. Raises ClassPathError."""
     module_name, colon, class_name = path.partition(":")
     if not (module_name and colon and class_name):
         raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
@@ -71,7 +71,7 @@ def _import(path: str, name: str) -> ModuleType:
 
 
 def _not_found(path: str, missing: str) -> ClassPathError:
-    """Return what is said of a path whose module, or a package of it, cannot be found."""
+    """Return the error for a path whose module, or a package of it, cannot be found."""
     parent, dot, last = missing.rpartition(".")
     if dot:
         folders: Iterable[str] | None = getattr(sys.modules.get(parent), "__path__", None)
@@ -110,7 +110,7 @@ def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:
     """Return what something takes that cannot be called with these arguments; empty where it can, or may."""
     try:
         signature = inspect.signature(call)
-    except (ValueError, TypeError):  # of C code that does not tell
+    except (ValueError, TypeError):  # of C code without a signature
         return ""
     try:
         signature.bind(*arguments)

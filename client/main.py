@@ -67,7 +67,7 @@ class PlayerProcess:
         try:
             self._loop.run(lambda: self._shell.stopped or self.crew.is_over)
         except PlayerError:
-            self._loop.perform()  # the vHub is told, and the log has where
+            self._loop.perform()  # the vHub has the reason, the log the place
             raise
         code = self.crew.leave()
         self._loop.perform()
@@ -84,7 +84,7 @@ class PlayerProcess:
         self.crew.step(now_ns)
 
     def _be_present(self) -> None:
-        """Show who has been let in."""
+        """Report the players that were admitted."""
         welcome = {core.name for core in self.crew.cores if core.deployment is not None}
         for wire in self._absent:
             if wire.name in welcome:
@@ -104,7 +104,7 @@ class Fleet:
         self._players = players
 
     def run(self) -> int:
-        """Take part until the end; return the greatest exit code. Raises what a player that failed raised."""
+        """Take part until the end; return the greatest exit code. Raises the error of a player that failed."""
         with ThreadPoolExecutor(len(self._players)) as pool:
             running = [pool.submit(player.run) for player in self._players]
             for ended in as_completed(running):
@@ -126,7 +126,7 @@ def run_players(
 ) -> int:
     """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
 
-    Raises Refused when there is nobody to connect to, PlayerError when a class cannot be loaded or fails.
+    Raises Refused when no vHub can be reached, PlayerError when a class cannot be loaded or fails.
     """
     for name in names:
         if not is_name(name):

@@ -1,6 +1,6 @@
-"""What a client may send and hear, as far as the deployment tells: checked before it leaves.
+"""Checks packets and subscriptions against the deployment before a client sends them.
 
-The vHub refuses and counts what does not fit; here the sender is told.
+The vHub refuses and counts invalid ones; these checks raise an error at the sender.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def check_packet(deployment: Deployment, packet: Outgoing) -> None:
 def check_subscription(deployment: Deployment, source: str, channel: str) -> None:
     """Raise UnknownName unless the deployment has this endpoint and, if it is a robot, the robot this channel to hear.
 
-    Players and clients say what they like, on channels of any name; raises PacketError for what cannot be one.
+    Players and clients may use channels of any valid name; raises PacketError for an invalid one.
     """
     if source in deployment.players or source in deployment.clients:
         _check_channel(channel)

@@ -1,7 +1,7 @@
-"""Players: what a controller's class looks like, and the loop that runs it.
+"""Players: the interface of a controller's class, and the loop that runs it.
 
 A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
-robots it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
+robots that it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
 process `foosim-player` and the rehearsal run this same loop.
 """
 
@@ -38,18 +38,18 @@ class Sample(NamedTuple):
 
 
 Samples = Mapping[tuple[str, str], Sample]
-"""The newest sample of each (endpoint, channel) that has arrived up to now; what has not come yet is absent."""
+"""The newest sample of each (endpoint, channel) so far; a channel without one is absent."""
 Commands = Mapping[str, Command]
-"""What each rod shall do, by name; a robot that is left out keeps its last command."""
+"""Commands by robot name; a robot without one keeps its last command."""
 Drives = Mapping[str, Drive]
 """The same for rovers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What a player does at a tick that also speaks: its commands, and packets to others in the order of sending.
+    """Result of a player that also sends packets: its commands, and the packets in the order of sending.
 
-    A packet without a destination is a broadcast to all that hear the player's channel.
+    A packet without a destination is a broadcast to all subscribers of the player's channel.
     """
 
     commands: Commands | Drives
@@ -71,17 +71,17 @@ PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
 
 
 class Newest:
-    """Keeps the newest sample of each channel that is heard; what was sent later may have come earlier."""
+    """Keeps the newest sample of each channel by sending time; packets may arrive out of order."""
 
     def __init__(self, kinds: Mapping[tuple[str, str], str]) -> None:
-        """`kinds` is the kind of what each (endpoint, channel) carries; packets of others are passed over."""
+        """`kinds` is the payload kind of each (endpoint, channel); packets of others are ignored."""
         self.samples: dict[tuple[str, str], Sample] = {}
         self.malformed = 0
         """Samples that did not fit their channel."""
         self._kinds = kinds
 
     def take(self, packets: Iterable[Received]) -> None:
-        """Take packets as they came."""
+        """Take packets in order of arrival."""
         for packet in packets:
             pair = (packet.source, packet.channel)
             kind = self._kinds.get(pair)
@@ -109,9 +109,9 @@ class PlayerLoop:
         self._period_ns = 0
 
     def step(self, now_ns: int) -> None:
-        """Do what can be done now: begin after the welcome, then act when it is the player's turn.
+        """Advance: begin after the welcome, then act at each Go or period.
 
-        Raises PlayerError for a player that cannot be loaded, fails, or commands what it must not.
+        Raises PlayerError for a player that cannot be loaded, fails, or gives an invalid command.
         """
         core = self.core
         if core.deployment is None or core.ended:
@@ -169,7 +169,7 @@ class PlayerLoop:
             raise failed(f"{self.core.name} failed {when}", error, _module_of(declared)) from error
 
     def _say(self, tick: int, now_ns: int) -> None:
-        """Have the player act, and say it."""
+        """Call the player and send its packets."""
         core, packets = self.core, self._act(tick)
         try:
             if core.go is not None:
@@ -180,7 +180,7 @@ class PlayerLoop:
             raise PlayerError(f"{core.name} failed at tick {tick}: {error}") from error
 
     def _act(self, tick: int) -> list[Outgoing]:
-        """Ask the player, and check what it says and commands; commands are last, in the robots' name order."""
+        """Call the player and check its packets and commands; commands are last, in the robots' name order."""
         assert self._player is not None and self._declaration is not None
         where = f"{self.core.name} failed at tick {tick}"
         try:
@@ -194,7 +194,7 @@ class PlayerLoop:
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
 
     def _packets(self, packets: object, where: str) -> list[Outgoing]:
-        """Return what the player says to others, and to its robots on channels of theirs."""
+        """Return the player's packets to others, and to its robots' channels."""
         deployment, declared = self.core.deployment, self._declaration
         assert deployment is not None and declared is not None
         if not isinstance(packets, Sequence) or not all(isinstance(packet, Outgoing) for packet in packets):
@@ -233,7 +233,7 @@ class PlayerLoop:
 
 
 def _by_name(item: tuple[object, object]) -> str:
-    """Orders what a player gave, also when it is no name."""
+    """Sort key of a command's name, which may have any type."""
     return str(item[0])
 
 

@@ -1,7 +1,7 @@
-"""The players that share a session, as one core: what comes is that player's whom it names, and all speak together.
+"""The players that share a session, as one core: messages are routed by name, and all send together.
 
-So they have one loop and one thread: players that are due at the same tick would take the interpreter from each other
-at every message. To the run each of them is what it would be alone.
+They have one loop and one thread: threads of players that are due at the same tick would compete for the interpreter
+at every message. For the run each of them is a separate player.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foosim.runtime.command import DONE, FAILED, REFUSED
 
 
 class Crew:
-    """One core out of several. `actions` is what the shell performs next; `step` after every message and wake."""
+    """One core out of several. `actions` are for the shell; `step` after every message and wake."""
 
     def __init__(self, cores: Sequence[ClientCore], load: Callable[[str], PlayerFactory] = load_player) -> None:
         assert cores, "a crew of nobody"
@@ -27,12 +27,12 @@ class Crew:
         self.cores = tuple(cores)
         self._players = {core.name: PlayerLoop(core, load) for core in cores}
         self._stirred: dict[str, PlayerLoop] = {}
-        """Those for whom something has come since the last step, in that order."""
+        """Players with a message since the last step, in that order."""
 
     # --- what the shell calls ----------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Hand a message to whom it names; of what names nobody here the first one keeps the account."""
+        """Hand a message to the player that it names; the first player counts those with unknown names."""
         player = self._players.get(name)
         if player is None:
             player = self._players[self.cores[0].name]
@@ -40,13 +40,13 @@ class Crew:
         self._stirred[player.core.name] = player
 
     def wake(self, now_ns: int) -> None:
-        """Say again what has not been answered, when it is due."""
+        """Repeat unanswered messages that are due."""
         for core in self.cores:
             core.wake(now_ns)
         self._stirred = dict(self._players)
 
     def step(self, now_ns: int) -> None:
-        """Let those act whose turn it is. Raises PlayerError for the first one that fails; the vHub is told why."""
+        """Let the players in turn act. Raises PlayerError for the first one that fails; the vHub gets the reason."""
         stirred, self._stirred = self._stirred, {}
         for player in stirred.values():
             try:
@@ -58,7 +58,7 @@ class Crew:
                 self._speak(player.core)
 
     def _speak(self, core: ClientCore) -> None:
-        """Take what a core has to say; of several, a line for people says whose it is."""
+        """Take a core's actions; with several cores, a log line has the player's name."""
         if len(self.cores) == 1:
             self.actions += core.actions
         else:
@@ -75,12 +75,12 @@ class Crew:
         self._stirred = dict(self._players)
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The loop of all of them stood still for so long."""
+        """Report a standstill of the shared loop to each player."""
         for core in self.cores:
             core.rest(stood_ns, now_ns)
 
     def deadline_ns(self) -> int:
-        """When `wake` has something to do next, or somebody acts."""
+        """When `wake` is due next, or a player acts."""
         return min(min(player.core.deadline_ns(), player.deadline_ns()) for player in self._players.values())
 
     # --- the end -----------------------------------------------------------------------------------------------------
@@ -92,7 +92,7 @@ class Crew:
         return all(core.ended for core in cores) or any(core.lost or core.refusal for core in cores)
 
     def leave(self) -> int:
-        """Say who has lost the vHub; return the exit code."""
+        """Report the players that have lost the vHub; return the exit code."""
         for core in self.cores:
             if core.lost:
                 core.actions.append(Say("error", "lost the vHub"))

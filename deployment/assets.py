@@ -21,7 +21,7 @@ from foosim.world.mesh import AssetError, digest_of
 from foosim.world.scenery import SceneryMesh, path_problem
 
 _COMPONENT = os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC
-_FILE = _COMPONENT | os.O_NONBLOCK  # a pipe that nobody writes to would be waited for
+_FILE = _COMPONENT | os.O_NONBLOCK  # a pipe without a writer would block
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
@@ -91,7 +91,7 @@ def _read_file(root: int, prefix: str, path: str) -> bytes:
 
 
 def _reason(error: OSError) -> str:
-    """What kept a component from being opened. A link is no folder, and as the last component one too many."""
+    """The error of a component that was not opened. A link is neither a folder nor a file."""
     if error.errno in (errno.ELOOP, errno.ENOTDIR):
         return "a symbolic link, or no folder, on the way; neither is followed"
     return error.strerror or str(error)

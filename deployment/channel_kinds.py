@@ -1,4 +1,4 @@
-"""What kind of payload the channels of a deployment's endpoints carry."""
+"""The payload kinds of the channels of a deployment's endpoints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one field of a deployment cannot know: whether names refer to something, and whether numbers fit together.
+"""Checks between the fields of a deployment: references to names, and numbers that depend on each other.
 
 It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
 one go: whatever is missing or malformed is passed over here, since the schema reports it. deployment_file.py turns
@@ -17,7 +17,7 @@ from foosim.common.errors import BadValue, show
 from foosim.common.finding import Finding, Location
 from foosim.common.names import LINE_NAMES, nearest_name
 
-# Bounds of what is looked at; what is beyond them, the schema refuses.
+# Bounds of the checks; the schema refuses larger values.
 TEXTS_MAX: Final = 4096
 
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
@@ -30,7 +30,7 @@ BODILESS: Final = "camera"
 
 
 def check_references(data: object) -> Iterator[Finding]:
-    """All problems between the parts of a deployment's plain data, found as they are asked for."""
+    """All problems between the parts of a deployment's plain data, found lazily."""
     view = View(data)
     between = (_names, _people, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
     for check in (_world, *between, _lines, _shapes, _hall, _scenery):
@@ -54,7 +54,7 @@ def path_text(location: Location) -> str:
 
 
 class View:
-    """Tolerant access to plain data: what is not of the expected kind looks empty."""
+    """Tolerant access to plain data: a value of an unexpected kind reads as empty."""
 
     def __init__(self, data: object) -> None:
         self.data = data
@@ -80,7 +80,7 @@ class View:
         return value if isinstance(value, dict) else {}
 
     def texts(self, *path: str | int) -> list[tuple[int, str]]:
-        """The texts of a list, or the single text that may stand for it, with their indices."""
+        """The texts of a list, or the single text in place of it, with their indices."""
         value = self.get(*path)
         items = value if isinstance(value, list) else [value]
         return [(index, item) for index, item in enumerate(items[:TEXTS_MAX]) if isinstance(item, str)]
@@ -138,7 +138,7 @@ def _names(view: View) -> Iterator[Finding]:
 
 
 def _people(view: View) -> Iterator[Finding]:
-    """An operator and a viewer of one name would hear each other's answers."""
+    """An operator and a viewer of one name would receive each other's answers."""
     operators = view.get("access", "operators")
     known = operators if isinstance(operators, list) else ["admin"]
     for index, name in view.texts("access", "viewers"):
@@ -242,7 +242,7 @@ def _players(view: View) -> Iterator[Finding]:
 
 
 def _hears(view: View) -> Iterator[Finding]:
-    """What a player hears of others: selectors that match another endpoint, channels that one of these has."""
+    """A player's `hears`: selectors that match another endpoint, channels that one of these has."""
     endpoints = [*view.robots, *view.players, *view.clients] if view.robots else []
     for player in view.players if endpoints else ():
         for glob in view.mapping("players", player, "hears"):
@@ -273,7 +273,7 @@ def _on(view: View) -> Iterator[Finding]:
 
 
 def _capture(view: View) -> Iterator[Finding]:
-    """What keeps only the last lets whole files go."""
+    """`keep_last` deletes whole files."""
     last = view.get("capture", "last")
     if last is not None and all(view.get("capture", key) is None for key in ("split_size", "split_time")):
         what = "whole files are let go: needs split_size or split_time"
@@ -281,7 +281,7 @@ def _capture(view: View) -> Iterator[Finding]:
 
 
 def _deadlines(view: View) -> Iterator[Finding]:
-    """Who is late is named before it is lost."""
+    """The deadline that reports a late process is before the one that drops it."""
     try:
         named_ns = units.parse_ns(view.get("deadlines", "tick_named"))
         lost_ns = units.parse_ns(view.get("deadlines", "tick_lost"))
@@ -370,7 +370,7 @@ def _scenery(view: View) -> Iterator[Finding]:
 
 
 def _radio(view: View, radio: Location) -> Iterator[Finding]:
-    """Waves cross a material, or have a fixed loss: one of both is said."""
+    """Waves cross a material, or have a fixed loss: exactly one is given."""
     given = {key: value for key, value in view.mapping(*radio).items() if value is not None}
     if isinstance(view.get(*radio), dict) and not given.keys() & {"is", "loss"}:
         yield Finding((*radio, "is"), "missing key of a material, unless it has a loss", "is", at="missing")

@@ -1,7 +1,7 @@
-"""Events of the network that are asked for while a run goes on: from plain data to the text that an order carries.
+"""Events of the network that are requested during a run: from plain data to the text in an order.
 
-An event of a request is one of a deployment without its time: it happens at the tick of its answer. What is wrong with
-it is said as of a file, by path, value and nearest valid name.
+A requested event is a deployment's event without its time: it happens at the tick of its answer. Its problems are
+reported like those of a file, by path, value and nearest valid name.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class BadEvent(Refused):
 def event_text(deployment: Deployment, data: object, at_ns: int) -> str:
     """Return an event as JSON, without spaces; `at_ns` is the simulated time at which it would happen.
 
-    Raises BadEvent with all that is wrong with it, of what is in the deployment, too.
+    Raises BadEvent with all its problems, including references to the deployment.
     """
     if not isinstance(data, dict):
         raise BadEvent(describe("not an event, which is a mapping", data))
@@ -69,7 +69,7 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
 
 
 def _files(deployment: Deployment, event: Event) -> Iterator[Finding]:
-    """Nobody brings files with a request: it may name those that the network was made with, for the same."""
+    """A request cannot bring files: it may name those of the network, for the same use."""
     known = {(type(setting), setting.file) for _, setting in file_settings(deployment.network)}
     for _, setting in file_settings(Network(events=[event])):
         if (type(setting), setting.file) not in known or setting.digest is not None:

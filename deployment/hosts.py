@@ -1,4 +1,4 @@
-"""The machines of a run, as they stand in a deployment, and which process runs on which of them.
+"""The hosts section of a deployment, and the placement of processes on hosts.
 
 A process without a place runs on the supervisor's machine. Nothing here changes the world: where something is computed
 is not part of the experiment.
@@ -54,12 +54,12 @@ class Host(SpecBase):
 
     @property
     def destination(self) -> str:
-        """What ssh connects to."""
+        """The destination for ssh."""
         return self.ssh or self.address.strip("[]")
 
 
 class Placed(SpecBase):
-    """What runs on a host: on the one named, or on one that has the label; by default on the supervisor's machine."""
+    """The host of a process: by name or by label; by default the supervisor's machine."""
 
     host: Name | None = None
     label: Name | None = None

@@ -58,7 +58,7 @@ EARLIER_SETTINGS: Final = (("capture", "payloads"),)
 """Section and key of settings that captures of earlier formats may have in their deployments."""
 
 _kept: dict[tuple[str, str], Deployment] = {}
-"""By text and name, the one that was not asked for longest first."""
+"""By text and name, the least recently used first."""
 
 
 def load_deployment(text: str, name: str) -> Deployment:
@@ -71,7 +71,7 @@ def load_deployment(text: str, name: str) -> Deployment:
 
 
 def read_deployment(text: str, name: str) -> Deployment:
-    """What `load_deployment` returns, read from the text whatever is kept."""
+    """The result of `load_deployment`, without the cache."""
     return _check(*read_tree(text, locate_in(name)))
 
 
@@ -86,7 +86,7 @@ def load_earlier(text: str, name: str) -> Deployment:
 
 
 def _keep(text: str, name: str, deployment: Deployment) -> Deployment:
-    """Keep what a text loads to, as the one that was asked for last."""
+    """Cache a text's deployment as the most recently used."""
     while len(_kept) >= DEPLOYMENTS_KEPT:
         _kept.pop(next(iter(_kept)))
     _kept[text, name] = deployment
@@ -95,7 +95,7 @@ def _keep(text: str, name: str, deployment: Deployment) -> Deployment:
 
 @lru_cache(maxsize=TREES_KEPT)
 def _tree_of(text: str, name: str) -> tuple[Tree | None, list[Problem]]:
-    """What `read_tree` gives; nobody changes it."""
+    """The result of `read_tree`; it is not changed."""
     return read_tree(text, locate_in(name))
 
 
@@ -110,7 +110,7 @@ def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
 def _applied(text: str, name: str, sets: tuple[str, ...]) -> str:
-    """What `apply_sets` returns; who rehearses the same again pays for it once."""
+    """The result of `apply_sets`, cached for repeated rehearsals."""
     tree, problems = _tree_of(text, name)
     if tree is not None:
         tree, set_problems = place_sets(copied(tree), sets)
@@ -130,7 +130,7 @@ def _applied(text: str, name: str, sets: tuple[str, ...]) -> str:
 def load_network(text: str, name: str, sets: Sequence[str] = ()) -> Network | None:
     """The network of a file that has its `network:` section alone, after settings; None for any other file.
 
-    Raises DeploymentError with all problems of the section. Whom its selectors match is not known.
+    Raises DeploymentError with all problems of the section. The matches of its selectors are not checked.
     """
     tree, problems = read_tree(text, locate_in(name))
     if not isinstance(tree, Fields) or set(tree.values) != {"network"}:
@@ -166,7 +166,7 @@ def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:
 
 
 def refuse_findings(text: str, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
-    """Refuse what was loaded for what was found in it later, if anything was; raises DeploymentError.
+    """Raise DeploymentError for problems that were found in a loaded deployment, if any.
 
     `text`, `name` and `sets` are what it was loaded from.
     """
@@ -264,7 +264,7 @@ def _problem(tree: Tree, finding: Finding) -> Problem:
 
 
 def _place(tree: Tree, finding: Finding) -> Place:
-    """Where the value, the key, or the mapping without the key stands; the nearest thing around it if it is absent."""
+    """The place of the value, the key, or the mapping without the key; the nearest enclosing one if it is absent."""
     node, place = tree, tree.place
     for step in finding.location:
         if isinstance(node, Fields) and isinstance(step, str) and step in node.values:

@@ -1,6 +1,6 @@
-"""What one field of a deployment's `network:` cannot know: whether selectors match, and whether settings fit together.
+"""Checks between the fields of a deployment's `network:`: matches of selectors, and settings that depend on each other.
 
-Like references.py, whose findings it makes, it reads plain data and passes over what is malformed.
+Like `checks`, it reads plain data and skips malformed values.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ _LASTING: Final = ("partition", "clog", "chaos")
 
 
 def check_network(data: object) -> Iterator[Finding]:
-    """All problems of the network's section, found as they are asked for."""
+    """All problems of the network's section, found lazily."""
     view = View(data)
     endpoints = [*view.robots, *view.players, *view.clients]
     if not view.mapping("network") or not view.robots:
@@ -38,7 +38,7 @@ def check_network(data: object) -> Iterator[Finding]:
 
 
 def check_network_alone(data: object) -> Iterator[Finding]:
-    """All problems of a network's section that stands alone: whom its selectors match is not known."""
+    """All problems of a network's section without its deployment: the matches of its selectors are not checked."""
     view = View(data)
     for check in (_carriers, _links, _events):
         yield from (finding for finding in check(view, ()) if finding.what != NO_ENDPOINT)
@@ -93,7 +93,7 @@ def _phase(view: View) -> Iterator[Finding]:
 
 
 def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
-    """Who carries a radio is somewhere: it has a body, is on board of one, or has a place."""
+    """An endpoint with a radio has a body, is on board of one, or has a place."""
     carried = [glob for glob in view.mapping("network", "robots") if names.is_selector(glob)]
     places = view.mapping("network", "places")
     for endpoint in endpoints:
@@ -200,7 +200,7 @@ def _dwell(view: View, location: Location) -> Iterator[Finding]:
 
 
 def _markov4(view: View, location: Location) -> Iterator[Finding]:
-    """What leaves a state is at most certain."""
+    """The probabilities of leaving a state add up to at most 1."""
     for one, other in (("p13", "p14"), ("p31", "p32")):
         first, second = (_share(view.get(*location, key)) for key in (one, other))
         if first is not None and second is not None and first + second > 1:
@@ -249,7 +249,7 @@ def _pareto(view: View, location: Location) -> Iterator[Finding]:
 
 
 def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
-    """Each event does one thing, to what there is, for a time that it says."""
+    """Each event has one action, existing targets, and a duration."""
     rules = [rule.get("id") for rule in view.get("network", "links") or () if isinstance(rule, dict)]
     links = [name for name in rules if isinstance(name, str)]
     for number in _count(view, "events", EVENTS_MAX):
@@ -262,7 +262,7 @@ def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
 def event_findings(
     view: View, location: Location, event: Any, endpoints: Sequence[str], links: Sequence[str]
 ) -> Iterator[Finding]:
-    """What is wrong with one event, at its location."""
+    """The problems of one event, at its location."""
     actions = [key for key in ACTIONS if key in event]
     if not actions:
         yield Finding((*location, "heal"), f"missing key: one of {', '.join(ACTIONS)}", "heal", at="missing")

@@ -76,7 +76,7 @@ def nested(sets: Sequence[str]) -> dict[str, Any]:
 
 
 def _of_argument(text: str, problem: str) -> str:
-    """Say what is wrong with an argument, which is shown once."""
+    """Raise the error of an argument, with its text once."""
     line = f"KEY=VALUE: {problem}"
     return line if line.endswith(show(text)) else f"{line}, {show(text)}"
 
@@ -141,7 +141,7 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
 
 
 def _key(node: Fields, steps: Sequence[tuple[str, int]], index: int) -> tuple[str, int]:
-    """The longest key of the mapping that the path goes on with, and how many steps it takes."""
+    """The longest key of the mapping that matches the rest of the path, and its number of steps."""
     for used in range(len(steps) - index, 0, -1):
         key = ".".join(step for step, _ in steps[index : index + used])
         if key in node.values:

@@ -1,4 +1,4 @@
-"""What radios are asked for that they do not do: settings of a radio, of rules over it, of events that change these.
+"""Checks for settings that a radio does not support: its own, those of rules over it, and of events on these.
 
 What a radio says by itself is checked as plain data, like all in `network_references`; what rules ask of radios is
 checked when the network is whole, for then it is known which radio the packets of a pair go by.
@@ -26,7 +26,7 @@ _RATES: Final = {
     "lora": "a radio's bit rate is that of its `spreading_factor`",
     "lte": "a radio's bit rate is that of its signal and `bandwidth`",
 }
-"""Media with bit rates of their own, and what decides these."""
+"""Media with bit rates of their own, and the settings that decide them."""
 _OWN_HEADERS: Final = ("wifi", "ieee802154", "lora")
 _OF_MEDIUM: Final = {
     "rates": "wifi",
@@ -55,11 +55,11 @@ def unheeded(key: str, medium: str) -> str | None:
     return None
 
 
-# --- what a radio says by itself --------------------------------------------------------------------------------------
+# --- a radio's own settings -------------------------------------------------------------------------------------------
 
 
 def inherited(view: View, location: Location) -> dict[str, Any]:
-    """Return what a radio, as it is written at a location, has from its preset."""
+    """Return the preset's settings of the radio at a location."""
     preset = view.mapping(*location).get("preset", "perfect")
     return preset_settings(preset) if isinstance(preset, str) and preset in PRESETS else {}
 
@@ -71,7 +71,7 @@ def is_on_air(view: View, radio: str) -> bool:
 
 
 def radio_findings(view: View, location: Location) -> Iterator[Finding]:
-    """Return what is written of a radio that it does not do."""
+    """Return the settings of a radio that it does not support."""
     written = view.mapping(*location)
     settings = {**inherited(view, location), **written}
     medium = settings.get("medium", "none")
@@ -129,13 +129,13 @@ def _duty(location: Location, settings: Mapping[str, Any], medium: str) -> Itera
     yield Finding((*location, "duty_cycle"), what, settings["duty_cycle"])
 
 
-# --- what rules and events ask of radios ------------------------------------------------------------------------------
+# --- settings of rules and events on radios ---------------------------------------------------------------------------
 
 
 def rule_findings(network: Network, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[Finding]:
     """Return which settings of rules, and of events for them, the radios do not heed by which packets go.
 
-    `ends` are the endpoints, none where they are not known: then only what a rule says by `via` is.
+    `ends` are the endpoints, none where they are not known: then only a rule's `via` is known.
     """
     profiles = Profiles(network, carriers)
     for number, rule in enumerate(network.links):
@@ -176,7 +176,7 @@ def _asked(
 def _ways(profiles: Profiles, rule: LinkRule, ends: Sequence[str]) -> Iterator[str]:
     """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
 
-    Where there are but wires, which all heed the same, only what a rule says by `via`.
+    If there are only wires, which all support the same settings, only a rule's `via` counts.
     """
     if rule.via is not None:
         yield rule.via
@@ -192,7 +192,7 @@ def _ways(profiles: Profiles, rule: LinkRule, ends: Sequence[str]) -> Iterator[s
 
 
 def place_findings(deployment: Deployment) -> Iterator[Finding]:
-    """Return who is nowhere and yet on air, by a rule's `via` or by the defaults: it carries no radio itself."""
+    """Return the endpoints without a place or a radio of their own that use one by a rule's `via` or the defaults."""
     network, ends = deployment.network, deployment.endpoints()
     profiles = Profiles(network, deployment.carriers())
     on_air = {way for way in ("", *network.radios) if profiles.base(way).is_on_air}

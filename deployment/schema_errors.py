@@ -1,6 +1,6 @@
-"""What pydantic found wrong with a deployment's data, in the words and places of this project.
+"""Translates pydantic's errors about a deployment's data into findings with this project's texts and places.
 
-pydantic says where in the *models* a value failed: that path has union tags and markers for keys in it, which are in
+pydantic reports where in the *models* a value failed: that path has union tags and markers for keys in it, which are in
 no file. The path is followed through the JSON Schema of the deployment, which knows what each step is, and which names
 and choices are valid there.
 """
@@ -42,14 +42,14 @@ _KINDS: Final = {
     "model_attributes_type": "not a mapping",
 }
 _BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
-# pydantic says this of a field whose default depends on another one that is wrong: that one is reported anyway.
+# pydantic reports this for a field whose default depends on another one that is wrong: that one is reported anyway.
 _CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
 
 
 def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Finding]:
-    """One finding for each of pydantic's errors, worked out as they are asked for.
+    """One finding for each of pydantic's errors, computed lazily.
 
-    `under` is where in a deployment the part stands that was checked.
+    `under` is the location in the deployment of the checked part.
     """
     details = error.errors(include_url=False)
     return (_finding(detail, under) for detail in details if detail["type"] not in _CONSEQUENCES)

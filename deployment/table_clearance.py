@@ -1,4 +1,4 @@
-"""What stands in the way on a football table: scenery where rods move, figures swing or the ball is kicked off.
+"""Checks that a football table's scenery leaves room for rods, swinging figures and the kick-off.
 
 That takes geometry, so it is looked at when all single fields are right. A rod's tube and each of its figures sweep a
 cylinder about the rod's axis, over the whole stroke. Bodies are compared as convex sets: points of the one are brought
@@ -36,7 +36,7 @@ Reach = Callable[[Vector], float]
 
 @dataclass(frozen=True, slots=True)
 class _Swept:
-    """What moves, where: the box around it, and its points."""
+    """A moving body: its bounding box, and its points."""
 
     what: str
     low: Vector
@@ -71,7 +71,7 @@ def _extent(body: _Swept) -> str:
 
 
 def _swept(deployment: Deployment) -> Iterator[_Swept]:
-    """Yield what the ball at the kick-off spot, and each rod with its figures, may take up."""
+    """Yield the space of the ball at the kick-off spot, and of each rod with its figures."""
     table = deployment.table
     ball, rod = table.ball.radius, table.rod
     yield _Swept(

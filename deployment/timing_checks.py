@@ -1,6 +1,6 @@
-"""What one field of a deployment cannot know of times: rates and offsets are whole ticks, offsets below their periods.
+"""Checks of a deployment's times: rates and offsets are whole ticks, offsets are below their periods.
 
-Like references.py, whose findings it makes, it reads plain data and passes over what is malformed.
+Like `checks`, it reads plain data and skips malformed values.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from foosim.deployment.checks import View, quoted
 
 
 def check_timing(data: object) -> Iterator[Finding]:
-    """All problems of a deployment's times, found as they are asked for."""
+    """All problems of a deployment's times, found lazily."""
     view = View(data)
     yield from _clients(view)
     for player in view.players:
@@ -31,7 +31,7 @@ def check_timing(data: object) -> Iterator[Finding]:
 
 
 def _sampled(view: View) -> Iterator[Location]:
-    """What happens at ticks that its rate and offset say: sensors, and who is in lockstep."""
+    """Sensors and lockstep clients: their ticks follow from rate and offset."""
     for robot in view.robots:
         for channel in view.mapping("robots", robot, "sensors"):
             yield "robots", robot, "sensors", channel
@@ -96,7 +96,7 @@ def _period_ns(text: object, tick_ns: int) -> int:
 
 
 def _clients(view: View) -> Iterator[Finding]:
-    """A client in lockstep has a rate; who is not in lockstep has no ticks of its own, and so no offset."""
+    """A lockstep client has a rate; a free-running one has no ticks of its own, and so no offset."""
     for name in view.clients:
         if _in_lockstep(view, "clients", name, is_default=False) and view.get("clients", name, "rate") is None:
             yield Finding(("clients", name, "rate"), "missing key of a client in lockstep", "rate", at="missing")
@@ -109,7 +109,7 @@ def _clients(view: View) -> Iterator[Finding]:
 
 
 def _arrivals(view: View, player: str) -> Iterator[Finding]:
-    """Who acts at arrival is in lockstep, has no ticks of its own, and hears at the arrival of what it acts."""
+    """A client that acts at arrival is in lockstep, has no ticks of its own, and subscribes to its `arrivals`."""
     at: Location = ("players", player)
     arrivals = view.mapping(*at, "arrivals")
     if view.get(*at, "act") != "arrival":
@@ -140,7 +140,7 @@ def _arrivals(view: View, player: str) -> Iterator[Finding]:
 
 
 def _heard(view: View, player: str) -> dict[str, set[str]]:
-    """The channels that a player hears, by endpoint."""
+    """The channels that a player subscribes to, by endpoint."""
     heard: dict[str, set[str]] = {}
     for robot in view.mapping("players", player, "robots"):
         heard.setdefault(robot, set()).update(name for _, name in view.texts("players", player, "robots", robot))

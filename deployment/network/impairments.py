@@ -168,7 +168,7 @@ class Outages(SpecBase):
 
 
 class Queue(SpecBase):
-    """What waits before it is sent: at most so many packets and bytes, for at most so long; `codel` drops early."""
+    """The send queue: limits of packets, bytes and waiting time; `codel` drops early."""
 
     packets: Annotated[int, Field(ge=1, le=1_000_000)] = 1000
     bytes_max: Bytes = default("64 MiB", "bytes")
