@@ -142,7 +142,7 @@ class SupervisorProcess:
         return FAILED if told["failed"] else DONE
 
     def _has_capture(self) -> bool:
-        """Whether the capture's file says that it is closed. One on another machine is not seen from here."""
+        """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""
         launch = self._folder.launch()
         return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
 
@@ -231,7 +231,7 @@ def serve(
 def _history(
     settings: RunSettings, deployment: Deployment, folder: RunFolder, read_records: Callable[[], list[bytes]]
 ) -> History | None:
-    """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
+    """Return the history in the run folder's journal; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
     if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):

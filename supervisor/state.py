@@ -91,11 +91,11 @@ class InputBuffer:
         return [node for node in members if node not in known]
 
     def drop(self, tick: int, nodes: Collection[str]) -> None:
-        """Drop the parts of these nodes, which did not fit and are asked for again."""
+        """Drop the invalid parts of these nodes, which are requested again."""
         self.parts[tick] = [part for part in self.parts[tick] if part.node not in nodes]
 
     def committed(self, tick: int) -> None:
-        """Tick `tick` is computed: drop its parts, and the deliveries that nobody asks for any more."""
+        """Tick `tick` is computed: drop its parts, and the deliveries that no node can still request."""
         self.parts.pop(tick + 1)
         self.deliveries.pop(tick - limits.KEPT_TICKS, None)
 
@@ -140,7 +140,7 @@ class RunState:
     asked: deque[Asked]
     """The last requests that change something, for people."""
     disruptions: int
-    """Events of the network that were asked for."""
+    """Requested events of the network."""
     last_disruptions: deque[tuple[int, str]]
     """The last of them: the tick at which each takes effect, the event as JSON."""
 
@@ -166,7 +166,7 @@ class RunState:
     granted_boot: str
     """Boot of the vHub that was last allowed to go on."""
     found_living: bool
-    """Whether a process was heard that takes part since before this supervisor was started."""
+    """Whether a process has reported that took part before this supervisor was started."""
     abandoned: str
     """Why a run that was resumed does not go on."""
 
@@ -222,7 +222,7 @@ class RunState:
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self.epoch_payload))
 
     def publish_tempo(self) -> None:
-        """Tell the vHub the pace."""
+        """Send the pace to the vHub."""
         self.publish(channels.TEMPO, channels.SUPERVISOR, Tempo(str(self.pacer.pace), self.pacer.paused))
 
     def publish_end(self) -> None:
@@ -338,7 +338,7 @@ class RunState:
         return max(deadline_ns, self.deployment.deadlines.start_ns) if self.is_starting else deadline_ns
 
     def resumed(self) -> None:
-        """The run goes on from the present frame."""
+        """The run continues from the present frame."""
         self._resumed_tick, self._is_resumed = self.frame.tick, True
 
     def abandons(self, reason: str) -> bool:
@@ -400,7 +400,7 @@ class RunState:
         self.asked.extend(history.asked)
 
     def restore_requests(self, history: History) -> None:
-        """Restore what requests have asked for, and the last answers, as many as are kept."""
+        """Restore the effects of requests, and the last answers, as many as are kept."""
         self.coming_edits, self.disruptions = history.edits, history.control.disruptions
         self.last_disruptions.extend(history.disruptions)
         self.answers = dict(list(history.answers.items())[-ANSWERS_KEPT:])
