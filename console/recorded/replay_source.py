@@ -34,12 +34,12 @@ ARGUMENTS: Final[Known] = {
 }
 STREAMS: Final = ("poses", "clock", "log", "rows")
 HEAR_S: Final = 0.02
-"""How long the thread listens before it looks whether something is asked."""
+"""Time for which the thread listens between checks for requests."""
 ROW_MARKS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     "/epochs": lambda row: f"epoch {row['epoch']}",
     "/recoveries": lambda row: f"{row['what']} {row['name']}: {row['reason']}",
 }
-"""Rows that are marks, and what they say."""
+"""Rows that are marks, and their texts."""
 Ask = tuple[str, Mapping[str, Any], "Future[dict[str, Any]]"]
 
 
@@ -101,7 +101,7 @@ class PlayedSource:
             await asyncio.to_thread(thread.join)
 
     def _listen(self, feed: Feed, tell: Callable[[Callable[[], None]], None]) -> None:
-        """Hear and ask until the replay or this source ends. Raises Refused."""
+        """Receive and send requests until the replay or this source ends. Raises Refused."""
         while not self._ended.is_set():
             ended = self._replay.ended  # what was heard while something was asked waits for the next `take`
             for item in self._replay.take(HEAR_S):
@@ -115,7 +115,7 @@ class PlayedSource:
             if ended:
                 raise ReplayGone("the replay has ended")
 
-    # --- heard -------------------------------------------------------------------------------------------------------
+    # --- messages ----------------------------------------------------------------------------------------------------
 
     def _tell(self, feed: Feed, item: Any) -> None:
         if isinstance(item, ReplayedPoses):
@@ -182,7 +182,7 @@ class PlayedSource:
             }
         )
 
-    # --- asked -------------------------------------------------------------------------------------------------------
+    # --- requests ----------------------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         checked(verb, arguments, ARGUMENTS)
@@ -204,7 +204,7 @@ class PlayedSource:
         return Answered(f"{status['state']} at tick {tick}, {status['rate']}", tick)
 
     def _refuse_all(self) -> None:
-        """Answer what nobody will: the connection has ended."""
+        """Answer the open requests: the connection has ended."""
         with suppress(queue.Empty):
             while True:
                 _, _, answer = self._asked.get_nowait()
