@@ -91,7 +91,7 @@ class SupervisorProcess:
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
         self._inbox = inbox
-        self._is_told_to_end = False
+        self._end_requested = False
         self._info = RunInfo(
             folder.name,
             self.core.state.deployment.world,
@@ -148,7 +148,7 @@ class SupervisorProcess:
 
     def stop(self) -> None:
         """End the run in order, as the command `down` does; a signal handler may call this."""
-        self._is_told_to_end = True
+        self._end_requested = True
         self._inbox.wake()
 
     def _turn(self, now_ns: int) -> None:
@@ -156,8 +156,8 @@ class SupervisorProcess:
         reminder = self._exposure.due(now_ns)
         if reminder:
             self.core.state.log("warning", reminder)
-        if self._is_told_to_end:
-            self._is_told_to_end = False
+        if self._end_requested:
+            self._end_requested = False
             self.core.stop()
         if not self.core.actions and self._loop.journal is not None:
             self._turn_journal(now_ns)
