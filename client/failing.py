@@ -37,7 +37,7 @@ def failed(where: str, error: BaseException, module: str) -> PlayerFailed:
     return PlayerFailed(f"{where}: {describe(error)}{place_of(error, module)}", _trace_of(error))
 
 
-def tell_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
+def report_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
     """Make a player's core report why its process ends."""
     trace = error.trace if isinstance(error, PlayerFailed) else ""
     core.fail(str(error), _trace_of(error) if isinstance(error, Unanswered) else trace)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.failing import tell_failure
+from foosim.client.failing import report_failure
 from foosim.client.loading import load_player
 from foosim.client.player import PlayerFactory, PlayerLoop
 from foosim.protocol.actions import Action, Say
@@ -52,7 +52,7 @@ class Crew:
             try:
                 player.step(now_ns)
             except PlayerError as error:
-                tell_failure(player.core, error)
+                report_failure(player.core, error)
                 raise
             finally:
                 self._speak(player.core)

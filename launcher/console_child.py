@@ -65,8 +65,8 @@ def page_of(console: bool, opens: bool, second: Path | None, offset: str | None,
 class ConsoleChild:
     """The console of one run."""
 
-    def __init__(self, folder: RunFolder, say: Callable[[str], None], page: Page | None) -> None:
-        self._folder, self._say, self._page = folder, say, page
+    def __init__(self, folder: RunFolder, report: Callable[[str], None], page: Page | None) -> None:
+        self._folder, self._report, self._page = folder, report, page
         self._launcher = Launcher(folder.name)
         self._has_addresses = self._has_ended = False
         """The addresses and the ending that were reported."""
@@ -87,7 +87,7 @@ class ConsoleChild:
         try:
             self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
         except Failed as failed:
-            self._say(f"{failed}; the run continues without it")
+            self._report(f"{failed}; the run continues without it")
 
     def look(self) -> None:
         """Report its addresses once they are known, and its ending."""
@@ -97,10 +97,10 @@ class ConsoleChild:
         text = "" if self._has_addresses else self._addresses()
         if text:
             self._has_addresses = True
-            self._say(text)
+            self._report(text)
         if child.exit_code is not None:
             self._has_ended = True
-            self._say(
+            self._report(
                 f"console {child.ending}, the run continues; foosim-console {self._folder.name} starts another one; "
                 f"its log is {child.log}"
             )

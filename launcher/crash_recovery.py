@@ -18,7 +18,7 @@ from foosim.vhub.recording.recovery import recover_capture, recovered_path
 from foosim.vhub.state.records import HeadRecord, HubRecord
 
 
-def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> None:
+def recover_leftovers(report: Callable[[str], None], but: str | None = None) -> None:
     """Recover the captures of this user's runs whose launcher is gone, logging a line each; skip the run `but`.
 
     The vHub's journal is deleted when the new capture is complete. A failed recovery is logged and deletes nothing.
@@ -32,10 +32,10 @@ def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> Non
         except JournalError:
             continue  # its vHub lives and finishes the capture
         except Refused as error:
-            say(f"run {folder.name} ended uncleanly, its capture cannot be recovered: {error}")
+            report(f"run {folder.name} ended uncleanly, its capture cannot be recovered: {error}")
             continue
         if recovered is not None:
-            say(f"run {folder.name}: {recovered}")
+            report(f"run {folder.name}: {recovered}")
             if not recovered.problem:
                 remove_journal(folder.journals, VHUB)
 

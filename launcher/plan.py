@@ -31,7 +31,7 @@ from foosim.world.scenes.hall_start import start_findings
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to).
+    """Checked options: the canonical text, the deployment, and the run's length (0 ticks: until requested to end).
 
     `branch` is the captured frame that it begins with, None for frame 0.
     """
@@ -50,16 +50,16 @@ class Plan:
         return None if self.branch is None else self.branch.start
 
     def settings(self, run: str) -> RunSettings:
-        """Return what the supervisor of the run with this name is started with."""
+        """Return the settings of the supervisor of the run with this name."""
         name, balance = str(self.options.file), self.options.balance
         again = replace(self.options, branch=None).arguments()
         return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, again, self.files)
 
 
 def check_certificates(plan: Plan) -> list[str]:
-    """Return which certificates end soon, of everybody whom `up` starts here and of the operator that it is itself.
+    """Return warnings of certificates that expire soon, of processes that `up` starts here and of its own operator.
 
-    Raises CertificateError when somebody would not be let in. Those on other machines have theirs there.
+    Raises CertificateError for one that would be refused. Processes on other machines have theirs there.
     """
     pki, deployment = plan.options.pki, plan.deployment
     elsewhere = places(deployment)
@@ -73,14 +73,14 @@ def check_certificates(plan: Plan) -> list[str]:
 
 
 def check_models_here(plan: Plan) -> None:
-    """Raise DeploymentError for a link model that cannot be had, unless the vHub, which looks again, runs elsewhere."""
+    """Raise DeploymentError for a link model that cannot be loaded, unless the vHub runs (and checks) elsewhere."""
     if VHUB not in places(plan.deployment):
         file, network = plan.options.file, plan.deployment.network
         check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
 
 
 def check_players_here(plan: Plan) -> None:
-    """Raise DeploymentError for players' classes that cannot be had. Those on other machines have theirs there."""
+    """Raise DeploymentError for players' classes that cannot be loaded. Other machines have their own classes."""
     deployment, elsewhere = plan.deployment, places(plan.deployment)
     findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
     if findings:
@@ -89,14 +89,14 @@ def check_players_here(plan: Plan) -> None:
 
 
 def check_meshes(deployment: Deployment, options: RunOptions) -> None:
-    """Raise DeploymentError for meshes, whose files have been read by now, that bodies start in or pass through."""
+    """Raise DeploymentError for meshes that bodies start in or pass through. Their files must have been read."""
     findings = [*start_findings(deployment), *clearance_findings(deployment)]
     if findings:
         refuse_findings(read_deployment_text(options.file), str(options.file), findings, options.all_sets)
 
 
 def make_plan(options: RunOptions) -> Plan:
-    """Check everything that was asked for before anything is started; raises Refused."""
+    """Check all options before any process is started; raises Refused."""
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
     text, files = pin_assets(text, name, options.file.parent)
@@ -116,7 +116,7 @@ def make_plan(options: RunOptions) -> Plan:
 
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
-    """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot go on."""
+    """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot be resumed."""
     if folder.is_live() or not folder.is_left():
         raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
     plan, launch = make_plan(launched_options(folder)), folder.launch()

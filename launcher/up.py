@@ -96,7 +96,7 @@ class Up:
         """Why the capture was not fetched from the machine on which it was written."""
         self._interrupts = 0
         self._ending_s = 0.0
-        self._is_told = False
+        self._end_requested = False
         """Whether the supervisor was requested to end the run."""
         self._lost: Child | None = None
         self._lost_s = 0.0
@@ -115,7 +115,7 @@ class Up:
         """Nodes that are to be started when they have ended."""
         self._starts: dict[str, int] = {}
         """Number of handled start requests, by node."""
-        self._told = 0
+        self._shown = 0
         """Number of the run's recoveries that were shown."""
 
     def run(self) -> Outcome:
@@ -297,9 +297,9 @@ class Up:
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Show new recoveries once they are complete."""
-        while self._told < len(recoveries) and recoveries[self._told]["outage_ms"] is not None:
-            self.display.say(recovery_text(recoveries[self._told]))
-            self._told += 1
+        while self._shown < len(recoveries) and recoveries[self._shown]["outage_ms"] is not None:
+            self.display.say(recovery_text(recoveries[self._shown]))
+            self._shown += 1
 
     def _end_stalled(self, status: dict[str, Any]) -> None:
         """Kill a process that hangs: the run continues without it, and a new one can take part."""
@@ -426,7 +426,7 @@ class Up:
             if self._can_resume:
                 return False
             self._ending_s = now_s
-        if self._ending_s and not self._is_told:
+        if self._ending_s and not self._end_requested:
             self._tell(supervisor)
         return not self._ending_s or now_s < self._ending_s + END_S
 
@@ -445,7 +445,7 @@ class Up:
         """Request the end of the run, as `down` does; before the run file exists, a signal kills the supervisor."""
         if self.folder.info() is None:
             return
-        self._is_told = True
+        self._end_requested = True
         if self._lost is not None and self._control is not None:
             with suppress(Refused):
                 self._control.ask("down", QUESTION_S, lost=f"{self._lost.name}: it {self._lost.ending}")
@@ -472,7 +472,7 @@ class Up:
         if ended is not None and result != ended:
             with suppress(OSError):
                 self.folder.write_result(result)
-        lines = [*map(recovery_text, result["recoveries"][self._told :]), line]
+        lines = [*map(recovery_text, result["recoveries"][self._shown :]), line]
         return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:

@@ -14,11 +14,11 @@ ALPHA: Final = 0.6
 BETA: Final = 0.3
 """Gains of position and velocity: 1.5 mm of noise at 100 Hz leaves 0.05 m/s in the velocity."""
 JUMP_M: Final = 0.02
-"""A sample this far from where it was expected says that the ball was kicked, or has bounced."""
+"""A sample this far from the prediction means that the ball was kicked, or has bounced."""
 SPEED_MAX: Final = 20.0
-"""m/s; what is faster was not rolled but put: the ball is back at the kick-off spot."""
+"""m/s; a faster displacement is a reset of the ball to the kick-off spot."""
 REBOUND: Final = 0.7
-"""Share of the speed across a side wall that comes back from it."""
+"""Coefficient of restitution at a side wall."""
 
 
 class Ball(NamedTuple):

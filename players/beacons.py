@@ -1,6 +1,6 @@
-"""What patrolling rovers and their base say to each other by radio, as bytes: small, and checked when they come.
+"""Payloads of the radio messages between patrolling rovers and their base: small, and checked on reception.
 
-What a network has damaged, or somebody else has said on the same channel, decodes to None. Numbers are little-endian.
+A damaged payload, or a foreign one on the same channel, decodes to None. Numbers are little-endian.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Telemetry(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """What the base knows of one rover: between which spots it was, and how long ago that was told (s)."""
+    """The base's entry for one rover: between which spots it was, and the age of that report (s)."""
 
     number: int
     here: int
@@ -93,13 +93,13 @@ def decode_beacon(payload: object, rovers: int, spots: int) -> Beacon | None:
 
 
 def encode_telemetry(telemetry: Telemetry) -> bytes:
-    """Return the bytes of what a rover tells its base: 19."""
+    """Return the 19 bytes of a rover's telemetry."""
     number, x, y, charge, driven, hears, here, goal = telemetry
     return _TELEMETRY.pack(number, x, y, _percent(charge), driven, min(hears, 255), here, goal)
 
 
 def decode_telemetry(payload: object, rovers: int, spots: int) -> Telemetry | None:
-    """Return what a rover tells its base, of one of so many on a map of so many spots; None for nothing of the kind."""
+    """Return a rover's telemetry, given the numbers of rovers and spots; None for an invalid payload."""
     if not isinstance(payload, bytes) or len(payload) != _TELEMETRY.size:
         return None
     number, x, y, percent, driven, hears, here, goal = _TELEMETRY.unpack(payload)
@@ -109,12 +109,12 @@ def decode_telemetry(payload: object, rovers: int, spots: int) -> Telemetry | No
 
 
 def encode_fleet(entries: Sequence[Entry]) -> bytes:
-    """Return the bytes of what the base knows: 7 a rover."""
+    """Return the bytes of the base's entries: 7 a rover."""
     return b"".join(_ENTRY.pack(entry.number, entry.here, entry.goal, _tenths(entry.age)) for entry in entries)
 
 
 def decode_fleet(payload: object, rovers: int, spots: int) -> list[Entry] | None:
-    """Return what the base knows, of so many rovers on a map of so many spots; None for what is nothing of the kind."""
+    """Return the base's entries, given the numbers of rovers and spots; None for an invalid payload."""
     if not isinstance(payload, bytes) or len(payload) % _ENTRY.size or len(payload) > rovers * _ENTRY.size:
         return None
     entries = [Entry(number, here, goal, tenths / 10) for number, here, goal, tenths in _ENTRY.iter_unpack(payload)]

@@ -23,7 +23,7 @@ from foosim.world.robots.foosball_rod import RodRobot, RodSensor
 from foosim.world.robots.overhead_camera import BallSensor
 
 LATENCY_S: Final = 0.003
-"""From a decision to what the rod does about it: the command's link and the next tick."""
+"""Delay from a decision to the rod's motion: the command's link and the next tick."""
 SLIDE_LAG_S: Final = 0.033
 """How far a rod's slide follows behind a moving target: 1 / gain of its loop."""
 SPIN_UP: Final = 1e4
@@ -77,14 +77,14 @@ class View(NamedTuple):
 
 
 class Rod:
-    """One rod in the hands of a player: what is known of it, and the movements that it can make."""
+    """One rod of a player: its state, and its possible movements."""
 
     def __init__(self, deployment: Deployment, name: str, robot: RodRobot, side: float) -> None:
         table = deployment.table
         line = table.lines[robot.line]
         self.name = name
         self.u = line.x
-        """Where its axis stands, in the team's view."""
+        """x of its axis, in the team's view."""
         self.slide = 0.0
         self.swing = 0.0
         self.seen = False
@@ -154,7 +154,7 @@ class Rod:
 
 
 class Keeper:
-    """Guards with the goal and defence rods: figures stand on the way of the ball, else between ball and goal."""
+    """Guards with the goal and defence rods: figures block the ball's path, or else the line from ball to goal."""
 
     def __init__(self, rods: Sequence[Rod], own_goal: tuple[float, float]) -> None:
         self.rods = rods
@@ -232,7 +232,7 @@ class Team:
         ]
 
     def act(self, tick: int, samples: Samples) -> Commands:
-        """Return what each rod does now."""
+        """Return the command of each rod."""
         self._see(samples)
         if not self._track.known:
             return {}

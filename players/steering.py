@@ -1,4 +1,4 @@
-"""From where a rover is and wants to go to the speeds of its wheels; and where it is, from its wheels and its pose."""
+"""Steering of a rover: wheel speeds towards a goal, and pose estimation from odometry and pose samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from foosim.world.payloads import Drive, Pose, WheelTravel
 TRUST: Final = 0.5
 """The share of the difference that a new pose corrects: 20 mm of noise become 12, slip does not add up."""
 LOST_M: Final = 1.0
-"""Farther away than this from where the wheels say, the pose alone is right."""
+"""Beyond this distance between odometry and the measured pose, the measured pose alone counts."""
 TURN_GAIN: Final = 2.5
 """rad/s of turning per rad of error."""
 TURN_MAX: Final = 2.0
@@ -19,18 +19,18 @@ AHEAD_RAD: Final = 0.7
 """Half of the sector that has to be free."""
 SIDE_RAD: Final = 1.6
 STOP_M: Final = 0.2
-"""Nearer than this to what is ahead it does not go on."""
+"""It stops at this distance to an obstacle ahead."""
 SWERVE_M: Final = 0.9
-"""From here on it turns aside from what is ahead,"""
+"""It turns aside from an obstacle ahead within this distance,"""
 SWERVE_RAD: Final = 0.8
-"""by so much: to the right, if there is room, as whoever comes the other way does."""
+"""by this angle: to the right, if there is room, as oncoming rovers do."""
 ROOM_M: Final = 0.5
 CLOSE_M: Final = 0.12
 """Nearer than this to anything it gets away from it,"""
 AWAY: Final = 0.2
 """m/s, first of all."""
 APPROACH: Final = 1.2
-"""Greatest speed per way to what is ahead, and to the goal, in 1/s."""
+"""Greatest speed per distance to an obstacle ahead, and to the goal, in 1/s."""
 SPEED_MIN: Final = 0.15
 """m/s, on the last way to the goal."""
 
@@ -48,7 +48,7 @@ class Estimate:
         self._sequence = -1
 
     def roll(self, travel: WheelTravel) -> None:
-        """Go on by what the wheels have turned since the last time."""
+        """Integrate the wheels' rotation since the last call."""
         last, self._travel = self._travel, travel
         if last is None:
             return
@@ -99,7 +99,7 @@ class Steering:
         return Drive(max(-limit, min(limit, forward - turning)), max(-limit, min(limit, forward + turning)))
 
     def _away(self, ranges: tuple[float, ...]) -> Drive:
-        """Return the speeds that take it slowly away from what nearly touches it, turning its side to it."""
+        """Return the speeds that move it slowly away from an obstacle that nearly touches it, turning sideways."""
         ray = min(range(len(ranges)), key=ranges.__getitem__)
         angle = 2.0 * pi * ray / len(ranges)
         forward = -AWAY if cos(angle) > 0.0 else AWAY

@@ -1,6 +1,6 @@
-"""Dispatch: the software of a base station. It hears what rovers tell, and tells all of them where the others are.
+"""Dispatch: the software of a base station. It collects telemetry of rovers and broadcasts all positions.
 
-So a rover that hears no neighbour still knows where they are, as old as that is.
+So a rover without a neighbour in radio range still has the others' positions, with their age.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ class Dispatch:
         if isinstance(cell_m, bool) or not isinstance(cell_m, int | float) or not 0.0 < cell_m < 1000.0:
             raise BadValue("parameter cell_m is not a number above 0", cell_m)
         self.fleet: dict[int, tuple[float, Telemetry]] = {}
-        """What each rover has told last, and when that was (s), by its number."""
+        """The last telemetry of each rover, and its time (s), by number."""
         self._rovers = sum(isinstance(robot, RoverRobot) for robot in deployment.robots.values())
         self._spots = len(roadmap_of(deployment, cell_m).spots)
         self._tick_s = deployment.tick_ns / 1e9
         self._due_s = 0.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Take what has come; once a second, say it all."""
+        """Take new telemetry; once a second, broadcast the fleet."""
         now_s = tick * self._tick_s
         for (_, channel), sample in samples.items():
             if channel != TELEMETRY:

@@ -3,7 +3,7 @@
 It goes from spot to spot of the roadmap, always to the neighbouring one that was visited longest ago, by itself or by
 whom it hears (conscientious reactive patrolling with shared idleness: Machado, Ramalho, Zucker, Drogoul, MABS 2002). It
 keeps out of the spots that others are at or head for, and gives way to those with a smaller number. With little charge
-it goes to the charger. When it has heard nobody for a while it slows down and relies on what its proximity shows alone.
+it goes to the charger. Without a message for a while it slows down and relies on its proximity sensor alone.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from foosim.world.scenes.obstacles import obstacles_of
 ARRIVED_M: Final = 0.35
 """So near to a spot it counts as visited."""
 CLAIM_S: Final = 2.0
-"""For so long it holds what another one has said about where it is going."""
+"""Time for which another rover's reported goal is valid."""
 SIGHT_S: Final = 3.0
-"""For so long it holds that something unknown stands somewhere."""
+"""Time for which an unknown obstacle is remembered."""
 OFF_MAP_M: Final = 0.3
-"""What is nearer to the map's obstacles is one of them."""
+"""An echo nearer to one of the map's obstacles belongs to it."""
 STUCK_S: Final = 4.0
-"""A spot that comes no nearer for so long is given up,"""
+"""A spot is given up after this time without approach,"""
 GIVEN_UP_S: Final = 10.0
 """for so long."""
 NEAR_M: Final = 1.2
@@ -62,7 +62,7 @@ ROVERS_MAX: Final = 255
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The parameters of a patrol as they stand in the deployment."""
+    """The parameters of a patrol in the deployment."""
 
     rover: str
     base: str = ""
@@ -72,7 +72,7 @@ class Settings:
     """m/s, of a rover that is not alone."""
     alone_speed: float = 0.5
     alone_s: float = 3.0
-    """Who has heard nobody for so long is alone."""
+    """A rover is alone after this time without a message."""
     beacon_s: float = 0.3
     low: float = 0.25
     """Shares of the capacity: when it goes to the charger,"""
@@ -104,7 +104,7 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
 
 
 class Heard(NamedTuple):
-    """What is known of another rover, and when (s) it was told that."""
+    """The last report of another rover, and its time (s)."""
 
     at_s: float
     here: int
@@ -113,7 +113,7 @@ class Heard(NamedTuple):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Patrol:
-    """The player: one rover's controller. What it remembers is of its own; all it knows of others came by radio."""
+    """The player: one rover's controller. Its knowledge of others comes by radio only."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         self.settings = settings = read_settings(parameters, deployment)
@@ -137,7 +137,7 @@ class Patrol:
         key = draw_key(deployment.seed, "patrol", settings.rover)
         spots = range(len(self._map.spots))
         self._visited_s = [-100.0 * unit_interval(draw_words(key, spot)[0]) for spot in spots]
-        """When each spot was visited last, by anybody: at the start by nobody, and each rover begins elsewhere."""
+        """The time of the last visit to each spot, by any rover: none at the start, and each rover begins elsewhere."""
         self._visits: dict[int, float] = {}
         self._blocked_s: dict[int, float] = {}
         """Until when a spot is taken for blocked."""
@@ -153,7 +153,7 @@ class Patrol:
         self._telemetry_due_s = TELEMETRY_S * self.number / self._count
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Take what has come, choose where to go, and say what others should know."""
+        """Take new samples, choose the goal, and send telemetry and beacons."""
         now_s = tick * self._tick_s
         self._listen(samples, now_s)
         ranges = self._sense(samples)
@@ -166,7 +166,7 @@ class Patrol:
     # --- knowing -----------------------------------------------------------------------------------------------------
 
     def _sense(self, samples: Samples) -> tuple[float, ...]:
-        """Take what the own robot's sensors say; return what its proximity shows."""
+        """Take the own robot's sensor samples; return its proximity ranges."""
         rover = self.settings.rover
         travel, pose = samples.get((rover, "odometry")), samples.get((rover, "pose"))
         if travel is not None and isinstance(travel.value, WheelTravel):
@@ -179,7 +179,7 @@ class Patrol:
         return proximity.value.ways if proximity is not None and isinstance(proximity.value, Ranges) else ()
 
     def _listen(self, samples: Samples, now_s: float) -> None:
-        """Take what others have said since the last turn."""
+        """Take messages of others since the last turn."""
         for (source, channel), sample in samples.items():
             if channel not in (BEACON, FLEET) or self._sequences.get(source) == sample.sequence:
                 continue
@@ -204,13 +204,13 @@ class Patrol:
             self._block(self._map.nearest(*beacon.seen), said_s + SIGHT_S)
 
     def _hear(self, number: int, heard: Heard) -> None:
-        """Keep what is newer."""
+        """Keep the newer report."""
         known = self.heard.get(number)
         if number != self.number and (known is None or heard.at_s > known.at_s):
             self.heard[number] = heard
 
     def is_at(self, x: float, y: float) -> bool:
-        """Whether what somebody sees there is this rover itself."""
+        """Whether an obstacle that another rover reports is this rover."""
         return hypot(x - self._estimate.x, y - self._estimate.y) <= 2.0 * self._rays_from
 
     def _look(self, ranges: tuple[float, ...], now_s: float) -> None:
@@ -236,7 +236,7 @@ class Patrol:
     # --- deciding ----------------------------------------------------------------------------------------------------
 
     def _choose(self, now_s: float) -> None:
-        """Decide where to go: on, back where another one has the right of way, or round what is in the way."""
+        """Decide where to go: ahead, back where another rover has the right of way, or around an obstacle."""
         x, y = self._estimate.x, self._estimate.y
         if self._here < 0:
             self._here = self._goal = self._map.nearest(x, y)
@@ -284,7 +284,7 @@ class Patrol:
         return hypot(seen_x, seen_y) < NEAR_M and abs(aside) < SIDE_RAD
 
     def _away(self, now_s: float) -> int:
-        """Return the spot near here that is farthest from what it meets."""
+        """Return the spot near here that is farthest from the oncoming rover."""
         assert self._seen is not None
         seen, claimed = self._seen, self._claimed(now_s)
         free = [spot for spot in (self._here, *self._map.neighbours[self._here]) if spot not in claimed]
@@ -305,7 +305,7 @@ class Patrol:
     # --- doing -------------------------------------------------------------------------------------------------------
 
     def _drive(self, ranges: tuple[float, ...]) -> Drive:
-        """Return the wheels' speeds towards the goal, as what is near allows."""
+        """Return the wheels' speeds towards the goal, limited by obstacles."""
         speed = self.settings.alone_speed if self.is_alone else self.settings.speed
         return self._steering.towards(self._estimate, self._map.spots[self._goal], ranges, speed)
 

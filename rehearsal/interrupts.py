@@ -19,17 +19,17 @@ class Interrupts:
         self.count = 0
         self._report = report
         self._system: System | None = None
-        self._is_told = threading.current_thread() is threading.main_thread()
+        self._handles_signals = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> Interrupts:
-        if self._is_told:
+        if self._handles_signals:
             self._before = signal.signal(signal.SIGINT, self._take)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._is_told:
+        if self._handles_signals:
             signal.signal(signal.SIGINT, self._before)
 
     def attend(self, system: System) -> None:

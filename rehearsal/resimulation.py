@@ -51,7 +51,7 @@ class Replica:
         for node in self._nodes:
             origin = None if start is None else start.origin
             build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
-            self._say(channels.BUILD, node, encode(build))
+            self._publish(channels.BUILD, node, encode(build))
         self._settle()
         self._epoch = 0
         self._begin(self.frame)
@@ -62,12 +62,12 @@ class Replica:
         self._epoch += 1
         owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
         who = sorted(self._nodes), owners, added, b""
-        self._say(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
+        self._publish(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
         commit = Commit(
             self._epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], last=False
         )
         for node in self._nodes:
-            self._say(channels.COMMIT, node, encode(commit))
+            self._publish(channels.COMMIT, node, encode(commit))
         self._settle()
 
     def set_back(self, frame: Frame) -> None:
@@ -85,10 +85,10 @@ class Replica:
         tick = self.frame.tick
         layout = layout_after(self.frame.layout, edits)
         if layout is not self.frame.layout:
-            self._say(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
+            self._publish(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
             self._settle()
-        self._say(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
-        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
+        self._publish(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
+        self._publish(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
         self._settle()
         core, _ = next(iter(self._nodes.values()))
         assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"
@@ -113,7 +113,7 @@ class Replica:
     def _added(self, layout: Layout) -> list[AddedEntity]:
         return [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in self._base]
 
-    def _say(self, channel: channels.Channel, name: str, payload: bytes) -> None:
+    def _publish(self, channel: channels.Channel, name: str, payload: bytes) -> None:
         self._bus.put(SOURCE, channel, name, payload, 0)
 
     def _settle(self) -> None:
@@ -122,7 +122,7 @@ class Replica:
             _, _, receiver, channel, name, payload = self._bus.pop()
             if receiver == SOURCE:
                 piece = piece_of(self._deployment, channels.read(channel, name, payload))
-                self._say(channels.PIECE, piece.name, encode(piece))
+                self._publish(channels.PIECE, piece.name, encode(piece))
                 continue
             core, solver = self._nodes[receiver]
             core.receive(channel, name, payload, 0)

@@ -15,7 +15,7 @@ from mypy_extensions import mypyc_attr
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.failing import Unanswered, tell_failure
+from foosim.client.failing import Unanswered, report_failure
 from foosim.client.loading import load_player
 from foosim.client.player import PlayerLoop
 from foosim.common import limits
@@ -417,7 +417,7 @@ class System:
                 self.at_work.acts = False
             except (PlayerError, Unanswered) as error:
                 self.at_work.acts = False
-                tell_failure(core, error)
+                report_failure(core, error)
                 self.soon(lambda: self.leave(name))
 
         self.enter(name, core, turn, channels.CLIENT_READS)

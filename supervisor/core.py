@@ -54,7 +54,7 @@ from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame, chain_next
 
 PREPARE_NS: Final = 200_000_000
-"""How often a layout that nodes have not built yet is asked for again."""
+"""Period at which a layout that nodes have not built yet is requested again."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -229,7 +229,7 @@ class SupervisorCore:
     def stop(self) -> int:
         """End the run in order and return after which tick: what is released, or one more when all of it is committed.
 
-        The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
+        The last commit is marked as the last, so that the vHub does not close its tick: no other may be.
         """
         state, pacer = self.state, self.state.pacer
         if not state.is_open or state.end is not None:
@@ -320,7 +320,7 @@ class SupervisorCore:
             frame = barrier.assemble()
         except BadParts as bad:
             self._refused += len(bad.nodes)
-            state.log("error", f"{bad}: asked for again")
+            state.log("error", f"{bad}: requested again")
             inputs.drop(tick + 1, bad.nodes)
             return False
         self._slots = slots
@@ -350,7 +350,7 @@ class SupervisorCore:
             state.log("info", late)
 
     def _publish_commit(self, edits: list[Edit], solved: Solved, now_ns: int, over: Iterable[Recovered] = ()) -> None:
-        """Journal a frame, who solved it and the outages that are over by it, then publish it to the vHub."""
+        """Journal a frame, its solvers and the outages that end with it, then publish it to the vHub."""
         state, frame = self.state, self.state.frame
         last = state.stop_at > 0 and frame.tick >= state.stop_at
         content = frame.digest, frame.values.tobytes(), frame.outbox_items, edits

@@ -90,7 +90,7 @@ class SupervisorProcess:
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
         self._inbox = inbox
-        self._is_told_to_end = False
+        self._end_requested = False
         self._info = RunInfo(
             folder.name,
             self.core.state.deployment.world,
@@ -138,20 +138,20 @@ class SupervisorProcess:
         return FAILED if told["failed"] else DONE
 
     def _has_capture(self) -> bool:
-        """Whether the capture's file says that it is closed. One on another machine is not seen from here."""
+        """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""
         launch = self._folder.launch()
         return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
 
     def stop(self) -> None:
         """End the run in order, as the command `down` does; a signal handler may call this."""
-        self._is_told_to_end = True
+        self._end_requested = True
         self._inbox.wake()
 
     def _turn(self, now_ns: int) -> None:
         self.core.state.busy = self._loop.busy
         self._shell.check(now_ns)
-        if self._is_told_to_end:
-            self._is_told_to_end = False
+        if self._end_requested:
+            self._end_requested = False
             self.core.stop()
         if not self.core.actions and self._loop.journal is not None:
             self._turn_journal(now_ns)
@@ -225,7 +225,7 @@ def serve(
 def _history(
     settings: RunSettings, deployment: Deployment, folder: RunFolder, read_records: Callable[[], list[bytes]]
 ) -> History | None:
-    """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
+    """Return the history in the run folder's journal; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
     if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):

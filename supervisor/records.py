@@ -252,7 +252,7 @@ def solved_by(barrier: Barrier, frame: Frame) -> Solved:
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
-    """Return what the records of a journal, in order and from the start of one of its files, say about the run.
+    """Return the history of a run from a journal's records, in order and from the start of one of its files.
 
     Raises Malformed when they are not those of a run of this version.
     """
@@ -276,7 +276,7 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
 
 
 def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
-    """Return the history that a file's first record stands for."""
+    """Return the history of a file's first record."""
     if isinstance(first, RunRecord):
         begun = 0 if first.start is None else first.start.origin.tick
         control = Control(first.pace, False, 0, first.ticks and begun + first.ticks, [], {}, {})

@@ -109,7 +109,7 @@ class Requests:
             answer = self._decide(inquiry, now_ns)
             assert answer is not None, inquiry.verb
         else:
-            why = f"{show(inquiry.verb)} is for operators: who only looks may ask for {', '.join(READS)}"
+            why = f"{show(inquiry.verb)} is for operators: a viewer may request {', '.join(READS)}"
             answer = Answer(inquiry.sender, inquiry.id, False, self._state.frame.tick, why, b"{}")
         self._reply(answer)
 
@@ -294,7 +294,7 @@ class Requests:
         state, effective, deployment = self._state, tick + 1, self._state.deployment
         text = event_text(deployment, arguments.get("event"), effective * deployment.tick_ns)
         if state.disruptions >= EVENTS_MAX:
-            raise Refused(f"{EVENTS_MAX} events were asked for already")
+            raise Refused(f"{EVENTS_MAX} events were requested already")
         state.disruptions += 1
         event = event_of(text, effective * deployment.tick_ns)
         when = f"from tick {effective} on" if event.heal is None else f"at tick {effective}"
@@ -316,7 +316,7 @@ class Requests:
         return answer
 
     def _balance(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Move all robots at once whose move makes the loads of the nodes more equal; the answer says which and why."""
+        """Move all robots at once whose move makes the nodes' loads more equal; the answer has the reason."""
         state, loads = self._state, loads_of(self._state)
         tick = state.frame.tick
         silent = [node for node in state.members if node not in loads]

@@ -20,7 +20,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.messages import Heartbeat, Hello, Ready, Refusal
 
 SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
-"""A process that lives is not silent for so long, unless its machine or its loop stands."""
+"""A process that lives is not silent for so long, unless its machine or its loop is suspended."""
 IN_FLIGHT_NS: Final = 500_000_000
 """How long the last messages of a process may take after its connection has closed: they do not mean that it is back.
 """
@@ -46,7 +46,7 @@ class Process:
     in_doubt: bool = False
     """Its connection has ended, perhaps only because the supervisor stood still."""
     lost: bool = False
-    """The run goes on without it; it may come back by the handshake."""
+    """The run continues without it; it may rejoin by the handshake."""
 
 
 class Roster:
@@ -56,9 +56,9 @@ class Roster:
         self.deployment = deployment
         self.by_name: dict[str, Process] = {}
         self.stopped: set[str] = set()
-        """Nodes that somebody stopped: they are not let in until somebody starts them."""
+        """Nodes that an operator stopped: they are refused until an operator starts them."""
         self.starts: dict[str, int] = {}
-        """How often somebody asked for a node to be started; a launcher that sees it grow starts its process."""
+        """Number of start requests by node; a launcher that sees it grow starts the node's process."""
         self.hub_account: dict[str, Any] = {}
         """The last report of a vHub that had its state: one that is started again has none before it has read it."""
         self._fingerprint = fingerprint
@@ -105,7 +105,7 @@ class Roster:
         return ""
 
     def has_silent_namesake(self, hello: Hello, now_ns: int) -> bool:
-        """Whether another process of this name takes part and was not heard of for some heartbeats: it may be gone."""
+        """Whether another process of this name takes part and has missed some heartbeats: it may be gone."""
         known = self.by_name.get(hello.name)
         is_other = known is not None and known.boot != hello.boot and not known.lost
         return known is not None and is_other and now_ns - known.heard_ns > SILENT_NS
@@ -130,7 +130,7 @@ class Roster:
         return bool(self.hub_account) and (hub is None or hub.lost or hub.report is not self.hub_account)
 
     def lose(self, process: Process) -> None:
-        """Go on without a process until it says hello again."""
+        """Exclude a process until it sends a hello again."""
         process.lost = True
 
     def note_ready(self, process: Process, ready: Ready) -> str:
@@ -149,12 +149,12 @@ class Roster:
         return ""
 
     def missing(self, layout: bytes) -> list[str]:
-        """Return who is not ready for a layout yet, of those that the deployment declares."""
+        """Return the declared processes that are not ready for a layout yet."""
         here = {name for name, process in self.by_name.items() if not process.lost and layout in process.ready}
         return [name for name in self.expected if name not in here]
 
     def silent(self, now_ns: int, deadline_ns: int) -> list[str]:
-        """Return who has not been heard of for longer than the deadline."""
+        """Return the processes without a heartbeat for longer than the deadline."""
         return [
             name
             for name, process in sorted(self.by_name.items())
@@ -163,6 +163,6 @@ class Roster:
 
 
 def refuse(role: str, name: str, boot: str, reason: str) -> list[Action]:
-    """Return the actions that tell a process that it does not take part, and why."""
+    """Return the actions that refuse a process, with the reason."""
     refusal = encode(Refusal(name, boot, reason))
     return [Say("warning", f"{role} {name} refused: {reason}"), Publish(channels.REFUSAL, name, refusal)]

@@ -46,5 +46,5 @@ class RunSettings:
 
     @property
     def last_tick(self) -> int:
-        """The tick of the frame that ends the run; 0: it ends when it is asked to."""
+        """The tick of the frame that ends the run; 0: it ends on request."""
         return self.ticks and self.ticks + (0 if self.start is None else self.start.origin.tick)

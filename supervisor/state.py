@@ -92,11 +92,11 @@ class InputBuffer:
         return [node for node in members if node not in known]
 
     def drop(self, tick: int, nodes: Collection[str]) -> None:
-        """Drop the parts of these nodes, which did not fit and are asked for again."""
+        """Drop the invalid parts of these nodes, which are requested again."""
         self.parts[tick] = [part for part in self.parts[tick] if part.node not in nodes]
 
     def committed(self, tick: int) -> None:
-        """Tick `tick` is computed: drop its parts, and the deliveries that nobody asks for any more."""
+        """Tick `tick` is computed: drop its parts, and the deliveries that no node can still request."""
         self.parts.pop(tick + 1)
         self.deliveries.pop(tick - limits.KEPT_TICKS, None)
 
@@ -141,7 +141,7 @@ class RunState:
     asked: deque[Asked]
     """The last requests that change something, for people."""
     disruptions: int
-    """Events of the network that were asked for."""
+    """Requested events of the network."""
     last_disruptions: deque[tuple[int, str]]
     """The last of them: the tick at which each takes effect, the event as JSON."""
 
@@ -167,7 +167,7 @@ class RunState:
     granted_boot: str
     """Boot of the vHub that was last allowed to go on."""
     found_living: bool
-    """Whether a process was heard that takes part since before this supervisor was started."""
+    """Whether a process has reported that took part before this supervisor was started."""
     abandoned: str
     """Why a run that was resumed does not go on."""
 
@@ -223,7 +223,7 @@ class RunState:
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self.epoch_payload))
 
     def publish_tempo(self) -> None:
-        """Tell the vHub the pace."""
+        """Send the pace to the vHub."""
         self.publish(channels.TEMPO, channels.SUPERVISOR, Tempo(str(self.pacer.pace), self.pacer.paused))
 
     def publish_end(self) -> None:
@@ -333,7 +333,7 @@ class RunState:
         return max(deadline_ns, self.deployment.deadlines.start_ns) if self.is_starting else deadline_ns
 
     def resumed(self) -> None:
-        """The run goes on from the present frame."""
+        """The run continues from the present frame."""
         self._resumed_tick, self._is_resumed = self.frame.tick, True
 
     def abandons(self, reason: str) -> bool:

@@ -55,7 +55,7 @@ class VhubLoss:
         return {"reason": self._reason, "tick": self._lost_at[1], "for_s": round((now_ns - self._since_ns) / 1e9, 1)}
 
     def on_heartbeat(self, process: Process, now_ns: int) -> None:
-        """A lost vHub sends a heartbeat: it is back, unless that was sent before its loss, or its tick stands still."""
+        """A lost vHub sends a heartbeat: it is back, unless that predates its loss or its tick does not advance."""
         state, heartbeat = self._state, process.heartbeat
         goes_on = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
         if state.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
@@ -82,7 +82,7 @@ class VhubLoss:
             self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
     def on_standstill(self, stood_ns: int) -> None:
-        """The supervisor stood still for so long and could not hear of the vHub."""
+        """The supervisor's loop stood still for so long: no deadline of the vHub runs then."""
         self._since_ns += stood_ns
 
     def timeout(self, now_ns: int) -> str:

@@ -52,9 +52,9 @@ class Viewing:
         """Whether a viewer wants frames: the only question of a commit while none does."""
         self._state = state
         self._leases: dict[str, _Lease] = {}
-        """By who asks."""
+        """By requester."""
         self._watched = Watched([], [])
-        """As the vHub was told last."""
+        """The set last sent to the vHub."""
         self._told_at: Heartbeat | None = None
         """Its last heartbeat before that."""
         self._period_ns = self._due_ns = 0
@@ -68,7 +68,7 @@ class Viewing:
         readings = _pairs("readings", arguments.get("readings"), self._reading)
         self._end_leases(now_ns)
         if request.sender not in self._leases and len(self._leases) >= limits.OPERATORS_MAX:
-            raise Refused(f"{limits.OPERATORS_MAX} look at the run already")
+            raise Refused(f"{limits.OPERATORS_MAX} watch the run already")
         known = self._leases.get(request.sender)
         leases = {**self._leases, request.sender: _Lease(hz, links, readings, now_ns + LEASE_NS)}
         watched = _watched_by(leases.values())
@@ -134,7 +134,7 @@ class Viewing:
                 self._say_watched(watched)
 
     def hub_ready(self) -> None:
-        """Tell a vHub that was started again which links and readings to report."""
+        """Send a restarted vHub the links and readings to report."""
         if self._is_watching:
             self._say_watched(self._watched)
 

@@ -151,7 +151,7 @@ def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None
 
 
 def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
-    """Mark a robot as out of service or back in it; what it wants from now on is to be where it is, or to stand."""
+    """Mark a robot as out of service or back in it; its set-point is then its present position, or speed 0."""
     numbers[robot.offsets["down"]] = float(is_down)
     set_point = robot.offsets.get("set_point")
     if set_point is not None:

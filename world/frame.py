@@ -68,7 +68,7 @@ class Frame:
         return self.numbers[start : start + count]
 
     def entity_digest(self, entity: Entity) -> bytes:
-        """Return a digest of 8 bytes of one entity's slots and outbox: it tells which entity differs."""
+        """Return a digest of 8 bytes of one entity's slots and outbox: it shows which entity differs."""
         hasher = blake2b(self.values[entity.start : entity.stop].data, digest_size=8)
         hasher.update(self.outboxes.get(entity.index, b""))
         return hasher.digest()

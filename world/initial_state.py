@@ -73,7 +73,7 @@ def place_ball(
 
 
 def place_rover(numbers: list[float], entity: Entity, spec: WorldSpec) -> None:
-    """Set a rover to where it starts, standing still, charged as its deployment says."""
+    """Set a rover to its start, at rest, with the deployment's charge."""
     robot = spec.robots[entity.name]
     assert isinstance(robot, RoverRobot)
     numbers[entity.start : entity.split] = [0.0] * (entity.split - entity.start)

@@ -1,4 +1,4 @@
-"""Who computes what: islands from the frame alone, solvers from islands, owners and roster.
+"""The division of a tick's work: islands from the frame alone, solvers from islands, owners and roster.
 
 An island is a set of bodies that could touch each other within the tick: their bounding volumes, grown by *declared*
 speed limit x tick, overlap (not by present speed: a resting ball leaves a kick at 15 m/s). It has one solver, the
@@ -94,7 +94,7 @@ Touching = tuple[tuple[Near, ...], tuple[tuple[int, int], ...]]
 
 
 def touching_of(numbers: Sequence[float], reach: Reach) -> Touching:
-    """Return who could touch whom within the tick that starts from these edited numbers."""
+    """Return the pairs that could touch within the tick that starts from these edited numbers."""
     near = []
     limit = reach.ball_m + reach.half_width_m
     for _, start in reach.balls:

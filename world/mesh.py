@@ -34,7 +34,7 @@ _STL_TRIANGLE: Final = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3,
 _FLOAT: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _CORNER: Final = re.compile(r"(-?[0-9]{1,9})(?:/-?[0-9]{0,9}){0,2}")
 _PASSED_OVER: Final = frozenset({"vn", "vt", "vp", "o", "g", "s", "l", "p", "usemtl", "mtllib"})
-"""Statements of an OBJ file that say nothing about its surface; what they name is not looked at."""
+"""Statements of an OBJ file that do not concern its surface; their arguments are ignored."""
 
 
 class AssetError(Refused):
@@ -163,7 +163,7 @@ def _read_obj(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[n
     faces: list[tuple[int, list[int]]] = []
     for line, (key, *words) in _text(name, content):
         if key == "v":
-            # What stands behind the coordinates is a weight or a colour.
+            # Values after the coordinates are a weight or a colour.
             if len(words) not in (3, 4, 6, 7):
                 raise AssetError(f"{name}:{line}: {len(words)} numbers, a vertex has 3, and then a weight or a colour")
             vertices.append(_numbers(f"{name}:{line}", words[:3]))
@@ -200,7 +200,7 @@ def _corners(place: str, words: list[str], count: int) -> list[int]:
 
 
 def _read_stl(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Read either form: a binary file is one whose length fits its count, since its header may also say `solid`."""
+    """Read either form: a binary file is one whose length fits its count, since its header may be `solid`, too."""
     if len(content) >= _STL_HEAD:
         count = int.from_bytes(content[_STL_HEAD - 4 : _STL_HEAD], "little")
         if len(content) == _STL_HEAD + count * _STL_TRIANGLE.itemsize:

@@ -23,7 +23,7 @@ class Delivered(Item, frozen=True):
 
 
 class RobotPacket(Item, frozen=True):
-    """One packet that a robot sends. `destination` is empty when it goes to all who subscribe to the channel."""
+    """One packet that a robot sends. An empty `destination` is a broadcast to all subscribers of the channel."""
 
     robot: Name
     index: Annotated[int, Meta(ge=0, lt=limits.ROBOT_PACKETS_PER_TICK_MAX)]

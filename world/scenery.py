@@ -31,7 +31,7 @@ _LETTERS: Final = "letters, digits, _, - and . (not at the beginning)"
 
 
 def path_problem(path: str) -> str:
-    """Return what keeps a text from being a path inside a folder, or an empty text. The file system is not asked."""
+    """Return why a text is no path inside a folder; empty if it is one. The file system is not read."""
     if len(path) > PATH_LENGTH_MAX:
         return f"a path of more than {PATH_LENGTH_MAX} characters"
     if ":" in path:
@@ -98,7 +98,7 @@ class Material(SpecBase):
 class Placed(SpecBase):
     """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
 
-    `surface` is what it is to a table's ball, `radio` what waves that cross it lose: 5 dB if it is not said.
+    `surface` is what it is to a table's ball, `radio` what waves that cross it lose: 5 dB by default.
     """
 
     x: Position = default("0 m")

@@ -1,4 +1,4 @@
-"""The distance between two sources on one clock, told while it is made: a point of the series at a time.
+"""The distance between two sources on one clock, published point by point while it is computed.
 
 Of two recordings all of the time that both have is compared; of a source that has its own clock, what it shows while
 somebody looks.
@@ -20,9 +20,9 @@ from foosim.console.shown.source import Feed
 TOLD_S: Final = 0.25
 POINTS_AT_ONCE: Final = 20
 Open = Callable[[], Where]
-"""Opens what is compared, in the thread of the comparison."""
+"""Opens the compared source, in the thread of the comparison."""
 Compare = Open | Leader
-"""What a source is compared with: a recording, or what leads."""
+"""The other source of a comparison: a recording, or the leading source."""
 Covers = Callable[[], tuple[int, int]]
 """Gives the first and the last tick of the clock at which the second source has something."""
 
@@ -34,7 +34,7 @@ class Told(Protocol):
 
 
 def compared(clock: Clock, one: Compare, other: Open, covers: Covers) -> Told:
-    """Return what compares a clock's first source with another one."""
+    """Return the comparison of a clock's first source with another one."""
     if isinstance(one, Leader):
         return Accompanying(one, other, covers)
     assert isinstance(clock, Deck), "a recording is compared on a deck"
@@ -78,7 +78,7 @@ class Comparing:
 
 
 class Accompanying:
-    """Compares what a leading source shows with another one as it goes, in a thread of its own."""
+    """Compares a running, leading source with another one, in a thread of its own."""
 
     def __init__(self, leader: Leader, other: Open, covers: Covers) -> None:
         self._leader, self._open, self._covers = leader, other, covers

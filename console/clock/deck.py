@@ -26,13 +26,13 @@ ARGUMENTS: Final[Known] = {
     "rate": {"pace": (str,)},
     "loop": {"on": (bool,)},
 }
-"""What may be asked of a playhead, with the arguments of each."""
+"""The requests of a playhead, with the arguments of each."""
 VERBS: Final = tuple(ARGUMENTS)
 UNITS: Final = ("ticks", "frames")
 
 
 class Clock(ABC):
-    """Simulated time that sources follow, and who waits for it to change; all of it in the event loop's thread."""
+    """Simulated time that sources follow, and the waiters for its changes; all of it in the event loop's thread."""
 
     def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         """`tick_ns`: of the first source. `clock_ns` is a monotonic wall clock."""
@@ -62,10 +62,10 @@ class Clock(ABC):
 
     @abstractmethod
     def account(self) -> dict[str, Any]:
-        """Return what a status says of it."""
+        """Return its part of a status."""
 
     def changed(self) -> None:
-        """Wake those that wait: a request was done, the ends are others, or time is told."""
+        """Wake the waiters: a request was done, the ends have changed, or time has been set."""
         self.changes += 1
         for event in self._waiting:
             event.set()

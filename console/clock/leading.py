@@ -45,7 +45,7 @@ class HeardClock(Clock):
 
 
 class Leader:
-    """A source that passes on what another one tells, and gives the time to who follows."""
+    """A source that forwards another one's messages, and gives the time to its followers."""
 
     def __init__(self, source: Source, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         """`tick_ns` is known before the source tells it. `clock_ns` is a monotonic wall clock."""
@@ -101,7 +101,7 @@ class Leader:
 
 
 class _Overheard:
-    """A feed that tells the leader what it passes on, after it has: who follows is told later."""
+    """A feed that forwards messages and then reports them to the leader, so that followers get them later."""
 
     def __init__(self, leader: Leader, feed: Feed) -> None:
         self._leader, self._feed = leader, feed

@@ -1,4 +1,4 @@
-"""What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
+"""Converts messages of a running system: frames to moments, statuses to messages, requests to marks.
 
 Pure.
 """
@@ -46,7 +46,7 @@ class World:
 
 
 class Following:
-    """What is known of one run."""
+    """The known state of one run."""
 
     def __init__(self, about: About) -> None:
         self.about = about
@@ -65,11 +65,11 @@ class Following:
         self._watched: Watched | None = None
         self._statuses = 0
         self._disturbers: dict[int, str] = {}
-        """Who asked for an event of the network, by the tick from which it holds."""
+        """The requester of an event of the network, by the tick from which it holds."""
         self.stopped_by = ""
-        """Who asked for the end of the run; empty while nobody did."""
+        """The requester of the run's end; empty without one."""
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
-        """Who has asked: by the request's sender, tick and verb."""
+        """The requesting browser, by the request's sender, tick and verb."""
 
     # --- the world ---------------------------------------------------------------------------------------------------
 
@@ -120,7 +120,7 @@ class Following:
         return self._world.drawing.content()
 
     def first_moment(self) -> Moment | None:
-        """Return what there is to see in the frame that came with the description."""
+        """Return the moment of the frame that came with the description."""
         assert self._world is not None, "described first"
         world, frame = self._world, self._world.first
         if frame is None or (self._frame is not None and self._frame.tick == frame.tick):
@@ -147,7 +147,7 @@ class Following:
         return world, frame
 
     def show(self, world: World, frame: Frame) -> Moment:
-        """Return what there is to see in a frame that was read just now."""
+        """Return the moment of a frame that was just read."""
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
         self._history.keep_frame(frame)
@@ -162,18 +162,18 @@ class Following:
         return self._world.drawing.overlay(self._frame, wanted)
 
     def listen(self, wanted: Wanted) -> None:
-        """Take note of what is looked at from here on: all else is not heard."""
+        """Set what browsers watch from now on: nothing else is received."""
         self._wanted = wanted
         self._history.listen(wanted)
 
     def points(self, curve: Curve) -> Callable[[], list[tuple[float, float]]]:
-        """Return what makes the points that are kept of a curve, in any thread."""
+        """Return a function that makes the recorded points of a curve, in any thread."""
         return list if self._world is None else self._history.reader(curve, self._world.drawing.layout)
 
     # --- statuses ----------------------------------------------------------------------------------------------------
 
     def watch_arguments(self, wanted: Wanted, hz_max: float) -> dict[str, Any]:
-        """Return what a lease is asked for with: what this world does not have is left out."""
+        """Return the arguments of a lease request, without names that this world does not have."""
         assert self._world is not None, "described first"
         deployment = self._world.drawing.deployment
         ends = set(deployment.endpoints())
@@ -183,7 +183,7 @@ class Following:
         return {"hz": min(wanted.hz, hz_max), "links": links, "readings": readings}
 
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
-        """Remember which browser has asked for something."""
+        """Record which browser has sent a request."""
         self._askers[sender, tick, verb] = who
         if verb == "down":
             self.stopped_by = who

@@ -1,4 +1,4 @@
-"""What the console keeps of a run that it looks at, so that a page that is opened later scrolls back.
+"""The console's history of a run, so that a page that is opened later can scroll back.
 
 Numbers of frames, values of the status, figures of links and readings that were plotted: of each the last rows, some
 time apart, of at most so many bytes. Nobody is asked for anything because of it: it keeps what is heard anyway. Pure.
@@ -28,7 +28,7 @@ FRAMES_BYTES: Final = 16 * 1024 * 1024
 STATUSES_BYTES: Final = 8 * 1024 * 1024
 LINKS_BYTES: Final = 8 * 1024 * 1024
 READINGS_MAX: Final = 64
-"""Channels of which readings are kept: those that were heard last."""
+"""Channels of which readings are kept: the most recently received ones."""
 READINGS_BYTES: Final = 32 * 1024 * 1024 // READINGS_MAX
 ROW_BYTES: Final = 256
 """Of a row beside its numbers."""
@@ -110,7 +110,7 @@ def _size(row: Row) -> int:
 
 
 class History:
-    """What is kept of one run."""
+    """The history of one run."""
 
     def __init__(self, tick_ns: int) -> None:
         self._tick_ns = tick_ns
@@ -121,7 +121,7 @@ class History:
         self._watched: Collection[Reading] = ()
 
     def listen(self, wanted: Wanted) -> None:
-        """Take note of what is heard from here on: frames while somebody looks, readings that somebody plots."""
+        """Set what is received from now on: frames while a browser watches, readings that a browser plots."""
         if not (wanted.readers and wanted.hz):
             self._frames.interrupt()
         self._watched = wanted.readings  # further ones come as long as their lease lasts
@@ -135,7 +135,7 @@ class History:
             self._frames.keep(frame.tick, frame.layout, frame.values)
 
     def keep(self, message: Mapping[str, Any]) -> None:
-        """Keep what a message of `status`, `links` or `readings` says."""
+        """Record a message of `status`, `links` or `readings`."""
         kind = message["type"]
         if kind == "status":
             self._keep_status(message["status"])
@@ -167,7 +167,7 @@ class History:
         if reading not in self._watched:
             return
         rows = self._readings.pop(reading, None) or Rows(READINGS_BYTES)
-        self._readings[reading] = rows  # the one that was heard last
+        self._readings[reading] = rows  # the one received last
         if len(self._readings) > READINGS_MAX:
             del self._readings[next(iter(self._readings))]
         for tick, numbers in points:

@@ -30,7 +30,7 @@ VERBS: Final = (
     *("stop", "start", "down"),
 )
 POLL_S: Final = 0.25
-"""How often the status is asked for while a browser looks."""
+"""Period of status requests while a browser watches."""
 UNSEEN_S: Final = 1.0
 """How often it is while none does: a page that is opened later scrolls back."""
 RENEW_S: Final = 1.5
@@ -50,9 +50,9 @@ OVERLAY_S: Final = 0.1
 
 T = TypeVar("T")
 Connect = Callable[[Callable[[], bool]], Control]
-"""Makes a connection; gives up when the function says so."""
+"""Makes a connection; gives up when the function returns true."""
 HowEnded = Callable[[str], Mapping[str, Any] | None]
-"""Returns the message that says how the run has ended, given who stopped it if that is known; None while it has not."""
+"""Returns the message about the end of the run, given its requester if known; None before the end."""
 
 
 class LiveSource:
@@ -61,7 +61,7 @@ class LiveSource:
     def __init__(
         self, name: str, view: Connect, operate: Connect | None, how_ended: HowEnded = lambda stopped_by: None
     ) -> None:
-        """`name` is the run's; `operate` None lets nobody ask for anything."""
+        """`name` is the run's; `operate` None permits no requests."""
         self._name, self._connect_view, self._connect_operator = name, view, operate
         self._how_ended = how_ended
         self._has_ended = False
@@ -76,7 +76,7 @@ class LiveSource:
         self._viewing = ThreadPoolExecutor(1, "console-view")
         self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
         self._idle: list[Control] = []
-        """Connections over which nobody is asking."""
+        """Idle connections."""
 
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
@@ -153,13 +153,13 @@ class LiveSource:
             self._asking.shutdown(wait=False)
 
     async def _say_away(self, feed: Feed, text: str) -> None:
-        """Say that the run is not there, or that it has ended, once."""
+        """Report once that the run is away, or that it has ended."""
         if not await self._say_ended(feed):
             feed.tell(away(text))
             feed.tell(_note("warning", text))
 
     async def _say_ended(self, feed: Feed) -> bool:
-        """Say that the run has ended, if it has; return whether that is said."""
+        """Report the end of the run, if it has ended; return whether it was reported."""
         if not self._has_ended:
             message = await self._in_thread(lambda: self._how_ended(self._following.stopped_by))
             if message is not None:
@@ -177,7 +177,7 @@ class LiveSource:
         return await asyncio.get_running_loop().run_in_executor(self._viewing, work)
 
     async def _follow(self, control: Control, feed: Feed) -> None:
-        """Tell of a run as long as its supervisor answers. Raises Refused."""
+        """Follow a run as long as its supervisor answers. Raises Refused."""
         await self._describe(control, feed)
         newest = _Newest(asyncio.get_running_loop(), partial(self._take_frame, feed))
         control.view(newest)
@@ -187,7 +187,7 @@ class LiveSource:
             newest.end()
 
     async def _describe(self, control: Control, feed: Feed) -> None:
-        """Learn which world it is, and tell its scene where that is new."""
+        """Request the description of the world, and publish its scene if that is new."""
 
         def ask() -> tuple[dict[str, Any], World]:
             what = control.describe(QUESTION_S, self._closing.is_set)
@@ -203,7 +203,7 @@ class LiveSource:
             feed.show(moment)
 
     async def _poll(self, control: Control, feed: Feed) -> None:
-        """Ask for statuses, renew the lease, describe again where frames do not fit; as long as somebody looks."""
+        """Request statuses, renew the lease, and describe again if frames do not fit, while a browser watches."""
         following, lease = self._following, Wanted()
         renewed_s = described_s = 0.0
         while True:

@@ -1,6 +1,6 @@
-"""Whether a run is there, as pages say it: here, away (its supervisor is looked for), or ended, how, with its capture.
+"""Presence of a run as pages show it: here, away (its supervisor is searched), or ended, with reason and capture.
 
-How it ended is in its folder, where its supervisor writes the result and `up` what it knows better.
+The result is in the run's folder, written by the supervisor and completed by `up`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def away(text: str) -> dict[str, Any]:
 def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
     """Return the message about a run that has a result; None for one that has not ended, or may be resumed.
 
-    `stopped_by` names who asked for the end, where that is known.
+    `stopped_by` is the requester of the end, if known.
     """
     if folder.result() is None:
         return None

@@ -1,4 +1,4 @@
-"""What people watch closely: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
+"""Watched details: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
 
 Pure; explaining takes milliseconds a packet, so it is done where it holds up nobody, and once for each packet.
 """
@@ -24,7 +24,7 @@ FRAMES_APART_TICKS: Final = 20
 
 
 class Watched:
-    """What was told of what is watched."""
+    """The last published details."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -33,9 +33,9 @@ class Watched:
         """The drops of each link as they were explained last."""
         self._rules = RuleTexts(deployment)
         self._said: dict[Link, str] = {}
-        """The rule of each link as it was told last."""
+        """The last published rule of each link."""
         self._read: dict[str, int] = {}
-        """The tick of the last reading that was told, by robot and channel."""
+        """The tick of the last published reading, by robot and channel."""
 
     def keep(self, frame: Frame) -> None:
         """Keep a frame that was shown, some ticks apart."""

@@ -1,4 +1,4 @@
-"""The command that begins a run with the frame that is seen: what `foosim-supervisor up --from` accepts."""
+"""The command that begins a run with the shown frame: arguments that `foosim-supervisor up --from` accepts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def branch_answer(recording: Recording, tick: int) -> Answered:
 
 
 def _near(path: Path) -> Path:
-    """Return a path as it is said from here: relative where it lies below this folder."""
+    """Return a path for display: relative if it is below this folder."""
     whole = Path(os.path.abspath(path))
     return whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else whole
 

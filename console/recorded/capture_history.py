@@ -27,7 +27,7 @@ PACKETS_MAX: Final = 10_000_000
 
 
 class CaptureHistory:
-    """Gathers what happened. `gather` reads on; all else tells of what was read so far."""
+    """Collects events. `gather` reads further; all else covers the part that was read."""
 
     def __init__(self, recording: Recording) -> None:
         """`recording` has the topics /packets and /clients in its index."""
@@ -42,13 +42,13 @@ class CaptureHistory:
         self.timeline = Timeline(recording.deployment)
         self._done: dict[str, int] = dict.fromkeys((EPOCHS, RECOVERIES, TICK, FRAME, PACKETS), 0)
         self._asked: list[tuple[int, str]] = []
-        """What was asked of the network, by tick."""
+        """Requested events of the network, by tick."""
         self._told: dict[int, Explained] = {}
         self._rules = RuleTexts(recording.deployment)
         self._generation = recording.index.generation
 
     def refresh(self) -> None:
-        """Take note of what was written since. Raises CaptureError."""
+        """Read rows written since the last call. Raises CaptureError."""
         self.recording.refresh()
         if self.recording.index.generation != self._generation:
             self._begin()

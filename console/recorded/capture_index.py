@@ -1,4 +1,4 @@
-"""Where the rows of a capture stand, so that any of them is read at once: what the time slider seeks with.
+"""Index of a capture's rows, so that any of them is read at once: used by the time slider.
 
 The index is made of the heads of chunks and their message indexes: no chunk is unpacked for it, but the last of a file
 that was cut within its indexes. A capture that is still being written is looked at again and again (`refresh`), from
@@ -54,7 +54,7 @@ class Chunk(NamedTuple):
 
 @dataclass(slots=True)
 class Places:
-    """Where the messages of one topic stand, in the order of the files."""
+    """Offsets of the messages of one topic, in the order of the files."""
 
     log_ns: array[int] = field(default_factory=lambda: array("Q"))
     chunk: array[int] = field(default_factory=lambda: array("I"))

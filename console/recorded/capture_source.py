@@ -46,7 +46,7 @@ REFRESH_S: Final = 1.0
 MARKS_TOLD: Final = 500
 """Of one message."""
 UNSEEN_HZ: Final = 2.0
-"""How often a recording moves on that nobody looks at."""
+"""Update period of a recording that no browser watches."""
 
 
 class FileSource:
@@ -89,7 +89,7 @@ class FileSource:
         """Number of the world whose scene they are in."""
         self._overlay_ns = 0
         self._told_ns = 0
-        """Up to which time readings were told."""
+        """Time up to which readings were published."""
         self._is_inexact = False
         """Whether frames between the captured ones cannot be computed."""
 
@@ -109,7 +109,7 @@ class FileSource:
     # --- running -----------------------------------------------------------------------------------------------------
 
     async def run(self, feed: Feed) -> None:
-        """Tell the feed until it is cancelled; what is damaged in the file is told, and the rest is shown."""
+        """Feed messages until cancelled; damage in the file is reported, and the rest is shown."""
         try:
             async with asyncio.TaskGroup() as tasks:
                 for work in (self._show, self._gather, self._tell_status, self._tell_links, self._refresh):
@@ -138,7 +138,7 @@ class FileSource:
         return min(max((self.clock.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
 
     async def _show(self, feed: Feed) -> None:
-        """Tell what is seen, the newest wish alone, at most as often as somebody looks."""
+        """Publish the moment of the newest request, at most at the browsers' rate."""
         shown: tuple[int, int, bool] | None = None
         clock, jumps, due_ns = self.clock, self.clock.jumps, 0
         while True:
@@ -192,7 +192,7 @@ class FileSource:
             feed.describe(self._about, self.recording.worlds[self._world].drawing.content())
 
     async def _show_exactly(self, feed: Feed, look: Look) -> None:
-        """Tell the frame of a tick that has none, computed again; it is told what stands in the way."""
+        """Publish the recomputed frame of a tick without one, or the reason why it cannot be computed."""
         if self._recompute is None or self._is_inexact or look.asked == look.tick == 0:
             return
         try:
@@ -217,10 +217,10 @@ class FileSource:
         frame = self.recording.frame_up_to(tick)
         return None if frame is None else (frame, [*self.recording.inputs(frame.tick, tick)])
 
-    # --- what happened -----------------------------------------------------------------------------------------------
+    # --- events ------------------------------------------------------------------------------------------------------
 
     async def _gather(self, feed: Feed) -> None:
-        """Read what happened, slice by slice, and tell the marks as they are found."""
+        """Read events, slice by slice, and publish the marks as they are found."""
         history = await self._in(self._back, self._open_history)
         told = False
         while True:
@@ -281,7 +281,7 @@ class FileSource:
             await asyncio.sleep(STATUS_S)
 
     async def _tell_links(self, feed: Feed) -> None:
-        """Tell what links did in the window up to now, the last drops of those that are watched, and readings."""
+        """Publish the links' figures of the window up to now, the last drops of watched links, and readings."""
         before: Any = None
         while True:
             history, at = self._history, self.tick()
@@ -330,7 +330,7 @@ class FileSource:
                 told.append({"type": "readings", "robot": robot, "channel": channel, "points": points})
         return told
 
-    # --- asked -------------------------------------------------------------------------------------------------------
+    # --- requests ----------------------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if verb == BRANCH or self._deck is None:

@@ -1,4 +1,4 @@
-"""A capture as something to look at: the world at any tick, as exactly as the capture has it.
+"""Random access to a capture's world: its state at any tick, as exactly as the capture has it.
 
 At a tick there may be a captured frame, which is the world to the last bit, or captured poses alone; else what was
 captured last before it holds. `Look.kind` says which.
@@ -100,7 +100,7 @@ class Recording:
         return (times[0] // self.tick_ns, times[-1] // self.tick_ns) if times else (0, 0)
 
     def refresh(self) -> bool:
-        """Look at what was written since; return whether there is more. Raises CaptureError."""
+        """Read rows written since the last call; return whether there is more. Raises CaptureError."""
         if not self.index.refresh():
             return False
         if self.index.generation != self._generation:
@@ -205,6 +205,6 @@ class Recording:
             yield captured_tick(self.row(TICK, number))
 
     def epoch_at(self, tick: int) -> EpochRow | None:
-        """Return who computed from a tick on."""
+        """Return the owners from a tick on."""
         number = bisect_right(self.epochs, tick, key=lambda epoch: epoch.tick) - 1
         return self.epochs[number] if number >= 0 else None

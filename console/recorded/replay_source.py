@@ -103,7 +103,7 @@ class PlayedSource:
             await asyncio.to_thread(thread.join)
 
     def _listen(self, feed: Feed, tell: Callable[[Callable[[], None]], None]) -> None:
-        """Hear and ask until the replay or this source ends. Raises Refused."""
+        """Receive and send requests until the replay or this source ends. Raises Refused."""
         while not self._ended.is_set():
             ended = self._replay.ended  # what was heard while something was asked waits for the next `take`
             for item in self._replay.take(HEAR_S):
@@ -117,7 +117,7 @@ class PlayedSource:
             if ended:
                 raise ReplayGone("the replay has ended")
 
-    # --- heard -------------------------------------------------------------------------------------------------------
+    # --- messages ----------------------------------------------------------------------------------------------------
 
     def _tell(self, feed: Feed, item: Any) -> None:
         if isinstance(item, PlayedPoses):
@@ -185,7 +185,7 @@ class PlayedSource:
             }
         )
 
-    # --- asked -------------------------------------------------------------------------------------------------------
+    # --- requests ----------------------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         checked(verb, arguments, ARGUMENTS)
@@ -207,7 +207,7 @@ class PlayedSource:
         return Answered(f"{status['state']} at tick {tick}, {status['rate']}", tick)
 
     def _refuse_all(self) -> None:
-        """Answer what nobody will: the connection has ended."""
+        """Answer the open requests: the connection has ended."""
         with suppress(queue.Empty):
             while True:
                 _, _, answer = self._asked.get_nowait()

@@ -1,4 +1,4 @@
-"""Where the entities of a capture are at any time, also between what it has: for a comparison with another source.
+"""Poses of a capture's entities at any time, interpolated between captured ones: for comparisons of sources.
 
 What was captured at the time itself is taken as it is; between two captured moments that are close a position is
 interpolated, but not over a jump.

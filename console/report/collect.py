@@ -1,4 +1,4 @@
-"""What a report says of a captured run's network: counts, delays and losses over time, causes, ages, queues, places.
+"""Collects a report on a captured run's network: counts, delays and losses over time, causes, ages, queues, places.
 
 Gathered in one pass over the packets, with bins and samples of bounded size, whatever the length of the run. Times are
 simulated; a packet is counted when it was sent.
@@ -52,7 +52,7 @@ class RadioText:
 
 @dataclass(frozen=True, slots=True)
 class RuleText:
-    """A rule of the deployment: whose packets it is for, and what it writes."""
+    """A rule of the deployment: its selectors, and its settings."""
 
     name: str
     ends: str

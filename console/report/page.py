@@ -1,4 +1,4 @@
-"""A report as one HTML page that stands by itself: nothing is fetched from elsewhere, and its tables need no script.
+"""A report as one self-contained HTML page: it fetches nothing, and its tables need no script.
 
 The script that draws is that of the console's page, in the page with the data that it reads. Every text is escaped,
 also those that the capture's own makers chose.

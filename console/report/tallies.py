@@ -1,4 +1,4 @@
-"""What a report counts while the packets of a capture go by: plain sums, and samples of bounded size."""
+"""Counters of a report over the packets of a capture: plain sums, and samples of bounded size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the console knows: what each source has last told, who looks at what, and who gets what of it.
+"""The console's board: the last messages of each source, the subscriptions of browsers, and their distribution.
 
 A browser that joins is told the sources, their scenes, the last moment and the last of each message, so that it draws
 at once. Pure: time is given by `clock`, bytes leave through each reader's outbox.
@@ -27,15 +27,15 @@ PLOTTED: Final = frozenset({"status", "links", "readings"})
 
 
 class Onlooker(Protocol):
-    """Looks at the moments of all sources, as a comparison of two of them does."""
+    """Observes the moments of all sources, for comparisons of two of them."""
 
     def saw(self, source: int, moment: Moment) -> Iterable[Mapping[str, Any]]:
-        """Return what there is to tell of it: messages of pages, whole."""
+        """Return complete messages for pages."""
 
 
 @dataclass
 class Told:
-    """What one source has told last."""
+    """The last messages of one source."""
 
     about: About
     generation: int = 0
@@ -46,14 +46,14 @@ class Told:
     kept: dict[str, bytes] = field(default_factory=dict)
     warning: bytes = b""
     presence: Mapping[str, Any] = field(default_factory=dict)
-    """Whether it is there, as it told last."""
+    """Its last reported presence."""
     watched: dict[Link, bytes] = field(default_factory=dict)
-    """The last message about each link that somebody watches."""
+    """The last message about each watched link."""
     marks: list[Mapping[str, Any]] = field(default_factory=list)
 
 
 class Board:
-    """The one place that sources tell and readers are served from; all of it in one thread."""
+    """Distributes messages of sources to readers; all of it in one thread."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Board:
         self._wanted = [Wanted() for _ in sources]
 
     def feed(self, source: int) -> SourceFeed:
-        """Return where a source tells of its world."""
+        """Return the feed of a source."""
         return SourceFeed(self, source)
 
     # --- browsers ----------------------------------------------------------------------------------------------------
@@ -101,7 +101,7 @@ class Board:
             self._look()
 
     def follow(self, reader: Reader, message: Show | Watch | Plot) -> tuple[Curve, ...]:
-        """Take what a page wants of a source; return the curves that it did not plot before. Raises Malformed."""
+        """Set a page's subscription to a source; return the curves that it did not plot before. Raises Malformed."""
         follows = reader.follows[self.checked(message.source)]
         new: tuple[Curve, ...] = ()
         if isinstance(message, Show):
@@ -155,7 +155,7 @@ class Board:
         )
 
     def _look(self) -> None:
-        """Tell each source what all browsers together look at, where that has changed."""
+        """Send each source the union of the browsers' subscriptions, if it has changed."""
         for number, source in enumerate(self.sources):
             all_follow = [reader.follows[number] for reader in self.readers.values()]
             links = sorted({follows.link for follows in all_follow if follows.link is not None})
@@ -176,11 +176,11 @@ class Board:
                 source.want(wanted)
 
     def has_ended(self) -> str:
-        """Return how the first source has ended; empty while it goes on."""
+        """Return how the first source has ended; empty while it runs."""
         presence = self._told[0].presence
         return str(presence["text"]) if presence.get("state") == "ended" else ""
 
-    # --- what sources tell -------------------------------------------------------------------------------------------
+    # --- messages of sources -----------------------------------------------------------------------------------------
 
     def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
         told = self._told[source]
@@ -233,7 +233,7 @@ class Board:
                 self._cut_off(reader, str(slow))
 
     def _send(self, reader: Reader, source: int, kind: str, message: Mapping[str, Any], text: bytes) -> None:
-        """Have one reader get a message, if it looks at that, and the further points of its curves. Raises TooSlow."""
+        """Send a reader a message, if it has subscribed, and the new points of its curves. Raises TooSlow."""
         follows = reader.follows[source]
         if kind == "watched":
             if follows.link == tuple(message["link"]):
@@ -252,7 +252,7 @@ class Board:
 
 
 class SourceFeed:
-    """Where one source tells of its world: a `source.Feed`."""
+    """The feed of one source: a `source.Feed`."""
 
     def __init__(self, board: Board, source: int) -> None:
         self._board, self._source = board, source

@@ -1,6 +1,6 @@
-"""What is served beside the WebSocket: the page's files, held in memory, and what a browser is told to allow them.
+"""Files served beside the WebSocket, held in memory, with their security headers.
 
-Nothing outside of this list is served, whatever the path says.
+Nothing outside of this list is served.
 """
 
 from __future__ import annotations

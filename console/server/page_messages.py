@@ -1,6 +1,6 @@
-"""What a page says to the console: JSON, checked whole, bounded.
+"""Messages from a page to the console: JSON, validated, bounded.
 
-What is not one of these ends the connection with a reason.
+Any other message ends the connection with a reason.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class Hello(_Message, frozen=True, tag="hello"):
-    """First: who this is."""
+    """The first message: authentication."""
 
     token: Annotated[str, Meta(max_length=128)]
 
@@ -44,7 +44,7 @@ class Ask(_Message, frozen=True, tag="ask"):
 
 
 class Show(_Message, frozen=True, tag="show"):
-    """What the page draws of a source, and how often at most."""
+    """The page's subscription to a source, with the greatest rate."""
 
     source: Place = 0
     overlays: Annotated[list[Literal["contacts", "rays"]], Meta(max_length=8)] = []
@@ -91,7 +91,7 @@ _decoder: Final[msgspec.json.Decoder[Message]] = msgspec.json.Decoder(Message)
 
 
 def read_message(payload: str | bytes) -> Message:
-    """Return what a page says, or raise `Malformed`."""
+    """Return a page's message, or raise `Malformed`."""
     if isinstance(payload, bytes):
         raise Malformed("a binary message; a page says JSON")
     try:

@@ -37,7 +37,7 @@ class Shown:
 
 @dataclass
 class Follows:
-    """What one browser looks at in one source."""
+    """The subscription of one browser to one source."""
 
     hz: float = 50.0
     overlays: frozenset[str] = frozenset()
@@ -54,16 +54,16 @@ class TooSlow(Exception):
 
 @dataclass
 class Reader:
-    """One browser that has said who it is."""
+    """One authenticated browser."""
 
     name: str
     role: Role
     wake: Callable[[], None]
     """Called when something waits."""
     follows: dict[int, Follows] = field(default_factory=dict)
-    """By source; all are followed until the page says otherwise."""
+    """By source; all are followed until the page requests otherwise."""
     _first: dict[Hashable, bytes] = field(default_factory=dict)
-    """What the others build on, newest wins: sources and scenes."""
+    """Messages that others depend on, the newest only: sources and scenes."""
     _ordered: deque[bytes] = field(default_factory=deque)
     _newest: dict[Hashable, bytes | Shown] = field(default_factory=dict)
 
@@ -72,14 +72,14 @@ class Reader:
         self.wake()
 
     def put(self, message: bytes) -> None:
-        """Add what nothing replaces. Raises TooSlow."""
+        """Add a message that is never replaced. Raises TooSlow."""
         if len(self._ordered) >= WAITING_MAX:
             raise TooSlow(f"{WAITING_MAX} messages wait for this page: it reads too slowly")
         self._ordered.append(message)
         self.wake()
 
     def put_newest(self, key: Hashable, message: bytes | Shown) -> None:
-        """Add what takes the place of what waits under this key."""
+        """Add a message that replaces the waiting one of this key."""
         self._newest[key] = message
         self.wake()
 

@@ -34,9 +34,9 @@ from foosim.console.shown.source import Answered, Curve, NotAsked, Source
 READERS_MAX: Final = 64
 """Browsers at once."""
 CONNECTIONS_MAX: Final = 256
-"""All that is connected, also what has said nothing yet."""
+"""Limit of all connections, authenticated or not."""
 ASKS_MAX: Final = 8
-"""What one browser may have asked and not been answered."""
+"""Limit of one browser's unanswered requests."""
 HELLO_S: Final = 5.0
 CLOSE_S: Final = 1.0
 PING_S: Final = 20.0
@@ -57,13 +57,13 @@ LOCAL_HOSTS: Final = frozenset({"127.0.0.1", "localhost", "[::1]"})
 
 @dataclass(frozen=True, slots=True)
 class Tokens:
-    """What a browser has to know."""
+    """The tokens of operators and viewers."""
 
     view: str
     operate: str
 
     def role(self, token: str) -> Role | None:
-        """Return what the one who knows a token may do."""
+        """Return the permissions of a token."""
         given = token.encode()
         if hmac.compare_digest(given, self.operate.encode()):
             return "operator"
@@ -71,7 +71,7 @@ class Tokens:
 
 
 def new_tokens() -> Tokens:
-    """Return tokens that nobody guesses: 144 bits each."""
+    """Return random tokens of 144 bits."""
     view, operate = (urlsafe_b64encode(os.urandom(18)).decode() for _ in range(2))
     return Tokens(view, operate)
 
@@ -128,7 +128,7 @@ class ConsoleServer:
                 task.cancel()
 
     async def run_sources(self) -> None:
-        """Have all sources tell of their worlds until this is cancelled."""
+        """Run all sources until this is cancelled."""
         async with asyncio.TaskGroup() as group:
             for number, source in enumerate(self._sources):
                 group.create_task(self._run(number, source))
@@ -236,7 +236,7 @@ class ConsoleServer:
             writer.cancel()
 
     async def _read(self, connection: ServerConnection, reader: Reader) -> None:
-        """Do what a page says, until its connection ends. Raises Malformed."""
+        """Handle a page's messages, until its connection ends. Raises Malformed."""
         asked = asyncio.Semaphore(ASKS_MAX)
         async for payload in connection:
             message = read_message(payload)
@@ -258,7 +258,7 @@ class ConsoleServer:
         task.add_done_callback(self._tasks.discard)
 
     async def _ask(self, reader: Reader, ask: Ask, asked: asyncio.Semaphore) -> None:
-        """Have a source do what a page asks, and answer it."""
+        """Forward a page's request to a source, and answer it."""
         source = self._sources[ask.source]
         try:
             if reader.role != "operator":
@@ -284,7 +284,7 @@ class ConsoleServer:
         )
 
     async def _tell_history(self, reader: Reader, source: int, curves: tuple[Curve, ...]) -> None:
-        """Tell a browser what is known so far of curves that it has begun to plot."""
+        """Send a browser the recorded points of curves that it has begun to plot."""
         series = []
         for curve in curves:
             name, unit, points = await self._sources[source].history(curve)
@@ -309,7 +309,7 @@ class ConsoleServer:
 
 
 async def _write(connection: ServerConnection, reader: Reader, waits: asyncio.Event) -> None:
-    """Send what waits for a browser as fast as it reads, until its connection ends."""
+    """Send a browser's waiting messages as fast as it reads, until its connection ends."""
     with contextlib.suppress(ConnectionClosed):
         while True:
             await waits.wait()

@@ -1,4 +1,4 @@
-"""Serves sources until the process is told to end: what `foosim-console` and `foosim-replay view` have in common.
+"""Serves sources until a signal ends the process; shared by `foosim-console` and `foosim-replay view`.
 
 By default only this machine reaches the page. Another address takes a certificate, which browsers have to trust: a
 token that travels in the open is known to everybody on the way.
@@ -24,12 +24,12 @@ from foosim.console.shown.source import Source
 from foosim.runtime.process import Stop
 
 MakeSources = Callable[[], tuple[Sequence[Source], Sequence[Onlooker]]]
-"""Makes sources, and who looks at all of them; called in the event loop."""
+"""Makes sources and their observers; called in the event loop."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """Where the page is served, to whom."""
+    """Address and access of the page."""
 
     listen: str = LOOPBACK
     certificate: Path | None = None
@@ -38,11 +38,11 @@ class ServeOptions:
     open: bool = False
     """Have the browser of this machine show it."""
     announce: Path | None = None
-    """A file that gets the addresses, which nobody else can read: whoever knows them may operate."""
+    """A file for the addresses, readable by its owner only: the operator's address permits requests."""
 
 
 def serve_sources(make: MakeSources, options: ServeOptions, say: Callable[[str], None]) -> None:
-    """Serve until a signal ends it. Raises BadValue, Insecure, and Failed where nobody can listen."""
+    """Serve until a signal ends it. Raises BadValue, Insecure, and Failed if the address cannot be used."""
     address, tls = listening_at(options)
     asyncio.run(_serve(make, options, address, tls, say))
 
@@ -101,7 +101,7 @@ async def _serve(
 
 
 def _announce(options: ServeOptions, stem: str, tokens: Tokens, say: Callable[[str], None]) -> None:
-    """Say the addresses of the page."""
+    """Report the addresses of the page."""
     view = f"{stem}#view={tokens.view}"
     operate = "" if options.view_only else f"{stem}#operate={tokens.operate}"
     text = f"console: {operate}, to look only: {view}" if operate else f"console: {view}"

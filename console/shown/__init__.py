@@ -1,1 +1,1 @@
-"""What a page shows of a world, whatever it comes from: scene, poses, overlays, links, curves, marks."""
+"""The contents of a page, for any kind of source: scene, poses, overlays, links, curves, marks."""

@@ -1,4 +1,4 @@
-"""What people asked of a run's world, in words: balls and robots that were added, removed, pushed, moved."""
+"""Descriptions of edits of a run's world: balls and robots that were added, removed, pushed, moved."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from foosim.capture.rows import EditRow, EpochRow
 
 
 def edit_text(edit: EditRow) -> str:
-    """Return what an edit of the world does, empty where nobody asked for it."""
+    """Return a description of a requested edit; empty for other edits."""
     if edit.kind == "push":
         return f"push {edit.name} by {_vector(edit.impulse)} N s"
     if edit.kind == "add":

@@ -33,7 +33,7 @@ class Drawing:
         return scene_content(self.deployment, self.layout, self.scene)
 
     def moment(self, frame: Frame, jump: bool = False, paused: bool = False) -> Moment:
-        """Return what there is to see in a frame of this layout."""
+        """Return the moment of a frame of this layout."""
         return Moment(frame.tick, self.poser.poses(frame.values), frame.values, jump, paused)
 
     def overlay(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:

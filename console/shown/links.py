@@ -38,7 +38,7 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """What a link has done since the start. Delays are those of all delivered packets, added up."""
+    """Totals of a link since the start. Delays are those of all delivered packets, added up."""
 
     offered: int
     delivered: int
@@ -87,7 +87,7 @@ class Windows:
         return {key: _between(self._before(key), count) for key, count in counts.items()}
 
     def _before(self, key: Key) -> Count:
-        """Return what a link had done when the window began."""
+        """Return a link's totals at the start of the window."""
         if self._is_beginning:
             return _NOTHING
         known = (counts.get(key, _NOTHING if are_all else None) for _, counts, are_all in self._kept)
@@ -194,7 +194,7 @@ class Links:
         return ends
 
     def _site(self, endpoint: str) -> Vector | None:
-        """Return where the deployment says that an endpoint without a body is."""
+        """Return the deployment's place of an endpoint without a body."""
         places = self._deployment.network.places
         if self._ends.get(endpoint) is not None or not any(fnmatchcase(endpoint, glob) for glob in places):
             return None

@@ -1,4 +1,4 @@
-"""What is drawn over a world on request: contacts, and what proximity sensors see."""
+"""Overlays of a world on request: contacts, and the rays of proximity sensors."""
 
 from __future__ import annotations
 

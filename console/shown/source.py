@@ -1,4 +1,4 @@
-"""What a page looks at: a running system, a capture, a replay, recorded poses; all behind one interface.
+"""The sources of a page: a running system, a capture, a replay, recorded poses; all behind one interface.
 
 A `Source` runs inside the console's event loop and tells a `Feed` of its world: which scene it has, what there is to
 see at a moment, and messages in the form that pages read (docs/reference/console.md lists them). It knows no browser;
@@ -28,12 +28,12 @@ OVERLAYS: Final = ("contacts", "rays")
 
 
 class NotAsked(Refused):
-    """A source has no such verb, or not for this browser; the text says which there are."""
+    """A source has no such verb, or not for this browser; the text lists those that it has."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a page is told of a source before its scene."""
+    """The description of a source, sent before its scene."""
 
     kind: Kind
     name: str
@@ -41,14 +41,14 @@ class About:
     world: str
     tick_ns: int
     verbs: tuple[str, ...]
-    """What an operator may ask."""
+    """The verbs of an operator."""
     span: tuple[int, int] | None = None
     """First and last tick of what has an end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What there is to see at one tick."""
+    """The visible state at one tick."""
 
     tick: float
     poses: NDArray[np.float32]
@@ -62,12 +62,12 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What all browsers together look at in one source."""
+    """The union of all browsers' subscriptions to one source."""
 
     readers: int = 0
     """How many browsers there are."""
     hz: float = 0.0
-    """Moments a second; 0 when nobody draws them."""
+    """Moments a second; 0 when no browser draws them."""
     overlays: frozenset[str] = frozenset()
     links: tuple[Link, ...] = ()
     """Whose last drops are explained."""
@@ -77,7 +77,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What became of what was asked; `tick` is the one from which it holds."""
+    """Result of a request; `tick` is the one from which it holds."""
 
     text: str
     tick: int
@@ -100,13 +100,13 @@ class Curve:
 
 
 class Feed(Protocol):
-    """Where a source tells of its world. Called in the event loop's thread."""
+    """Receives a source's messages. Called in the event loop's thread."""
 
     def describe(self, about: About, scene: Mapping[str, Any]) -> None:
         """Say the scene, as `scene_json.scene_content` makes it, and what is new about the source."""
 
     def show(self, moment: Moment) -> None:
-        """Say what there is to see; `poses` has as many rows as the scene has links."""
+        """Publish a moment; `poses` has as many rows as the scene has links."""
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Say a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
@@ -121,7 +121,7 @@ class Source(Protocol):
         """What is known of it before it runs, and from then on."""
 
     async def run(self, feed: Feed) -> None:
-        """Tell the feed of the world until it is cancelled, or has nothing more to tell."""
+        """Publish the world to the feed until cancelled or complete."""
 
     def want(self, wanted: Wanted) -> None:
         """Take note of what the browsers look at. Called at each change, in the event loop's thread."""

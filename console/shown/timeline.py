@@ -1,4 +1,4 @@
-"""What happened in a run, as marks on its time line: what the world's rules did, what was asked for, who was lost.
+"""Events of a run as marks on its time line: effects of the world's rules, requests, losses.
 
 The rules leave their memory in frames, so their events are read from these, to the tick, also where only every tenth
 frame is there. Pure, and bounded whatever the length of the run.
@@ -36,7 +36,7 @@ GOAL, KICKOFF, OUT, DEAD, QUARANTINE, DOWN, EMPTY = "goal", "kickoff", "out", "d
 EPOCH, RECOVERY, MOVE, NETWORK, DROPS = "epoch", "recovery", "move", "network", "drops"
 
 FLAGS: Final = {"quarantined": (QUARANTINE, "is in quarantine"), "down": (DOWN, "is out of service")}
-"""Slots of an entity that are 1 while something holds: the kind of the mark, and what it says."""
+"""Slots of an entity that are 1 while something holds: the kind of the mark, and its text."""
 
 
 @dataclass(frozen=True, slots=True)

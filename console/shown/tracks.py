@@ -1,4 +1,4 @@
-"""Where something was over time, from samples: what a recorded reality, and a comparison of two sources, are made of.
+"""Positions over time, from samples: used for recorded poses and for comparisons of two sources.
 
 Between two samples a position is interpolated along a line and an orientation along the arc, but not over a gap and not
 over a jump: there nothing is known. Times are ns, positions m, orientations quaternions x, y, z, w, world frame.

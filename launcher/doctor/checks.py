@@ -1,10 +1,9 @@
-"""Looks whether a deployment could run here, before it does: what is fine, what is not, and what to do.
+"""Checks whether a deployment could run on this machine, with a remedy for each problem.
 
-Each check is a function that gives findings about one subject, and a row of `CHECKS`; nothing is changed, nothing is
-started. Checks are about the machine they run on, which is the supervisor's or a host of the deployment: they run on
-each host, too, and `doctor.remote` brings their findings home. There `findings_of` adds what only a comparison tells: a
-host's clock, its arithmetic, whether its ports are reached from here. Clocks are looked at for people, and for the
-dates of certificates; no run compares them.
+Each check is a function that returns findings about one subject, and a row of `CHECKS`; it changes and starts nothing.
+A check concerns the machine it runs on, the supervisor's or a host of the deployment: `doctor.remote` collects the
+findings of the hosts. `findings_of` adds comparisons with this machine: a host's clock, its arithmetic, and whether its
+ports can be reached from here. Clocks matter for logs and for the dates of certificates; no run compares them.
 """
 
 from __future__ import annotations
@@ -63,15 +62,15 @@ HERE: Final = "here"
 PLACEMENT: Final = "placement"
 CLOCK_WARN_NS: Final = 50_000_000
 TIME_ERROR: Final = 5
-"""What `adjtimex` returns of a clock that nothing keeps in time."""
+"""Result of `adjtimex` for a clock that is not synchronized."""
 PYTHON_TESTED: Final = (3, 11)
 IMPORT_S: Final = 20.0
-"""How long the players' modules may take: half of what a host may take for all its answers."""
+"""Time limit for importing the players' modules: half of a host's limit for all its answers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at, on one host. `remedy` says what to do; it is empty when all is fine."""
+    """Result of one check on one host. `remedy` is empty when all is fine."""
 
     check: str
     subject: str
@@ -83,7 +82,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is to be run: the deployment, where it would listen, and its certificates if any."""
+    """The planned run: the deployment, its address, and its certificates if any."""
 
     deployment: Deployment
     listen: str
@@ -95,7 +94,7 @@ class Case:
     ca: str = ""
     """On a host: the fingerprint of the root that the run has; empty for a run without certificates."""
     reach: str = ""
-    """On a host: where the supervisor would listen, and somebody does meanwhile; empty where that cannot be tried."""
+    """On a host: the supervisor's planned address, with a test listener; empty where that cannot be tested."""
 
     @property
     def is_there(self) -> bool:
@@ -118,12 +117,12 @@ class Case:
         return places(self.deployment).get(VHUB) == self.host
 
     def provide(self, more: str = "") -> str:
-        """Return the command that makes what certificates are missing, and brings them to a host."""
+        """Return the command that issues missing certificates, and sends them to a host."""
         return f"foosim-pki init DIR FILE{more} --send" if self.is_there else f"foosim-pki init {self.pki} FILE{more}"
 
 
 class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the host finds of itself, and the fingerprint of its arithmetic."""
+    """The host's own findings, and the fingerprint of its arithmetic."""
 
     fingerprint: str
     findings: list[Finding]
@@ -131,7 +130,7 @@ class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What was heard of one host: its answer, or a `problem` and its `remedy`.
+    """Response of one host: its answer, or a `problem` and its `remedy`.
 
     Its clock is `offset_ns` ahead of the one here, give or take `error_ns`. `radio` is where a vHub there would listen,
     if that was tried, and `not_reached` why it would not be reached from here.
@@ -153,7 +152,7 @@ def examine(case: Case) -> list[Finding]:
 
 
 def is_well(findings: Iterable[Finding]) -> bool:
-    """Whether nothing stands in the way; warnings do not."""
+    """Whether there is no problem; warnings do not count."""
     return all(finding.state != "problem" for finding in findings)
 
 
@@ -165,7 +164,7 @@ _Said = tuple[str, State, str, str]
 
 
 def _versions(case: Case) -> Iterator[_Said]:
-    """foosim, Python and each library against what this foosim asks for; whether the hot path is compiled."""
+    """Versions of foosim, Python and each library against the requirements; whether the hot path is compiled."""
     yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
     python = platform.python_version()
     if sys.version_info[:2] == PYTHON_TESTED:
@@ -192,7 +191,7 @@ def _library(wanted: Requirement) -> _Said:
 
 
 def _arithmetic(case: Case) -> Iterator[_Said]:
-    """Nodes whose fingerprints differ are refused, unless the deployment says `mixed_cpu: true`."""
+    """Nodes whose fingerprints differ are refused, unless the deployment has `mixed_cpu: true`."""
     yield "fingerprint", "fine", f"{library_fingerprint().hex()[:16]} on {platform.machine()}", ""
 
 
@@ -200,14 +199,14 @@ def _arithmetic(case: Case) -> Iterator[_Said]:
 
 
 def _certificates(case: Case) -> Iterator[_Said]:
-    """The certificate or password of everybody here: there, of this root, its own key, valid, for the right host."""
+    """The certificate or password of each process here: present, of this root, with its key, valid, for this host."""
     folder = case.pki
     if folder is None and case.ca:
-        remedy = f"say in hosts.{case.host}.pki in which folder they are to be, then {case.provide()}"
-        yield "folder", "problem", "the deployment does not say where they are on this host", remedy
+        remedy = f"set hosts.{case.host}.pki to their folder, then {case.provide()}"
+        yield "folder", "problem", "the deployment has no folder for them on this host", remedy
         return
     if folder is None:
-        yield "folder", "fine", "none: only this machine can take part, or whoever reaches it with --insecure", ""
+        yield "folder", "fine", "none: only this machine can take part, or with --insecure any process", ""
         return
     try:
         ca = read_ca(folder, wall_clock.now_utc())
@@ -231,12 +230,12 @@ def _certificates(case: Case) -> Iterator[_Said]:
 
 
 def fingerprint(certificate: x509.Certificate) -> str:
-    """Return what tells a certificate from all others, in hex."""
+    """Return the fingerprint of a certificate, in hex."""
     return certificate.fingerprint(hashes.SHA256()).hex()
 
 
 def _password(folder: Path, who: str, case: Case) -> _Said:
-    """Look at a client's password, and that it has no certificate beside it."""
+    """Check a client's password, and that it has no certificate beside it."""
     try:
         read_password(folder / f"{who}{PASSWORD_SUFFIX}")
     except CertificateError as error:
@@ -247,7 +246,7 @@ def _password(folder: Path, who: str, case: Case) -> _Said:
 
 
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
-    """Look at the certificate that one of the run shows."""
+    """Check the certificate of one process of the run."""
     path = certificate_path(folder, who)
     if not path.exists():
         return who, "problem", "no certificate", case.provide()
@@ -276,7 +275,7 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
 
 
 def _ports(case: Case) -> Iterator[_Said]:
-    """Whether those who listen on this machine can, where they are asked to."""
+    """Whether the processes that listen on this machine can use their addresses."""
     if not case.is_there:
         yield _port("simulation plane", case.address)
     if case.has_vhub:
@@ -307,7 +306,7 @@ def _network(case: Case) -> Iterator[_Said]:
 
 
 def _placement(case: Case) -> Iterator[_Said]:
-    """On the supervisor's machine: whether what is placed on hosts could connect to here."""
+    """On the supervisor's machine: whether processes on other hosts could connect to it."""
     where = remotes(case.deployment)
     if case.is_there or not where:
         return
@@ -331,7 +330,7 @@ def _clock(case: Case) -> Iterator[_Said]:
 
 
 def _clock_state() -> int:
-    """Ask the kernel how it keeps time; TIME_ERROR where it does not, 0 where it cannot be asked."""
+    """Return the kernel's clock state; TIME_ERROR if it is not synchronized, 0 if it cannot be read."""
     if sys.platform != "linux":
         return 0
     nothing_to_set = ctypes.create_string_buffer(512)
@@ -433,7 +432,7 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
 
 
 def findings_of(told: Told, own_fingerprint: str, mixed_cpu: bool) -> list[Finding]:
-    """Return what is to be said of a host: what it found itself, and what comparing it with this machine tells."""
+    """Return the findings about a host: its own, and those of the comparison with this machine."""
     name, answer = told.remote.name, told.answer
     if answer is None:
         return [Finding("ssh", told.remote.host.destination, "problem", told.problem, told.remedy, name)]
@@ -462,7 +461,7 @@ def _arithmetic_finding(name: str, there: str, here: str, mixed_cpu: bool) -> Fi
     text = f"{there[:16]} is not {here[:16]}, that of this machine"
     if mixed_cpu:
         return Finding("arithmetic", "compared", "warning", text, "mixed_cpu lets it in; runs may differ in bits", name)
-    remedy = "use processors and libraries that are alike, or say `mixed_cpu: true` in the deployment"
+    remedy = "use equal processors and libraries, or set `mixed_cpu: true` in the deployment"
     return Finding("arithmetic", "compared", "problem", text, remedy, name)
 
 

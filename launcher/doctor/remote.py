@@ -1,9 +1,9 @@
-"""The doctor's way to the hosts of a deployment: all are asked at once, through ssh as a launcher would.
+"""Runs the doctor's checks on the hosts of a deployment, in parallel, through ssh like a launcher.
 
 Lines on standard input and output of `foosim-guard`, so that one connection serves for everything: the greeting; for
 each `clock` the wall time in ns; for the question (JSON) the answer (JSON). Then the host listens, where a vHub of the
-run would, until standard input ends: whether others reach it can only be tried. A host that does not answer is one
-finding, and holds no other up.
+run would, until standard input ends, so that others can test the connection. A host that does not answer is one
+finding, and does not delay the others.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ LIMIT_S: Final = 40.0
 """How long one host may take: ssh alone tries for ten seconds to connect."""
 CLOCK_TRIES: Final = 5
 GREETING_LINES_MAX: Final = 100
-"""A login may say something before it does what it is told."""
+"""A login may print lines before the command's output."""
 HOSTS_AT_ONCE: Final = 32
 LAST_LINES: Final = 30
 END_S: Final = 5.0
 
 
 class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is to be run, and what is asked: `host` is which host this machine is.
+    """The planned run, and the requested checks: `host` is the name of this machine.
 
     `ca` is the fingerprint of the run's root, empty for a run without certificates. `reach` is where the supervisor
     would listen, and somebody does meanwhile, `radio` where a vHub on this host would; empty what cannot be tried.
@@ -116,7 +116,7 @@ def _root(case: Case) -> str:
 
 
 def ask(remote: Remote, question: Question, limit_s: float) -> Told:
-    """Ask one host, and return what was heard within a time."""
+    """Run the checks of one host within a time limit."""
     words = [remote.path(GUARD), "examine", "--version-of-launcher", version("foosim")]
     with tempfile.TemporaryFile() as errors:
         try:
@@ -148,7 +148,7 @@ def ask(remote: Remote, question: Question, limit_s: float) -> Told:
 
 
 def _converse(remote: Remote, question: Question, process: subprocess.Popen[bytes]) -> Told | None:
-    """Compare clocks, ask, try to reach what listens there; None when the other side does not take part."""
+    """Compare clocks, request the checks, test the listener there; None when the other side does not respond."""
     assert process.stdin is not None and process.stdout is not None
     given, said = process.stdin, process.stdout
     try:
@@ -159,13 +159,13 @@ def _converse(remote: Remote, question: Question, process: subprocess.Popen[byte
         line = said.readline(LINE_BYTES_MAX)
         answer = msgspec.json.decode(line, type=Answer)
         not_reached = why_not_reached(parse_address(question.radio)) if question.radio else ""
-    except (OSError, ValueError, Refused):  # the connection ended, or what came is no answer: how it ended says why
+    except (OSError, ValueError, Refused):  # the connection ended, or the line is invalid: the exit code has the reason
         return None
     return Told(remote, answer, "", "", offset_ns, error_ns, question.radio, not_reached)
 
 
 def _compare_clocks(given: IO[bytes], said: IO[bytes]) -> tuple[int, int]:
-    """Return how far the other clock is ahead of ours, and how far that may be off: half of what the way took."""
+    """Return the other clock's offset from ours, and its error: half of the round trip."""
     before_ns = wall_clock.now_unix_ns()
     _say(given, CLOCK.encode())
     there_ns = int(said.readline(LINE_BYTES_MAX))
@@ -179,7 +179,7 @@ def _say(given: IO[bytes], line: bytes) -> None:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End ssh, and what it has started to get there."""
+    """End ssh and its child processes."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
@@ -216,7 +216,7 @@ def _remedy(remote: Remote, code: int) -> str:
 
 
 def serve(given: IO[bytes], told: IO[bytes]) -> None:
-    """Answer what stands on `given`. Raises Malformed or DeploymentError for a question that is none."""
+    """Answer the requests on `given`. Raises Malformed or DeploymentError for an invalid question."""
     _say(told, GREETING.encode())
     while (line := given.readline(LINE_BYTES_MAX).strip()) == CLOCK.encode():
         _say(told, str(wall_clock.now_unix_ns()).encode())
@@ -233,7 +233,7 @@ def serve(given: IO[bytes], told: IO[bytes]) -> None:
 
 
 def case_of(question: Question) -> Case:
-    """Return what this host is to be examined for: with its own folder of certificates, if the run has any."""
+    """Return the case for this host, with its own folder of certificates, if the run has any."""
     deployment = load_deployment(question.text, question.name)
     pki = deployment.hosts[question.host].pki
     folder = Path(pki) if pki is not None and question.ca else None

@@ -48,7 +48,7 @@ def write_units(folder: Path, units: Mapping[str, str]) -> list[Path]:
 
 
 def run_there(remote: Remote, script: str, text: str) -> str:
-    """Return what a script of the shell on a host says, with `text` as its input. Raises Failed."""
+    """Return the output of a shell script on a host, with `text` as its input. Raises Failed."""
     command = remote.ssh(["sh", "-c", script])
     try:
         done = subprocess.run(command, input=text, capture_output=True, text=True, timeout=INSTALL_S, check=False)

@@ -1,6 +1,6 @@
-"""Whether a machine reaches a port of another one: a listener that answers nothing, a connection that says nothing.
+"""Tests whether a machine can reach a port of another one, with a listener and a connection that send nothing.
 
-That a port is closed by a firewall is known only by trying, with something that listens there.
+Only a connection to a listener shows whether a firewall closes a port.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def listen(address: Address) -> socket.socket:
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(place)
-        listener.listen(BACKLOG)  # the system takes connections; nobody else does
+        listener.listen(BACKLOG)  # the system accepts connections; no process does
     except OSError:
         listener.close()
         raise
@@ -40,7 +40,7 @@ def listen(address: Address) -> socket.socket:
 
 @contextmanager
 def listening(address: Address) -> Iterator[None]:
-    """Have an address listened at, by us where nobody does so already and we can."""
+    """Ensure that an address has a listener: our own if there is none and the address is free."""
     try:
         listener = listen(address)
     except OSError:

@@ -1,4 +1,4 @@
-"""What `up` does with the machines of a run, beside starting processes on them: checks, and what is brought home.
+"""Preparation of a run's remote hosts, and the fetching of a capture from them.
 
 A vHub on another machine writes the capture there; when it has ended the file is sent through ssh, compared with its
 digest, and then removed there.
@@ -29,7 +29,7 @@ class OutOfReach(Refused):
 
 
 class NoFolder(Refused):
-    """Processes are to run on another machine with certificates, and nothing says where they are there."""
+    """A process on another machine needs certificates, and their folder there is not known."""
 
 
 def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, Remote]) -> None:
@@ -41,21 +41,21 @@ def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, 
         there = f"{name} on host {remote.name} ({remote.host.address})"
         if address.is_loopback and not parse_address(remote.host.address).is_loopback:
             raise OutOfReach(
-                f"{there} cannot connect to {address}; say --listen HOST[:PORT], or `listen:` in the deployment, "
+                f"{there} cannot connect to {address}; give --listen HOST[:PORT], or `listen:` in the deployment, "
                 "with an address of this machine that it reaches"
             )
         if address.protocol == "tls" and remote.host.pki is None:
             raise NoFolder(
-                f"{there} has no certificate: say in hosts.{remote.name}.pki in which folder on it they are; "
+                f"{there} has no certificate: set hosts.{remote.name}.pki to their folder on it; "
                 "`foosim-pki init DIR FILE --send` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:
-            raise OutOfReach(f"{there} is a unit of systemd and needs a port that stays; say --listen HOST:PORT")
+            raise OutOfReach(f"{there} is a unit of systemd and needs a fixed port; give --listen HOST:PORT")
 
 
 def fetch_capture(remote: Remote, run: str, path: Path) -> None:
-    """Bring the capture of a run home to `path`, with the files that it goes on in; remove the run's folder there.
+    """Fetch the capture of a run to `path`, with its further files; remove the run's folder there.
 
     Raises Failed; it stays there then.
     """
@@ -69,7 +69,7 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
             problem = _receive(process.stdout, path, came)
         except OSError as error:
             problem = f"{path}: {error.strerror}"
-        # Who is not read to the end dies of the closed pipe: that ending is our doing and says nothing.
+        # If the output is not read to the end, the closed pipe kills the process: its exit code then means nothing.
         is_cut_here = bool(problem) and process.stdout.read(1) != b""
         process.stdout.close()
         lines = process.stderr.read().decode("utf-8", "replace").splitlines()
@@ -86,13 +86,13 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
     try:
         subprocess.run(forget, stdin=subprocess.DEVNULL, capture_output=True, timeout=FORGET_S, check=False)
     except subprocess.TimeoutExpired:
-        return  # it is home; what is left there is only in the way
+        return  # it was fetched; the files left there do no harm
 
 
 def _receive(stream: IO[bytes], path: Path, came: dict[Path, Path]) -> str:
-    """Write what a guard sends, under names that are not theirs yet; return what is wrong with it, or an empty text.
+    """Write the files that a guard sends, under temporary names; return the error, or an empty text.
 
-    `came` gets those names, with what they are to be.
+    `came` gets the temporary names, with the final ones.
     """
     while (line := stream.readline(SIZE_LINE_MAX)) != b"end\n":
         number, _, size = line.strip().partition(b" ")

@@ -1,6 +1,6 @@
-"""How a process is started on another machine: the command line of the system's ssh, and what its end means.
+"""Starting processes on another machine: the command line of the system's ssh, and the meaning of its exit code.
 
-`ssh` is the user's own: keys, agents, jump hosts and ~/.ssh/config are as they are; it never asks for anything. On the
+`ssh` is the user's own: keys, agents, jump hosts and ~/.ssh/config are as they are; it never prompts. On the
 other side `foosim-guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs the
 commands, `hosts` fetches what a run left on a machine.
 """
@@ -23,15 +23,15 @@ SSH_FAILED: Final = 255
 NOT_FOUND: Final = 127
 NOT_RUNNABLE: Final = 126
 OWN_BUS: Final = "export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/run/user/$(id -u)}"
-"""Where a user's own systemd is found; a login by ssh does not always say."""
+"""Finds the user's own systemd; a login by ssh does not always set it."""
 CAPTURE: Final = "capture.mcap"
-"""What a vHub on another machine calls its capture, in the run's folder there."""
+"""Name of the capture of a vHub on another machine, in the run's folder there."""
 
-# A user's option of the same name comes first and holds; that nothing is asked for always does.
+# A user's option of the same name precedes these and is used; BatchMode always applies.
 _ALWAYS: Final = ("-T", "-o", "BatchMode=yes")
 _DEFAULTS: Final = ("ConnectTimeout=10", "ServerAliveInterval=5", "ServerAliveCountMax=3")
 
-# What OpenSSH says, and what it means: the first that fits.
+# Messages of OpenSSH and their meanings: the first match counts.
 _SAID: Final[Sequence[tuple[str, str]]] = (
     ("Permission denied", "it refused the key: `{ssh}` has to work without a password (ssh-copy-id, or an agent)"),
     ("Host key verification failed", "its host key is not known: type `{ssh}` once, and compare the key"),
@@ -48,7 +48,7 @@ _AWAY: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Remote:
-    """A machine by its name in the deployment, with what the deployment says of it."""
+    """A machine by its name in the deployment, with its settings there."""
 
     name: str
     host: Host
@@ -68,7 +68,7 @@ class Remote:
         return command if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{command}"
 
     def pki_arguments(self) -> list[str]:
-        """Return where the certificates are there, as a process of a run with certificates is told it."""
+        """Return the folder of the certificates there, as an argument for a process of a run with certificates."""
         return [] if self.host.pki is None else ["--pki", self.host.pki]
 
     def guarded(self, run: str, name: str, command: Sequence[str]) -> list[str]:
@@ -82,10 +82,10 @@ class Remote:
         return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start {unit_name(name)}"])
 
     def why(self, code: int, lines: Sequence[str]) -> str:
-        """Return why ssh, or what it ran, ended with this code, for people; `lines` are the last ones of its log."""
+        """Return why ssh, or its command, ended with this code; `lines` are the last ones of its log."""
         if code == NOT_FOUND:
             text = f"there is no {self.path(GUARD)} on host {self.name}"
-            return f"{text}: install foosim there, and say in hosts.{self.name}.commands in which folder"
+            return f"{text}: install foosim there, and set hosts.{self.name}.commands to its folder"
         if code == NOT_RUNNABLE:
             return f"{self.path(GUARD)} cannot be run on host {self.name}"
         if code == OTHER_VERSION:

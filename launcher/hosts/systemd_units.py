@@ -1,7 +1,6 @@
 """The unit of systemd that runs a node on its host: its text.
 
-Where systemd restarts a node, the run goes on without it and takes it in again, as with a node that `up` started. Pure;
-neighbours: `install` writes it onto the host, `remote` starts it, `protocol.notify` is what it is told.
+While systemd restarts a node, the run continues without it until it rejoins, as with a node that `up` started. Pure.
 """
 
 from __future__ import annotations
@@ -37,10 +36,10 @@ StartLimitIntervalSec=0
 Type=notify
 ExecStart={command}
 Environment=OPENBLAS_NUM_THREADS=1 PYTHONUNBUFFERED=1
-{credentials}# Ready is who has found the supervisor, whenever that comes.
+{credentials}# A node is ready when it has found the supervisor.
 TimeoutStartSec=infinity
 TimeoutStopSec=10
-# The loop says that it goes on; one that hangs is killed, and started again.
+# The loop sends watchdog notifications; a node that hangs is killed and restarted.
 WatchdogSec={watchdog_s}
 WatchdogSignal=SIGKILL
 Restart=on-failure
@@ -76,7 +75,7 @@ _CREDENTIALS_FOLDER: Final = "%d"
 
 
 def node_command(remote: Remote, node: str, address: Address, world: str) -> list[str]:
-    """Return what the unit of a node runs, without where its certificate is."""
+    """Return the command of a node's unit, without its certificate's folder."""
     return [remote.path("foosim-node"), "--name", node, "--connect", str(address), "--world", world]
 
 
@@ -110,7 +109,7 @@ def unit_text(remote: Remote, node: str, address: Address, world: str, is_users:
 
 
 def _escaped(words: Sequence[str]) -> str:
-    """Return a command line as systemd reads it: % and $ stand for themselves."""
+    """Return a command line in systemd's syntax, with % and $ escaped."""
     return shlex.join(words).replace("%", "%%").replace("$", "$$")
 
 
@@ -122,7 +121,7 @@ def units_of(deployment: Deployment, host: str, address: Address, is_users: bool
     if address.is_loopback and remote.host.address not in ("localhost", address.host):
         raise BadValue(f"host {host} cannot connect to the supervisor there (--listen)", str(address))
     if address.protocol == "tls" and remote.host.pki is None:
-        raise Failed(f"host {host} has no certificates: say in hosts.{host}.pki in which folder on it they are")
+        raise Failed(f"host {host} has no certificates: set hosts.{host}.pki to their folder on it")
     nodes = [name for name, place in places(deployment).items() if place == host and name in deployment.nodes]
     if not nodes:
         raise Failed(f"no node is placed on host {host}")

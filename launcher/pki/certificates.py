@@ -48,7 +48,7 @@ SLACK: Final = timedelta(hours=1)
 """How far clocks of machines may be behind: from so long before now a certificate is valid."""
 LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "::1")
 LISTENERS: Final = frozenset({SUPERVISOR, VHUB})
-"""Whose certificates say where they are reached: the others only connect."""
+"""Identities whose certificates have host names: the others only connect."""
 HOST_LENGTH_MAX: Final = 253
 
 
@@ -80,7 +80,7 @@ def provide(
     days: int = LEAF_DAYS,
     within_days: int = RENEW_DAYS,
 ) -> list[Path]:
-    """Make what a folder lacks for these identities, and return what was made: the root, certificates, passwords.
+    """Issue the missing files for these identities, and return their names: the root, certificates, passwords.
 
     `passwords`: those of the identities who have a password instead. `hosts`: names and addresses by which others reach
     supervisor and vHub. A certificate that ends within so many days, lacks such a host or has another root is issued
@@ -98,7 +98,7 @@ def provide(
 
 
 def _is_due(folder: Path, identity: str, ca: x509.Certificate, hosts: Sequence[str], within_days: int) -> bool:
-    """Whether a certificate is to be issued anew. Raises CertificateError for one of somebody else."""
+    """Whether a certificate is due for renewal. Raises CertificateError for one of another identity."""
     path, now = certificate_path(folder, identity), wall_clock.now_utc()
     found = read_certificate(path)
     try:
@@ -203,7 +203,7 @@ def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) ->
 
 
 def show_folder(folder: Path) -> list[Shown]:
-    """Return what the folder has: the root first, then by identity. Raises CertificateError when there is no root."""
+    """Return the folder's contents: the root, then by identity. Raises CertificateError when there is no root."""
     now = wall_clock.now_utc()
     ca = read_certificate(folder / CA_FILE)
     shown = [_shown("", folder / CA_FILE, ca, _problem(lambda: read_ca(folder, now)))]
@@ -294,7 +294,7 @@ def _usage(is_ca: bool) -> x509.KeyUsage:
 
 
 def _alternatives(hosts: Sequence[str]) -> list[x509.GeneralName]:
-    """Return the hosts, those of this machine first, as a certificate says them. Raises BadValue."""
+    """Return the hosts as in a certificate, those of this machine first. Raises BadValue."""
     return [_alternative(host) for host in dict.fromkeys([*LOCAL_HOSTS, *_own_names(), *hosts])]
 
 

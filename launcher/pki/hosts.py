@@ -1,4 +1,4 @@
-"""What the processes on a host need of a folder of certificates, and how it comes there: through ssh.
+"""The files of a certificates' folder that the processes of a host need, and their transfer through ssh.
 
 The root, and for each process that the deployment places there its own certificate and key, or its password; the vHub
 needs the passwords of all clients, to compare them. Nothing else is ever sent.
@@ -22,7 +22,7 @@ from foosim.runtime.transport.certificates import certificate_path, key_path, lo
 
 
 def identities_on(deployment: Deployment, host: str | None) -> list[str]:
-    """Return who of a run is on a host, in the order of `identities_of`; None: who is on none."""
+    """Return a run's identities on a host, in the order of `identities_of`; None: those on no host."""
     where = places(deployment)
     known = {VHUB: where.get(VHUB)}
     known |= {identity.node(name): where.get(name) for name in deployment.nodes}
@@ -31,7 +31,7 @@ def identities_on(deployment: Deployment, host: str | None) -> list[str]:
 
 
 def passwords_of(deployment: Deployment, identities: Sequence[str]) -> list[str]:
-    """Return whose passwords have to be where these identities are: their own, and all clients' where the vHub is."""
+    """Return the clients whose passwords these identities need: their own, and all clients' for the vHub."""
     if deployment.access.radio != "password":
         return []
     clients = [who for who in identity.identities_of(deployment) if who.startswith("client.")]
@@ -54,11 +54,11 @@ def files_for(deployment: Deployment, host: str) -> list[str]:
 def send_files(remote: Remote, folder: Path, names: Sequence[str]) -> list[str]:
     """Bring files of a folder of certificates into that of a host, and return their paths there.
 
-    All are checked before the first is sent: raises CertificateError for one with which nobody would be let in, Failed
+    All are checked before the first is sent: raises CertificateError for one that would be refused, Failed
     when the host names no folder or cannot be reached.
     """
     if remote.host.pki is None:
-        raise Failed(f"host {remote.name} names no folder for certificates: say it in hosts.{remote.name}.pki")
+        raise Failed(f"host {remote.name} names no folder for certificates: set it in hosts.{remote.name}.pki")
     contents = {name: _checked(folder, name) for name in names}
     paths = []
     for name, content in contents.items():
@@ -71,7 +71,7 @@ def send_files(remote: Remote, folder: Path, names: Sequence[str]) -> list[str]:
 
 
 def _checked(folder: Path, name: str) -> str:
-    """Return what is in a file of a folder of certificates. Raises CertificateError."""
+    """Return the contents of a file in a folder of certificates. Raises CertificateError."""
     path = folder / name
     if name == CA_FILE:
         from foosim.runtime.transport.certificate_files import read_ca

@@ -119,7 +119,7 @@ def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> Non
     (there / "node.blue.pem").unlink()
     assert on_host(left)["node.blue"].remedy == "foosim-pki init DIR FILE --send"
     nowhere = on_host(Case(deployment, LISTEN, host="left", ca=ca))["folder"]
-    assert nowhere.state == "problem" and "say in hosts.left.pki" in nowhere.remedy
+    assert nowhere.state == "problem" and "set hosts.left.pki" in nowhere.remedy
 
 
 def test_a_hosts_units_are_those_that_would_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

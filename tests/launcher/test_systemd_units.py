@@ -67,7 +67,7 @@ def test_a_unit_of_the_system_is_lent_the_nodes_certificate_and_a_users_reads_it
     assert lent == [f"LoadCredential={name}:/etc/foosim/pki 100%%/{name}" for name in files]
     (own,) = units_of(with_certificates(), "left", address, is_users=True).values()
     assert lines(own)["ExecStart"] == f"{command} --pki '/etc/foosim/pki 100%%'" and "LoadCredential" not in own
-    with pytest.raises(Failed, match=r"host left has no certificates: say in hosts\.left\.pki"):
+    with pytest.raises(Failed, match=r"host left has no certificates: set hosts\.left\.pki"):
         units_of(CLUSTER, "left", address, is_users=False)
     plain = units_of(with_certificates(), "left", ADDRESS, is_users=False)
     assert plain == units_of(CLUSTER, "left", ADDRESS, is_users=False), "a run without certificates has none"
@@ -136,7 +136,7 @@ def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
     check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
     assert check_certificates(plan) == []
     plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts[:2]), pki=folder))
-    with pytest.raises(NoFolder, match=r"red on host right .* say in hosts.right.pki .* `foosim-pki init DIR FILE"):
+    with pytest.raises(NoFolder, match=r"red on host right .* set hosts.right.pki .* `foosim-pki init DIR FILE"):
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
 
@@ -152,5 +152,5 @@ def test_hosts_have_to_reach_the_supervisor() -> None:
     check("192.168.10.1")
     with pytest.raises(OutOfReach, match=r"blue on host left \(192.168.10.2\) cannot connect to tcp/127.0.0.1:7400"):
         check("127.0.0.1:7400")
-    with pytest.raises(OutOfReach, match="needs a port that stays"):
+    with pytest.raises(OutOfReach, match="needs a fixed port"):
         check("192.168.10.1", "nodes.blue.launch=systemd")

@@ -314,7 +314,7 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     recording = {**NOT_RECORDED, "state": "closing", "offered": 9, "written": 4, "bytes": 1_000_000}
     told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": recording}
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
-    up._has_begun = up._has_ended = up._is_told = True
+    up._has_begun = up._has_ended = up._end_requested = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
     assert not up._goes_on(), "it would be cut off"
     up._show(closing)  # type: ignore[arg-type]

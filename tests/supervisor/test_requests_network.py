@@ -127,4 +127,4 @@ def test_there_are_so_many_events_and_no_more() -> None:
         system.at_tick(10, ask)
 
     rehearsed = rehearse(TABLE.read_text(), TABLE.name, 30, 1, SETS, prepare=prepare)
-    assert _answer(rehearsed.answers, refused).text == f"{EVENTS_MAX} events were asked for already"
+    assert _answer(rehearsed.answers, refused).text == f"{EVENTS_MAX} events were requested already"

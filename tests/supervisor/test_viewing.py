@@ -140,7 +140,7 @@ def test_who_only_looks_may_ask_for_what_changes_nothing_and_no_more() -> None:
         assert isinstance(said, Publish), "nothing is journalled"
         verbs[verb] = decode(Answer, said.payload)
     assert [verb for verb, answer in verbs.items() if answer.accepted] == ["status", "describe", "watch"]
-    assert verbs["pause"].text == "'pause' is for operators: who only looks may ask for status, describe, watch"
+    assert verbs["pause"].text == "'pause' is for operators: a viewer may request status, describe, watch"
     core.actions.clear()
     core.receive(channels.INQUIRY, "desk.1", encode(Request("desk.1", "id", "down", b"{}")), 0)
     assert core.statistics().refused == 1 and core.state.end is None, "a request on the key of an inquiry is none"
@@ -151,7 +151,7 @@ def test_so_many_may_look_and_no_more() -> None:
     for number in range(limits.OPERATORS_MAX):
         assert ask(core, 0, "watch", f"one.{number}", hz=1).accepted
     answer = ask(core, 0, "watch", "late", hz=1)
-    assert (answer.accepted, answer.text) == (False, "64 look at the run already")
+    assert (answer.accepted, answer.text) == (False, "64 watch the run already")
     assert ask(core, 1, "watch", "one.3", hz=1).accepted, "who has a lease renews it"
     assert ask(core, 5000 * MS, "watch", "late", hz=1).accepted, "leases end"
 

@@ -93,7 +93,7 @@ def assert_a_viewer_sees_and_cannot_touch() -> None:
         shown = decode(Commit, payload)
         frame = frame_from_bytes(shown.tick, build_layout(deployment), shown.values, shown.outboxes)
         assert key == channels.VIEW.key and frame.digest == shown.digest
-        with pytest.raises(RequestRefused, match="'down' is for operators: who only looks may ask for status, "):
+        with pytest.raises(RequestRefused, match="'down' is for operators: a viewer may request status, "):
             viewer.ask("down")
 
 

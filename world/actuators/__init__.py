@@ -1,4 +1,4 @@
-"""Actuators of robots: what a command's bytes mean and what the motors are told.
+"""Actuators of robots: the meaning of a command's bytes, and the motors' set-points.
 
 One file each. To add one: a file with a class like those here, made by its kind of world (`node.world`).
 """

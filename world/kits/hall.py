@@ -1,7 +1,7 @@
-"""The world parameters of a hall with mobile robots, as they stand under `hall:` of a deployment.
+"""The world parameters of a hall with mobile robots: `hall:` of a deployment.
 
 Frame of reference: x along the hall, y across it, z up, the origin on the floor in the middle. Every value is in SI
-units here. Where a number comes from stands beside it in deploy/warehouse.yaml.
+units here. Sources of the numbers are in deploy/warehouse.yaml.
 """
 
 from typing import Annotated

@@ -1,7 +1,7 @@
-"""The world parameters of the football table, as they stand under `table:` of a deployment.
+"""The world parameters of the football table: `table:` of a deployment.
 
 Frame of reference: x along the field from red's goal (-x) to blue's (+x), y across it, z up, the origin on the floor in
-the middle. Every value is in SI units here. Where a number comes from stands beside it in deploy/table.yaml.
+the middle. Every value is in SI units here. Sources of the numbers are in deploy/table.yaml.
 """
 
 from typing import Annotated

@@ -72,7 +72,7 @@ class TableRules:
         self._count_still(numbers, ball)
 
     def _count_out(self, numbers: list[float], ball: Entity, x: float, y: float, z: float) -> None:
-        """A ball beyond the walls or below the floor for long enough comes back to the spot; quarantine too."""
+        """A ball beyond the walls or below the floor for long enough returns to the spot; so does one in quarantine."""
         out = ball.offsets["out_ticks"]
         inside = abs(x) <= self.end_x_m and abs(y) <= self.side_y_m and z > 0.0
         quarantined = numbers[ball.offsets["quarantined"]] != 0.0
@@ -81,7 +81,7 @@ class TableRules:
             self._to_the_spot(numbers, ball)
 
     def _count_still(self, numbers: list[float], ball: Entity) -> None:
-        """A ball that nobody moves for long enough is dead and comes back to the spot."""
+        """A ball at rest for long enough is dead and returns to the spot."""
         still = ball.offsets["still_ticks"]
         start = ball.offsets["linear_velocity"]
         vx, vy, vz = numbers[start : start + 3]

@@ -1,4 +1,4 @@
-"""Where rovers start and stations stand: in the hall, and not in anything else.
+"""Checks that rovers start, and stations are, inside the hall and outside of obstacles.
 
 That takes geometry, so it is looked at when all single fields are right.
 """

@@ -1,4 +1,4 @@
-"""What stands in a rover's way, seen from above: rectangles and circles.
+"""Obstacles of rovers, seen from above: rectangles and circles.
 
 An upright box is a rectangle, an upright cylinder and a base station are circles; whatever is tilted, and a mesh, is
 the rectangle around it. What is higher than a rover with its antenna, or below the floor, is none. The walls of the
@@ -59,12 +59,12 @@ Obstacle = Rectangle | Circle
 
 
 def obstacles_of(spec: WorldSpec) -> tuple[Obstacle, ...]:
-    """Return what stands in the way of the deployment's rovers: walls, stations, scenery."""
+    """Return the obstacles of the deployment's rovers: walls, stations, scenery."""
     return tuple(thing for _, thing in named_obstacles(spec))
 
 
 def named_obstacles(spec: WorldSpec) -> Iterator[tuple[str, Obstacle]]:
-    """Yield what stands in the way, with what it is called; a mesh counts where its file was given."""
+    """Yield obstacles with their descriptions; a mesh counts if its file was given."""
     hall = spec.hall
     for shape in hall_scenery(hall):
         if is_in_the_way(shape, hall):

@@ -22,7 +22,7 @@ from foosim.world.sensors.fitting import Fitting
 
 Numbers: TypeAlias = NDArray[np.float64]
 TINY: Final = 1e-300
-"""Stands for 0 in a ray's direction, so that a quotient is never 0 / 0."""
+"""Replaces 0 in a ray's direction, so that a quotient is never 0 / 0."""
 WORDS: Final = 8
 """Words of one draw."""
 
