@@ -1,4 +1,4 @@
-"""What a launcher and a guard share: where foosim's commands are, and what ties a child to its parent."""
+"""Shared by launcher and guard: the paths of foosim's commands, and the tie of a child to its parent."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ GRACE_S: Final = 5.0
 """How long a child has after SIGTERM before it is killed."""
 GUARD: Final = "foosim-guard"
 BY_SIGNAL: Final = 128
-"""A guard ends with this and the number of the signal that ended its process."""
+"""The exit code of a guard is this plus the number of the signal that ended its process."""
 OTHER_VERSION: Final = 125
-"""What a guard ends with that is of another version than the launcher."""
+"""The exit code of a guard of another version than the launcher."""
 
 
 def script(name: str) -> str:

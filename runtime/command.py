@@ -1,4 +1,4 @@
-"""What the commands have in common: exit codes, `--version`, and how a refusal is shown.
+"""Shared by the commands: exit codes, `--version`, and the display of refusals.
 
 Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused, 130 for a second Ctrl-C.
 """
@@ -24,7 +24,7 @@ REFUSED: Final = 3
 INTERRUPTED: Final = 130
 HELP_WIDTH_MAX: Final = 100
 PKI_VARIABLE: Final = "FOOSIM_PKI"
-"""Says, where `--pki` does not, which folder has the certificates."""
+"""The folder with the certificates, without `--pki`."""
 
 
 def _show_version(wanted: bool) -> None:
@@ -57,12 +57,12 @@ def new_app() -> typer.Typer:
 
 
 def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadUsage], None] | None = None) -> None:
-    """Run the command `name` and exit with its code; what is refused is shown without a traceback.
+    """Run the command `name` and exit with its code; refusals are shown without a traceback.
 
-    `refusing` is told of arguments that are no use of the command, before that is shown.
+    `refusing` is called with invalid arguments, before they are shown.
 
-    What was imported lives as long as the process: garbage collections leave it out, also those at the process's end,
-    which are else a fifth of what a short command costs.
+    Garbage collections skip imported objects, which live as long as the process; at its end they would take a fifth of
+    the time of a short command.
     """
     words = sys.argv[1:]
     if gc.get_freeze_count() == 0:
@@ -85,7 +85,7 @@ def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadU
 
 
 def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:
-    """Return the exit code of a command. Raises BadUsage for arguments that are no use of it."""
+    """Return the exit code of a command. Raises BadUsage for invalid arguments."""
     try:
         code = app(words, prog_name=name, standalone_mode=False)
     except typer.TyperException as error:

@@ -1,7 +1,6 @@
-"""How much room a disk has left for what is written to it, and when that gets little.
+"""The free space of a disk, and its levels.
 
-A reserve is kept free, so that what has to be written in the end still fits: a file's summary, a journal's last
-records.
+A reserve is kept free for the end of a run: a file's summary, a journal's last records.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ _UNITS: Final = {"TiB": 1 << 40, "TB": 10**12, "GiB": 1 << 30, "GB": 10**9, "MiB
 
 
 class Level(IntEnum):
-    """How much room is left: below twice the reserve it is LOW, below the reserve FULL, below a quarter of it OUT."""
+    """The level of free space: LOW below twice the reserve, FULL below the reserve, OUT below a quarter of it."""
 
     FINE = 0
     LOW = 1
@@ -26,7 +25,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What is left, and the reserve that is not for ordinary use, in bytes; `where` names it for people."""
+    """Free space and reserve in bytes; `where` names the disk."""
 
     left: int
     reserve: int
@@ -45,7 +44,7 @@ class Room:
 
 
 def free_bytes(place: int | Path) -> int:
-    """Return how much an ordinary process can still write to the disk of an open file or a path; raises OSError."""
+    """Return the free bytes for an unprivileged process on the disk of an open file or a path; raises OSError."""
     found = os.statvfs(place)
     return found.f_bavail * found.f_frsize
 
@@ -56,11 +55,11 @@ def room_on_disk(place: int | Path, reserve: int) -> Room:
 
 
 def megabytes(count: int) -> str:
-    """Return a size for people: `12.4 MB`."""
+    """Return a size for display: `12.4 MB`."""
     return f"{count / 1e6:.1f} MB" if count < 1e10 else f"{count / 1e9:.1f} GB"
 
 
 def size_text(count: int) -> str:
-    """Return a size as a deployment says it: exactly, in the unit in which the number is shortest (`64 MiB`)."""
+    """Return a size as in a deployment: exact, in the unit with the shortest number (`64 MiB`)."""
     whole = [f"{count // size} {unit}" for unit, size in _UNITS.items() if count >= size and count % size == 0]
     return min([*whole, f"{count} B"], key=lambda text: len(text.split()[0]))

@@ -1,4 +1,4 @@
-"""The command `foosim-probe`: whether a process of a run still works, for health checks and probes."""
+"""The command `foosim-probe`: checks whether the loop of a process advances, for health checks and probes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ProgressOption = Annotated[
     Path | None,
     typer.Option("--progress-file", help="Write signs of life here, for foosim-probe."),
 ]
-"""The option of a process that is watched."""
+"""The option of a process with a progress file."""
 
 app = new_app()
 
@@ -39,9 +39,9 @@ def probe(
     within: Annotated[str, typer.Option(help="How old the last sign of life may be.")] = "5s",
     version: VersionOption = False,
 ) -> None:
-    """Ask whether the loop of a process still goes round, on the machine or in the container where the process is.
+    """Check whether the loop of a process advances, on its machine or in its container.
 
-    It exits with 0 when it does, with 1 when it gave no sign of life for too long.
+    Exit codes: 0 the last sign of life is recent, 1 it is too old or missing.
     """
     print(f"alive, {probe_file(path, within) / 1e9:.1f} s ago")
 

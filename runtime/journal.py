@@ -1,13 +1,12 @@
-"""Journals: append-only files of framed records, which a process writes before it speaks.
+"""Journals: append-only files of framed records, which a process writes before it publishes.
 
 One record is one `write`. A killed process loses nothing that was appended; a dead machine at most what `fdatasync`,
-called each second in a thread, had not reached. The first record of a file is what its writer gives as head, so that
-older files can go. `flock` keeps a second writer out. What a record means is its writer's matter: `vhub.records`,
-`supervisor.records`.
+called each second in a thread, had not reached. The first record of a file is the writer's checkpoint, so that older
+files can be removed. `flock` excludes a second writer. `vhub.state.records` and `supervisor.records` define the
+records.
 
-When a file is full, `append` does not turn to the next one by itself: the head holds the writer's state, which is the
-state after the last appended record only when nothing that was decided still waits to be appended. The shell knows
-when that is, and calls `rotate_if_full`.
+When a file is full, `append` does not begin the next one by itself: the checkpoint is the state after the last appended
+record only when no decision waits to be appended. The shell knows when, and calls `rotate_if_full`.
 """
 
 from __future__ import annotations
@@ -45,11 +44,12 @@ _SERIAL: Final = re.compile(r"(\d{6,})\.journal")
 
 
 class JournalError(Failed):
-    """A journal cannot be written or read: the file, and what is wrong with it."""
+    """A journal cannot be written or read: the file and the defect."""
 
 
 class JournalDamaged(JournalError):
-    """A record is bad that was whole once: the file, the byte, and how many whole records of the file are before it.
+    """A record is invalid that was valid once: the file, the byte, and the number of valid records before it in the
+    file.
 
     No run goes on from such a journal.
     """
@@ -72,12 +72,12 @@ class JournalStatistics:
 
 
 def journal_files(folder: Path, stem: str) -> list[Path]:
-    """Return the files of a journal, oldest first; none is no error."""
+    """Return the files of a journal, oldest first; there may be none."""
     return [path for _, path in _numbered(folder, stem)]
 
 
 def remove_journal(folder: Path, stem: str) -> None:
-    """Remove the files of a journal whose run has ended in order: nothing is left to recover from them."""
+    """Remove the files of a journal whose run has ended in order."""
     for path in [*journal_files(folder, stem), folder / f"{stem}.lock"]:
         path.unlink(missing_ok=True)
 
@@ -94,8 +94,8 @@ def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
 class Records(Iterator[bytes]):
     """The records of one file, in order, up to the end of the file or of the journal.
 
-    After the last one `left_bytes` is how many bytes of the file are no record: 0 in a whole file. Raises
-    JournalDamaged at a record that is bad though it was whole once.
+    After the last one `left_bytes` is the number of bytes after the last valid record: 0 in a whole file. Raises
+    JournalDamaged at an invalid record that was valid once.
     """
 
     def __init__(self, path: Path) -> None:
@@ -103,7 +103,7 @@ class Records(Iterator[bytes]):
         self.count = 0
         """How many records were read."""
         self.head: Head | None = None
-        """None where the file's beginning never came to the disk."""
+        """None if the file's beginning never reached the disk."""
         try:
             with path.open("rb") as file:
                 self._size = os.fstat(file.fileno()).st_size
@@ -127,24 +127,24 @@ class Records(Iterator[bytes]):
 
     @property
     def same_machine(self) -> bool:
-        """Whether the machine was not started since the journal was opened: then the disk has lost nothing."""
+        """Whether the machine was not booted since the journal was opened: then the disk has lost nothing."""
         return self.head is not None and any(self.head.machine) and self.head.machine == machine_hash(machine_start())
 
     def __next__(self) -> bytes:
         return next(self._records)
 
     def behind(self, at: int) -> Iterator[Whole]:
-        """Yield the whole records from a byte on, wherever they stand."""
+        """Yield the valid records from a byte on, at any position."""
         return iter(()) if self.head is None else whole_records(self.head, self.path.read_bytes(), at)
 
     def damaged(self, following: int) -> JournalDamaged:
-        """Return what to raise when so many whole records say that the one where reading ended was whole."""
+        """Return the error for an invalid record that, by so many valid ones after it, was valid once."""
         behind = f"{following} whole record{'s' if following > 1 else ''}"
         text = f"{self.path}: byte {self.valid_bytes}: record {self.count + 1} is damaged, {behind} behind it"
         return JournalDamaged(text, self.path, self.valid_bytes, self.count)
 
     def _read(self, head: Head) -> Iterator[bytes]:
-        """Yield whole records; a length beyond the file's end is never allocated."""
+        """Yield valid records; a length beyond the file's end is never allocated."""
         with self.path.open("rb") as file:
             file.seek(self.valid_bytes)
             while self.left_bytes:
@@ -164,14 +164,14 @@ class Records(Iterator[bytes]):
 
 
 def read_records(path: Path) -> Records:
-    """Read one file of a journal. A torn tail is what a killed machine leaves, and no error: see `left_bytes`."""
+    """Read one file of a journal. A torn tail, as a killed machine leaves, is no error: see `left_bytes`."""
     return Records(path)
 
 
 def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
     """Yield the records of all files of a journal, in order; each file but the first starts with its head again.
 
-    Behind a torn end comes what was written when the journal was opened again. Raises JournalDamaged.
+    A torn end is followed by the records of the next opening. Raises JournalDamaged.
     """
     opening = b""
     torn: tuple[int, Records] | None = None
@@ -193,7 +193,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
 
 
 def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
-    """Yield the records of a journal's newest file that has any: its head stands for the files before it."""
+    """Yield the records of a journal's newest file that has any: its checkpoint replaces the files before it."""
     for path in reversed(journal_files(folder, stem)):
         records = read_records(path)
         first = next(records, None)
@@ -204,7 +204,7 @@ def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
 
 
 def read_whole(records: Iterable[bytes]) -> tuple[list[bytes], JournalDamaged | None]:
-    """Return the records up to one that is damaged, and what is to say of that; None when none is."""
+    """Return the records up to a damaged one, and its error; None without damage."""
     whole: list[bytes] = []
     try:
         whole.extend(records)
@@ -239,8 +239,8 @@ def lock_journal(folder: Path, stem: str) -> int:
 class Journal:
     """The one writer of a journal: files `STEM-000001.journal`, ... in `folder`; a new one at every opening.
 
-    Raises JournalError when another process writes it or the disk refuses; after a failed write every further one
-    fails too, since a record that is missing in the middle would be worse than an end.
+    Raises JournalError when another process writes it or the disk refuses. After a failed write every further one
+    fails, because a gap would be worse than an end.
     """
 
     def __init__(
@@ -264,7 +264,7 @@ class Journal:
         self._opening, self._machine = os.urandom(8), machine_hash(machine_start())
         self._written: Place = (self._serial + 1, 0)
         self._synced: Place = self._written
-        """Up to where the journal is written, and up to where that is known to be on the disk."""
+        """The written position of the journal, and the position that is known to be on the disk."""
         self._begin_file()
         self._stop = threading.Event()
         self._syncer = threading.Thread(target=self._sync_each_interval, name=f"sync-{stem}", daemon=True)
@@ -273,7 +273,7 @@ class Journal:
     # --- writing -----------------------------------------------------------------------------------------------------
 
     def append(self, record: bytes) -> None:
-        """Write one record; when this returns, a killed process does not lose it."""
+        """Write one record; after that a killed process does not lose it."""
         if self._error is not None:
             raise self._error
         if len(record) > limits.JOURNAL_BYTES_MAX:
@@ -285,9 +285,9 @@ class Journal:
         self._records += 1
 
     def rotate_if_full(self, head: Callable[[], bytes], tick: int) -> bool:
-        """Begin a new file with the record `head()` when this one is full; return whether that was so.
+        """Begin a new file with the record `head()` if this one is full; return whether it was.
 
-        To be called when everything that was decided is appended. `tick` is the last one that the files so far hold.
+        Call it when every decision is appended. `tick` is the last one in the files so far.
         """
         if self._size < self._bytes_max:
             return False
@@ -300,7 +300,7 @@ class Journal:
         return True
 
     def forget_before(self, tick: int) -> None:
-        """Remove the files that hold nothing from `tick` on: the capture is synced up to there."""
+        """Remove the files without records from `tick` on, up to which the capture is synced."""
         done = [serial for serial, last_tick in self._closed_files if last_tick < tick]
         if not done:
             return
@@ -319,11 +319,11 @@ class Journal:
 
     @property
     def path(self) -> Path:
-        """The file that is written."""
+        """The current file."""
         return self.folder / f"{self.stem}-{self._serial:06d}.journal"
 
     def close(self) -> None:
-        """Sync what is written and let go of the files; a second call does nothing."""
+        """Sync and close the files; a second call does nothing."""
         if self._stop.is_set():
             return
         self._stop.set()
@@ -346,7 +346,7 @@ class Journal:
     # --- files -------------------------------------------------------------------------------------------------------
 
     def _lock(self) -> int:
-        """Take the lock that is held as long as the journal is open, and note in it who has it."""
+        """Take the lock, held while the journal is open, and write the holder into it."""
         lock = lock_journal(self.folder, self.stem)
         try:
             os.ftruncate(lock, 0)
@@ -357,7 +357,7 @@ class Journal:
         return lock
 
     def _begin_file(self) -> None:
-        """Turn to a new file, which must not exist yet; the one before goes to the syncing thread."""
+        """Begin a new file, which must not exist; the previous one is passed to the syncing thread."""
         self._serial += 1
         try:
             file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
@@ -373,7 +373,7 @@ class Journal:
         self._written = self._serial, 0
 
     def _write(self, content: bytes) -> None:
-        """Append by one `write`, more of them only when a disk that gets full takes a part; that part is cut off."""
+        """Append by one `write`; if a full disk takes a part of it, that part is cut off."""
         written = 0
         try:
             while written < len(content):
@@ -400,7 +400,7 @@ class Journal:
             self._sync()
 
     def _sync(self) -> None:
-        """Bring to the disk what was written, and the names of new files; files that are full are let go of."""
+        """Sync the written records and the names of new files; close full files."""
         written = self._written
         with self._mutex:
             retired, self._retired = self._retired, []

@@ -1,13 +1,13 @@
-"""The bytes of a journal: a file's head, its records, and what tells a torn end from damage.
+"""The bytes of a journal: a file's head, its records, and the distinction of a torn end from damage.
 
-A file begins with its head: which opening of the journal it is of, on which start of the machine, and its number. A
-record has a checksum over its payload, its place, the opening and a *mark*: up to where, when it was appended, all was
-known to be on the disk. So bytes of another place or another journal are no record.
+A file begins with its head: the opening of the journal, the boot of the machine, and the number of the file. A record
+has a checksum over its payload, its position, the opening and a *mark*: the position up to which, when it was appended,
+everything was known to be on the disk. So bytes of another position or another journal are no valid record.
 
-A record that is bad ends a journal only if nothing says that it was whole once. A killed process leaves the last record
-cut. A machine that loses its power may lose any pages that were not synced, also some in front of others that it kept.
-So a whole record behind a bad one tells: on the same start of the machine nothing was lost, the bad one is damaged; on
-another, it is damaged if the mark is behind it.
+An invalid record ends a journal unless it was valid once. A killed process leaves the last record cut. A machine that
+loses power may lose any pages that were not synced, also some before others that it kept. So a valid record after an
+invalid one decides: on the same boot nothing was lost, and the invalid one is damaged; on another boot, it is damaged
+if the mark is after it.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ FRAMING_BYTES: Final = _FRAMING.size
 _PLACED: Final = struct.Struct("<8sIIIII")
 
 Place = tuple[int, int]
-"""A file's number, and a byte in it; what is further is greater."""
+"""A position: the number of a file, and a byte in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a file begins with. `opening` is random, `machine` a hash of the start of the machine; none is zeros."""
+    """The head of a file. `opening` is random, `machine` a hash of the boot of the machine, or zeros."""
 
     opening: bytes
     machine: bytes
@@ -44,35 +44,35 @@ class Head:
 
     @classmethod
     def unpack(cls, start: bytes) -> Self | None:
-        """Return the head that a file begins with; None when it is damaged."""
+        """Return the head of a file; None when it is damaged."""
         opening, machine, serial, checksum = _HEAD.unpack_from(start, len(SIGNATURE))
         return cls(opening, machine, serial) if crc32(_HEAD.pack(opening, machine, serial, 0)) == checksum else None
 
 
 def machine_hash(start: str) -> bytes:
-    """Return the hash of a start of a machine by its name, which may be empty."""
+    """Return the hash of a boot of a machine by its name, which may be empty."""
     return blake2b(start.encode(), digest_size=8).digest() if start else bytes(8)
 
 
 def pack_record(head: Head, at: int, synced: Place, payload: bytes) -> bytes:
-    """Return a record, to stand at a byte of the file with that head; all up to `synced` is on the disk."""
+    """Return a record for a byte of the file with that head; everything up to `synced` is on the disk."""
     length = len(payload)
     return _FRAMING.pack(head.opening, *synced, length, _checksum(head, at, synced, payload)) + payload
 
 
 def _checksum(head: Head, at: int, synced: Place, payload: bytes | memoryview) -> int:
-    """CRC of all that a record says; a run of zeros, as some file systems leave after a crash, has no opening."""
+    """Return the CRC of a record; a run of zeros, as some file systems leave after a crash, has no opening."""
     return crc32(payload, crc32(_PLACED.pack(head.opening, head.serial, at, *synced, len(payload))))
 
 
 def record_bytes(framing: bytes) -> int:
-    """Return how long the payload behind a framing says it is; 0 for one that is cut."""
+    """Return the length of the payload in a framing; 0 for a cut one."""
     return int(_FRAMING.unpack(framing)[3]) if len(framing) == FRAMING_BYTES else 0
 
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A whole record: where its payload is in what was looked at, and its mark."""
+    """A valid record: the position of its payload in the content, and its mark."""
 
     start: int
     stop: int
@@ -80,7 +80,7 @@ class Whole:
 
 
 def whole_record(head: Head, content: bytes | memoryview, at: int, offset: int = 0) -> Whole | None:
-    """Return the record at a byte of a file, of which `content` is what stands from `offset` on; None for a bad one."""
+    """Return the record at a byte of a file, whose bytes from `offset` on are `content`; None for an invalid one."""
     start = at - offset + FRAMING_BYTES
     if start > len(content):
         return None
@@ -94,7 +94,7 @@ def whole_record(head: Head, content: bytes | memoryview, at: int, offset: int =
 
 
 def whole_records(head: Head, content: bytes, at: int) -> Iterator[Whole]:
-    """Yield the whole records of a file from a byte on, wherever they stand; `content` is the whole file."""
+    """Yield the valid records of a file from a byte on, at any position; `content` is the whole file."""
     while (at := content.find(head.opening, at)) >= 0:
         found = whole_record(head, content, at)
         if found is not None:
@@ -103,6 +103,6 @@ def whole_records(head: Head, content: bytes, at: int) -> Iterator[Whole]:
 
 
 def is_damage(same_machine: bool, bad: Place, behind: Iterator[Whole]) -> int:
-    """Return how many of the whole records behind a bad one say that it was whole once; 0: the journal ends there."""
+    """Return how many valid records after an invalid one show that it was valid once; 0: the journal ends there."""
     marks = [whole.synced for whole in behind]
     return len(marks) if marks and (same_machine or max(marks) > bad) else 0

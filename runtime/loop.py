@@ -1,8 +1,7 @@
-"""The loop that every process has: take what came, let the core decide, do what it asks for, sleep until there is more.
+"""The loop of every process: pass messages to the core, perform its actions, sleep until a message or a deadline.
 
-A core never waits and never touches the world; here is all that does. Actions are performed in their order, so what has
-to be written before it is spoken is. The loop sleeps until a message or the core's next deadline, and measures which
-share of the time it did not.
+A core never waits and has no input or output; the loop has both. Actions are performed in order, so a record is written
+before the messages that depend on it are published. The loop measures the share of time in which it does not sleep.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ _LEVELS: Final = {"info": logging.INFO, "warning": logging.WARNING, "error": log
 
 
 def collect_seldom() -> None:
-    """What is loaded by now stays: collections of garbage need not walk through it, nor come every few ticks."""
+    """Exclude the loaded objects from garbage collection, and make collections rare."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)
@@ -52,7 +51,7 @@ class Wire:
     def read(self, reads: Sequence[tuple[Channel, bool]], waits: Sequence[Channel] = ()) -> None:
         """Read these channels: (channel, whether only what is addressed to this name).
 
-        `waits` are those among them for which the reader waits itself: the shortest way, for what every tick brings.
+        `waits` are those in whose queues the reader itself waits: the fastest path, for messages of every tick.
         """
         mine = {channel.key for channel, own in reads if own}
         wanted = {channel.key for channel, _ in reads}
@@ -73,7 +72,7 @@ class Wire:
                 self.session.subscribe(key, channel.key, self._inbox)
 
     def put(self, channel: Channel, name: str, payload: bytes) -> None:
-        """Publish on a channel; `name` is the sender, or the one addressed."""
+        """Publish on a channel; `name` is the sender, or the receiver where one is addressed."""
         key = channel.key_for(name)
         publisher = self._publishers.get(key)
         if publisher is None:
@@ -81,11 +80,11 @@ class Wire:
         publisher.put(payload)
 
     def declare_alive(self) -> None:
-        """Be present under this name; only for who was let in, since one name has one presence."""
+        """Declare presence under this name, after admission, since one name has one presence."""
         self.session.declare_alive(ALIVE[self.plane].replace("{name}", self.name))
 
     def watch_alive(self, name: str = "*") -> None:
-        """Hear who comes and goes."""
+        """Observe the presence of processes."""
         self.session.watch_alive(ALIVE[self.plane].replace("{name}", name), ALIVE[self.plane], self._inbox)
 
 
@@ -100,7 +99,7 @@ def channel_of(key: str) -> tuple[Channel, str] | None:
 
 
 class Core(Protocol):
-    """What a loop needs of a core."""
+    """The interface of a core to its loop."""
 
     actions: list[Any]
 
@@ -110,7 +109,7 @@ class Core(Protocol):
 
 
 class Appender(Protocol):
-    """What a loop needs of a journal."""
+    """The interface of a journal to its loop."""
 
     def append(self, record: bytes) -> None: ...
 
@@ -119,30 +118,30 @@ class Loop:
     """Runs one core. Set the hooks that a process needs, then `run`."""
 
     def __init__(self, core: Core, inbox: Inbox, log: logging.Logger, deadline_ns: Callable[[int], int]) -> None:
-        """`deadline_ns(now)` is when the core has something to do by time."""
+        """`deadline_ns(now)` returns the time of the core's next deadline."""
         self.core = core
         self.deadline_ns = deadline_ns
         self.journal: Appender | None = None
         self.turn: Callable[[int], None] = lambda now_ns: None
-        """What the core does once it has its messages; it may call `perform` in between."""
+        """Called after the core has received its messages; it may call `perform` in between."""
         self.other: Callable[[Any], None] | None = None
-        """Performs the actions that only this process has."""
+        """Performs the actions that are specific to this process."""
         self.lacking: Callable[[], tuple[Channel, int] | None] = lambda: None
-        """The channel, and how many messages of it, without which the core cannot go on: what else a tick brings does
-        not wake the loop."""
+        """The channel, and the number of its messages, that the core waits for; other messages of a tick do not wake
+        the loop."""
         self.on_alive: Callable[[Plane, str, bool], None] = lambda plane, name, is_alive: None
-        """Somebody has come or gone."""
+        """The presence of a process has begun or ended."""
         self.notify = Notify({})
-        """Tells a service manager that the loop goes round; of itself it knows of none."""
+        """Notifies a service manager that the loop advances; none by default."""
         self.on_say: Callable[[Say], None] = lambda say: None
         self.on_unwritten: Callable[[JournalError], None] | None = None
-        """Told once that a record could not be written; what is decided from then on is in no journal."""
+        """Called once when a record could not be written; later decisions are in no journal."""
         self.holds_back: Callable[[Publish], bool] | None = None
-        """Says which messages are not to be said."""
+        """Whether a message is not to be published."""
         self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
-        """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
+        """Called with the begin and the end of a turn, including its actions."""
         self.stood: Callable[[int, int], None] = lambda stood_ns, now_ns: None
-        """Told when the loop has not gone round when it meant to: for how long, and the time (`standstill`)."""
+        """Called after a standstill of the loop, with its length and the time (`standstill`)."""
         self.busy = 0.0
         """Share of the last second in which the loop did not sleep."""
         self._inbox = inbox
@@ -159,17 +158,17 @@ class Loop:
         self._sign_ns = NEVER_NS
 
     def show_progress(self, path: Path | None) -> None:
-        """Give signs of life in this file as long as the loop goes round; None gives none. Raises Failed."""
+        """Write signs of life to this file while the loop advances; none without a path. Raises Failed."""
         if path is not None:
             self._progress = ProgressFile(path)
             self._sign_ns = 0
 
     def connect(self, wire: Wire) -> None:
-        """Publish what belongs to this wire's plane on it."""
+        """Publish messages of this wire's plane on it."""
         self._wires[wire.plane] = wire
 
     def run(self, until: Callable[[], bool]) -> None:
-        """Go round until `until` says so; `Inbox.wake` makes it look."""
+        """Run until `until` returns true; `Inbox.wake` has it checked."""
         collect_seldom()
         self.notify.ready(time.monotonic_ns())
         while not until():
@@ -177,7 +176,7 @@ class Loop:
         self.notify.stopping()
 
     def go_round(self) -> None:
-        """Sleep until there is something, and do it."""
+        """Sleep until a message or a deadline, then handle it."""
         core = self.core
         slept_ns = time.monotonic_ns()
         self.took(self._turn_ns, slept_ns)
@@ -212,7 +211,7 @@ class Loop:
             self._sign(now_ns)
 
     def perform(self) -> None:
-        """Do what the core asks for, in order."""
+        """Perform the core's actions, in order."""
         actions = self.core.actions
         for action in actions:
             kind = type(action)
@@ -230,7 +229,7 @@ class Loop:
         actions.clear()
 
     def _append(self, record: bytes) -> None:
-        """Write a record; a journal that fails is not written any more, and who knows what follows is told."""
+        """Write a record; after a failure the journal is not written again, and `on_unwritten` is called."""
         if self.journal is None:
             return
         try:
@@ -246,7 +245,7 @@ class Loop:
         self._sign_ns = now_ns + EVERY_NS
         try:
             self._progress.write(now_ns)
-        except OSError as error:  # whoever watches sees an old sign; the run itself is not harmed
+        except OSError as error:  # the sign gets old; the run itself is not affected
             self._log.warning("no sign of life could be written: %s", error.strerror)
 
     def _measure(self, now_ns: int, slept_ns: int) -> None:

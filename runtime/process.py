@@ -1,8 +1,7 @@
-"""What every process does around its loop: it dies with its parent, logs lines, and ends in order when told to.
+"""Around the loop of every process: it dies with its parent, logs lines, and ends in order on a signal.
 
-A child that its launcher started is told so in the environment. It asks the kernel to be killed when the launcher
-ends, and a thread watches a pipe that only the launcher can write: its end means the same where the kernel cannot be
-asked.
+The environment tells a child of its launcher. It asks the kernel for a signal when the launcher ends, and a thread
+reads a pipe that only the launcher can write: its end has the same meaning where the kernel has no such signal.
 """
 
 from __future__ import annotations
@@ -48,13 +47,13 @@ def end_with(parent: int) -> None:
 
 
 def end_with_stack() -> None:
-    """Have STACK_SIGNAL write the stacks of all threads to standard error and then end this process: if it hangs."""
+    """Have STACK_SIGNAL write the stacks of all threads to standard error and end this process, for one that hangs."""
     signal.signal(STACK_SIGNAL, signal.SIG_DFL)
     faulthandler.register(STACK_SIGNAL, sys.stderr, all_threads=True, chain=True)
 
 
 def _watch(pipe: int) -> None:
-    """Wait for the end of a pipe that nobody writes to."""
+    """Wait for the end of a pipe to which nothing is written."""
     os.read(pipe, 1)
     os._exit(1)
 
@@ -73,7 +72,7 @@ def start_log(name: str) -> logging.Logger:
 
 
 def machine_start() -> str:
-    """Return a name for this start of this machine; another start of it has another one. Empty where there is none."""
+    """Return the name of this boot of the machine; empty where there is none."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:
@@ -81,20 +80,20 @@ def machine_start() -> str:
 
 
 def clock_name() -> str:
-    """Return a name for the clock of `time.monotonic_ns`: it counts from the start of this machine, not longer."""
+    """Return the name of the clock of `time.monotonic_ns`, which counts from the boot of the machine."""
     return machine_start() or f"process {os.getpid()}"  # then no other process's times are comparable
 
 
 def new_boot() -> str:
-    """Return a name for this start of this process; another start of it has another one."""
+    """Return a random name for this start of this process."""
     return f"b{os.urandom(8).hex()}"
 
 
 class Stop:
-    """Whether this process was told to end: by SIGTERM, SIGINT or SIGHUP. A second SIGINT ends it at once."""
+    """Whether SIGTERM, SIGINT or SIGHUP has requested the end of this process. A second SIGINT ends it at once."""
 
     def __init__(self) -> None:
-        """Take the signals over; only the main thread can."""
+        """Handle the signals; only the main thread can."""
         self._is_set = False
         self._then: Callable[[], None] = lambda: None
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -104,7 +103,7 @@ class Stop:
         return self._is_set
 
     def then(self, call: Callable[[], None]) -> None:
-        """Call this when told to end; at once when that was before."""
+        """Call this when the end is requested, or at once if it was."""
         self._then = call
         if self._is_set:
             call()

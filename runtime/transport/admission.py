@@ -1,7 +1,8 @@
-"""Whether the other side lets us in: access control denies silently, so who is let in sees that the router is present.
+"""The admission to a plane: access control denies silently, so an admitted process is one that sees its router's
+presence.
 
-A connection with certificates that brings no sign of its router within `ADMISSION_NS` is one of somebody whom the
-deployment does not know.
+A connection with certificates that receives no presence of its router within `ADMISSION_NS` has an identity that the
+deployment does not declare.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ ADMISSION_NS: Final = 10_000_000_000
 
 
 class Admission:
-    """What one connection waits for before it is sure to be let in; without certificates everybody is."""
+    """The wait of one connection for its admission; without certificates every connection is admitted."""
 
     def __init__(self, credentials: Credentials | None, router: str, locator: str, now_ns: int) -> None:
-        """`router` is whose presence is the sign."""
+        """`router` is the name whose presence is awaited."""
         self._credentials = credentials
         self._router = router
         self._locator = locator
@@ -25,12 +26,12 @@ class Admission:
         self._is_open = credentials is not None
 
     def heard(self, name: str, is_alive: bool) -> None:
-        """Somebody is present: who hears of the router is let in."""
+        """Handle the presence of a process: that of the router shows admission."""
         if is_alive and name == self._router:
             self._is_open = False
 
     def check(self, now_ns: int) -> None:
-        """Raise NotAuthorised when there was no sign in time."""
+        """Raise NotAuthorised when the router's presence has not been received in time."""
         if self._is_open and now_ns >= self._until_ns:
             assert self._credentials is not None
             who = self._credentials.identity

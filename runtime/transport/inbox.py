@@ -1,12 +1,12 @@
 """The inbox of a process: bounded, many writers, one reader.
 
-Threads that receive only offer to it; the loop takes everything that is there, decides, and sleeps until there is more
-or its deadline has come. Nothing else may happen in a receiving thread: the rest of the world waits behind it.
+Receiving threads only offer messages. The loop takes all of them, decides, and sleeps until a message or its deadline.
+A receiving thread does nothing else, because other messages wait behind it.
 
-A waiting reader costs a wake-up for each message, and a receiving thread between network and reader costs a second one:
-a quarter more for all that a tick's messages cost (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose
-queues the reader waits itself: in that of the channel without which it cannot go on, so that nothing else wakes it for
-nothing. It looks into the others whenever it is awake; what threads offer rings the bell of the queue that it waits in.
+A waiting reader costs a wake-up for each message, and a receiving thread between network and reader a second one: a
+quarter of the cost of a tick's messages (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose queues
+the reader itself waits: that of the channel that it lacks, so that no other message wakes it. It empties the others
+whenever it is awake; an offer of a thread rings the bell of the queue in which it waits.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 Item = tuple[str, str, bytes]
-"""Channel, name (the sender, or who is addressed), payload."""
+"""Channel, name (the sender, or the receiver where one is addressed), payload."""
 
 _NS: Final = 1_000_000_000
 _NEVER_NS: Final = 1 << 63
 ALARM_S: Final = 1.0
-"""How long the end of the alarm thread is waited for."""
+"""Timeout for the end of the alarm thread."""
 
 
 class Source(Protocol):
     """A queue of messages in which a reader can wait."""
 
     def poll(self) -> list[Item]:
-        """Return all that is there, without waiting."""
+        """Return all messages, without waiting."""
 
     def wait(self, count: int) -> list[Item]:
-        """Wait for `count` messages or the bell; return what is there, which may be nothing when it was the bell."""
+        """Wait for `count` messages or the bell; return all messages, possibly none after the bell."""
 
     def ring(self) -> None:
         """End a wait, from another thread."""
@@ -42,7 +42,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class InboxStatistics:
-    """Items taken by the reader, dropped since the inbox was full, and the most that was ever there at once."""
+    """Numbers of items: taken by the reader, dropped by a full inbox, and the most at one time."""
 
     taken: int
     dropped: int
@@ -50,7 +50,7 @@ class InboxStatistics:
 
 
 class Inbox:
-    """Items from many threads for one reader. A full inbox drops the newest and counts: what is older goes first."""
+    """Items from many threads for one reader. A full inbox drops the newest item and counts it."""
 
     def __init__(self, limit: int) -> None:
         assert limit >= 1, limit
@@ -63,7 +63,7 @@ class Inbox:
         self._bell.acquire()
         self._sources: dict[str, Source] = {}
         self._source: Source | None = None
-        """The one that the reader waits in, or has waited in last, and for how many messages."""
+        """The source in which the reader waits, or waited last, and for how many messages."""
         self._count = 1
         self._alarm: _Alarm | None = None
         self._taken = 0
@@ -81,10 +81,10 @@ class Inbox:
         return True
 
     def take(self, timeout_s: float | None, lacking: str = "", count: int = 1) -> list[Item]:
-        """Return all that is there; wait for it until the timeout (None: for ever) or until woken.
+        """Return all items; wait for them until the timeout (None: without limit) or until woken.
 
-        `lacking` is the channel without `count` messages of which the reader cannot go on: fewer do not end the wait,
-        nor does what comes in the queues of other sources. An empty list says that nothing came.
+        The reader lacks `count` messages of the channel `lacking`: fewer do not end the wait, nor do messages in the
+        queues of other sources. The list is empty after a timeout.
         """
         sources = self._sources  # a session that closes takes them away
         received: list[Item] = []
@@ -99,7 +99,7 @@ class Inbox:
             return self._hand_over(received)
         deadline_ns = None if timeout_s is None else time.monotonic_ns() + int(timeout_s * _NS)
         while True:
-            self._waiting = True  # before looking: who comes later rings
+            self._waiting = True  # before looking: later offers ring
             if self._items or self._woken:
                 break
             received = self._wait(deadline_ns)
@@ -110,7 +110,7 @@ class Inbox:
         return self._hand_over(received)
 
     def wake(self) -> None:
-        """End the reader's take, or the next one that would wait. A signal handler may call this: it takes no lock."""
+        """End the reader's take, or its next one that would wait. A signal handler may call this: it takes no lock."""
         self._woken = True
         self._ring()
 
@@ -122,7 +122,7 @@ class Inbox:
         self._sources[channel] = source
 
     def detach(self) -> None:
-        """Give the queues up, since their session closes: the reader waits without them. What was offered stays."""
+        """Remove the sources, since their session closes; offered items stay."""
         self._sources = {}
         source, self._source = self._source, None
         if self._alarm is not None:
@@ -135,7 +135,7 @@ class Inbox:
         return InboxStatistics(self._taken, self._dropped, self._high_water)
 
     def _ring(self) -> None:
-        """End a wait. A ring too many only lets the reader look around once more."""
+        """End a wait. A surplus ring only wakes the reader once more."""
         if not self._waiting:
             return
         self._waiting = False
@@ -158,7 +158,7 @@ class Inbox:
         return []
 
     def _hand_over(self, items: list[Item]) -> list[Item]:
-        """Return what the source had and then what was offered, no more than the limit."""
+        """Return the messages of the source and then the offered ones, up to the limit."""
         if self._items:
             with self._guard:  # or an offer could still append to what the reader has
                 offered, self._items = self._items, []
@@ -178,8 +178,8 @@ class Inbox:
 class _Alarm:
     """Rings at a deadline, from a thread that sleeps until then.
 
-    A later deadline does not wake it: it finds it when the earlier one has passed. So a loop whose deadlines advance
-    pays for one wake-up where one passes, not where one is set. Only the reader writes the deadline.
+    A later deadline does not wake it: the thread reads it when the earlier one has passed. So a loop whose deadlines
+    advance has one wake-up per expired deadline, not per new one. Only the reader writes the deadline.
     """
 
     def __init__(self, ring: Callable[[], None]) -> None:
@@ -192,7 +192,7 @@ class _Alarm:
         self._stopped = False
 
     def set(self, deadline_ns: int) -> None:
-        """Ring at this time, and no more at the one that was set before."""
+        """Replace the deadline."""
         self._deadline_ns = deadline_ns
         if deadline_ns >= self._sleeps_until_ns:
             return
@@ -227,5 +227,5 @@ class _Alarm:
                 else:
                     self._sleeps_until_ns = deadline_ns
                     self._changed.wait((deadline_ns - now_ns) / _NS)
-                    self._sleeps_until_ns = _NEVER_NS  # awake: whoever sets a deadline waits until it has been read
+                    self._sleeps_until_ns = _NEVER_NS  # awake: the reader waits until its deadline has been read
         return False

@@ -1,4 +1,4 @@
-"""Says every minute that a plane is open to everybody who reaches it: what `--insecure` asked for."""
+"""Repeats every minute that a plane is open to every process that reaches it, by `--insecure`."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class Exposure:
     """The reminder of one process."""
 
     def __init__(self, address: Address, now_ns: int) -> None:
-        """`address` is where it listens, and what for; silent for one that only this machine reaches, or with TLS."""
+        """`address` is that of the router; there is no reminder for a loopback address, or with TLS."""
         self._address = address
         self._is_open = not address.is_loopback and address.protocol == "tcp"
         self._next_ns = now_ns
 
     def due(self, now_ns: int) -> str:
-        """Return what is to be said now; mostly nothing."""
+        """Return the reminder when it is due, else an empty text."""
         if not self._is_open or now_ns < self._next_ns:
             return ""
         self._next_ns = now_ns + EVERY_NS

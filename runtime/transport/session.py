@@ -1,11 +1,11 @@
 """A session on a plane: the one file that knows Zenoh.
 
 The supervisor's session is the router of the simulation plane, the vHub's second one that of the radio plane. All
-others are clients, which dial one address and never listen. Scouting is off: nothing is found or linked behind a
-router's back. Threads that receive only fill inboxes; they never decide, never publish, never call Zenoh.
+others are clients, which connect to one address and never listen. Scouting is off, so no links bypass a router.
+Receiving threads only fill inboxes; they never decide, publish or call Zenoh.
 
-Zenoh tells a sender nothing about loss and takes many settings silently. So what matters is set here on purpose, read
-back and compared, and every message is numbered by what it is about.
+Zenoh reports no loss to a sender and accepts many settings silently. So the settings that matter are set here, read
+back and compared, and every message has the number of its tick or sequence.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.settings import QUERY_S, Security, client_settings, holds, router_settings
 
 KeyReader = Callable[[str], tuple[str, str] | None]
-"""Gives the channel and the name that a key stands for, or None for a key that it does not know."""
+"""Returns the channel and the name in a key, or None for an unknown key."""
 
 CLOSE_S: Final = 2.0
 ATTEMPT_S: Final = 0.5
-"""Between two attempts to connect `give_up` is asked, and signals are heard."""
+"""The interval of attempts to connect, between which `give_up` is called and signals are handled."""
 ROUTER_THREADS: Final = 8
 """Each sender whose message waits for a stuck reader holds one receiving thread of the router. With Zenoh's two, a
 stuck client stopped healthy ones for 9 s; with eight for 1.3 s, and nothing of theirs was lost."""
 KEYS_KEPT: Final = 4096
 BELL: Final = "-"
-"""Last chunk of a bell's key: nobody can be called so."""
+"""Last chunk of a bell's key, which is no valid name."""
 
 ROUTER_RUNTIME: Final = f"(rx: (worker_threads: {ROUTER_THREADS}))"
 CLIENT_RUNTIME: Final = "(rx: (handover: app), acc: (handover: app))"
@@ -90,7 +90,7 @@ class Publisher:
         self._pid = os.getpid()
 
     def put(self, payload: bytes) -> None:
-        """Publish. A stuck reader holds a blocking publisher for at most half a second; nothing is told about loss."""
+        """Publish. A stuck reader holds a blocking publisher for at most half a second; a loss is not reported."""
         assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
         self._put(payload)
         self.sent += 1
@@ -121,7 +121,7 @@ class Session:
     ) -> Session:
         """Listen as the router of a plane; with port 0 the system chooses. Raises ListenError.
 
-        With `security` only who proves to be known is let in, and may do what is granted.
+        With `security` only authenticated identities are admitted, with their grants.
         """
         address = parse_address(listen, security is not None)
         try:
@@ -145,8 +145,8 @@ class Session:
     ) -> Session:
         """Connect to a router, which may start later. Raises ConnectError at the timeout, or when `give_up` says so.
 
-        Raises NotAuthorised as soon as the other side, or its certificate, says that we may not. A link that is lost
-        later is made again as soon as the router is back.
+        Raises NotAuthorised as soon as the other side, or its certificate, shows a refusal. A link that is lost later
+        is restored as soon as the router is back.
         """
         address = parse_address(connect, security is not None)
         if address.port == 0 or address.is_wildcard:
@@ -158,7 +158,7 @@ class Session:
                 return cls(
                     _open(client_settings(address, message_bytes_max, min(left_s, ATTEMPT_S), security)), str(address)
                 )
-            except zenoh.ZError:  # its text says no more than the address, whatever the cause
+            except zenoh.ZError:  # its text is the address alone, for every cause
                 from foosim.runtime.transport.tls_probe import probe  # brings ssl, which few processes need
 
                 probe(address, None if security is None else security.credentials, left_s <= ATTEMPT_S)
@@ -170,10 +170,10 @@ class Session:
         raise ConnectError(f"gave up before a router answered at {address}")
 
     def publisher(self, key: str, express: bool = True, blocking: bool = True) -> Publisher:
-        """Return a publisher on one key, which subscribers of this same session do not hear.
+        """Return a publisher on one key, which does not reach subscribers of this session.
 
-        `express`: sent at once, never held back for a batch. `blocking`: a slow reader holds the sender; otherwise what
-        does not fit within 1 ms is lost.
+        `express`: sent at once, without batching. `blocking`: a slow reader holds the sender; otherwise a message that
+        cannot be sent within 1 ms is lost.
         """
         self._check()
         declared = self._session.declare_publisher(
@@ -187,12 +187,12 @@ class Session:
         return self._publishers[-1]
 
     def subscribe(self, key_expr: str, channel: str, inbox: Inbox) -> None:
-        """Offer what comes on these keys to the inbox as (channel, last chunk of the key, payload)."""
+        """Offer messages on these keys to the inbox as (channel, last chunk of the key, payload)."""
         self._check()
         self._drain(self._session.declare_subscriber(key_expr, _queue(inbox)), channel, inbox, _payload)
 
     def receive(self, key_expr: str, channel: str, read_key: KeyReader, inbox: Inbox) -> None:
-        """Let the inbox's reader wait for these keys itself: the short way, for what every tick brings.
+        """Let the inbox's reader itself wait for these keys: the fastest path, for messages of every tick.
 
         Once for a channel, by the reader itself or before the inbox's first take. When the reader leaves more than the
         inbox's limit waiting, the link waits, too.
@@ -209,21 +209,21 @@ class Session:
         inbox.attach(source, channel)
 
     def declare_alive(self, key: str) -> None:
-        """Be present under this key until the session or its process ends."""
+        """Declare presence under this key until the session or its process ends."""
         self._check()
         self._declared.append(self._session.liveliness().declare_token(key))
 
     def watch_alive(self, key_expr: str, channel: str, inbox: Inbox) -> None:
-        """Offer (channel, name, b"+" or b"-") for all who are present, and then for who comes and goes.
+        """Offer (channel, name, b"+" or b"-") for all present names, and then for each change.
 
-        Repeats can occur.
+        Duplicates can occur.
         """
         self._check()
         subscriber = self._session.liveliness().declare_subscriber(key_expr, _queue(inbox), history=True)
         self._drain(subscriber, channel, inbox, _presence)
 
     def alive(self, key_expr: str) -> set[str]:
-        """Ask for the names that are present: a cross-check of what `watch_alive` brought."""
+        """Query the present names, to check those of `watch_alive`."""
         self._check()
         replies = self._session.liveliness().get(key_expr, timeout=QUERY_S)
         return {_name(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
@@ -239,7 +239,7 @@ class Session:
         )
 
     def close(self) -> bool:
-        """Take back what was declared and close; False when that took more than `CLOSE_S` and goes on without us."""
+        """Undeclare everything and close; False when that takes more than `CLOSE_S` and continues in the background."""
         assert os.getpid() == self.pid, "a session does not survive a fork: spawn processes"
         if self._closed:
             return True
@@ -283,7 +283,7 @@ _sessions: weakref.WeakSet[Session] = weakref.WeakSet()
 
 
 class _Receiver:
-    """What a receiving side counts. It belongs to one thread."""
+    """The counters of a receiving thread."""
 
     def __init__(self, handler: Any) -> None:
         self.received = 0
@@ -293,7 +293,7 @@ class _Receiver:
         self._handler = handler
 
     def _concrete_key(self, sample: zenoh.Sample) -> str | None:
-        """Return the key; None, and counted, for one with wildcards: Zenoh lets them pass, and they name nobody."""
+        """Return the key; None, and counted, for one with wildcards, which Zenoh lets pass."""
         key = str(sample.key_expr)
         if "*" in key or "$" in key:
             self.refused += 1
@@ -335,7 +335,7 @@ class _Source(_Receiver):
     """A subscriber's queue as an inbox's source. Its bell is a message on a key of it that stays in this session."""
 
     def __init__(self, handler: Any, read_key: KeyReader, bell_key: str, bell: zenoh.Publisher, limit: int) -> None:
-        """`limit` is how many messages are taken at a time: a flood would keep the reader from all else."""
+        """`limit` is the number of messages that are taken at a time, so that a flood does not block the reader."""
         super().__init__(handler)
         self._limit = limit
         self._read_key = read_key
@@ -344,7 +344,7 @@ class _Source(_Receiver):
         self._keys: dict[str, tuple[str, str]] = {}
 
     def poll(self) -> list[Item]:
-        """Return what is there, without waiting."""
+        """Return the messages, without waiting."""
         items: list[Item] = []
         try:
             while len(items) < self._limit and (sample := self._handler.try_recv()) is not None:
@@ -354,7 +354,7 @@ class _Source(_Receiver):
         return items
 
     def wait(self, count: int) -> list[Item]:
-        """Wait for `count` messages or the bell, and return what is there."""
+        """Wait for `count` messages or the bell, and return the messages."""
         items: list[Item] = []
         try:
             for expected in range(1, count + 1):
@@ -446,14 +446,14 @@ def _locators(session: zenoh.Session) -> list[str]:
 
 
 def _close_all() -> None:
-    """Close what was left open. A thread that Python ends inside Zenoh, as it does at exit, aborts the process."""
+    """Close open sessions. A thread that Python ends inside Zenoh, as it does at exit, aborts the process."""
     for session in list(_sessions):
         if session.pid == os.getpid():
             session.close()
 
 
 def _reason(error: zenoh.ZError) -> str:
-    """Return what the system said, out of a text that names Zenoh's source files."""
+    """Return the system's error, out of a text that names Zenoh's source files."""
     text = str(error)
     said = re.search(r"([A-Z][^:()\[\]]*) \(os error \d+\)", text)
     return said[1] if said is not None else text.partition(" at /")[0][:160]

@@ -1,6 +1,6 @@
-"""What a session is set to: common settings, certificates, who may do what. Zenoh's names, without Zenoh.
+"""The settings of a session: common settings, certificates, grants. Zenoh's names, without Zenoh.
 
-Each line is here because its default was found wanting.
+Each line is here because its default did not fit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from foosim.protocol.channels import CHANNELS, Plane
 from foosim.runtime.transport.certificates import Credentials
 
 LEASE_MS: Final = 1000
-"""After how much silence a peer counts as gone."""
+"""The silence after which a peer is lost."""
 BLOCK_US: Final = 500_000
 """How long one stuck reader may hold a sender before its link is closed."""
 QUERY_S: Final = 2.0
@@ -23,7 +23,7 @@ QUERY_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Security:
-    """Who we are, and, for a router, whom it lets do what. `passwords_file`: users and passwords, a line each."""
+    """The identity, and the grants of a router. `passwords_file`: users and passwords, a line each."""
 
     credentials: Credentials
     access: Access | None = None
@@ -37,7 +37,7 @@ def router_settings(address: Address, message_bytes_max: int, security: Security
         "listen/timeout_ms": 0,
         "listen/exit_on_failure": True,
         "connect/endpoints": [],
-        # What it says about itself tells which port was chosen. It can be read, never written.
+        # Its own admin space has the chosen port. It can be read, never written.
         "adminspace/enabled": True,
         "adminspace/permissions": {"read": True, "write": False},
     }
@@ -69,7 +69,7 @@ def client_settings(
 
 
 def holds(found: Any, said: Any) -> bool:
-    """Whether what Zenoh gives back is what it was told; what was not said of a mapping it gives as null."""
+    """Whether Zenoh returns the settings that it was given; missing keys of a mapping are null."""
     if isinstance(said, dict) and isinstance(found, dict):
         return all(holds(value, said.get(key)) for key, value in found.items()) and said.keys() <= found.keys()
     if isinstance(said, list) and isinstance(found, list):
@@ -78,12 +78,12 @@ def holds(found: Any, said: Any) -> bool:
 
 
 def _common_settings(mode: str, message_bytes_max: int, protocol: str) -> dict[str, Any]:
-    """Return what router and client have in common."""
+    """Return the settings of router and client."""
     return {
         "mode": mode,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        "scouting/delay": 0,  # a router would wait half a second for those that it may not look for
+        "scouting/delay": 0,  # a router would wait half a second for peers that it does not look for
         "timestamping/enabled": {"router": False, "peer": False, "client": False},  # ticks are our time
         "queries_default_timeout": int(QUERY_S * 1000),
         "transport/shared_memory/enabled": False,  # loses queries when a reader stalls
@@ -106,7 +106,7 @@ def _common_settings(mode: str, message_bytes_max: int, protocol: str) -> dict[s
 
 
 def _certificate_settings(security: Security) -> dict[str, Any]:
-    """Return whom we trust and what we show: both sides need `enable_mtls`, or no client certificate is sent."""
+    """Return root and certificate: both sides need `enable_mtls`, or no client certificate is sent."""
     mine = security.credentials
     settings: dict[str, Any] = {
         "root_ca_certificate": str(mine.ca),
@@ -129,7 +129,7 @@ def _access_settings(access: Access, passwords_file: str) -> dict[str, Any]:
 
 
 def _size_limits(plane: Plane) -> list[dict[str, Any]]:
-    """Return where less than a plane's largest message is let in: a limit each, as the table of channels says it."""
+    """Return the limits of channels with smaller messages than their plane's largest, from the table of channels."""
     channels = [channel for channel in CHANNELS if channel.plane is plane]
     largest = max(channel.bytes_max for channel in channels)
     return [

@@ -1,7 +1,7 @@
-"""Why a router did not let us in: a TLS handshake of our own, since Zenoh calls every refusal a timeout.
+"""The reason of a refusal by a router: a TLS handshake of our own, since Zenoh reports every refusal as a timeout.
 
-Only what is sure is said early: a certificate that we do not trust, or an alert of the other side about ours. Who is
-not there at all may still start.
+Only certain reasons are reported early: a certificate that is not trusted, or an alert of the other side. A router that
+does not answer may still start.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from foosim.runtime.transport.certificates import Credentials, NotAuthorised
 
 PROBE_S: Final = 1.0
 ALERT_S: Final = 0.5
-"""How long the other side has to complain about our certificate: in TLS 1.3 it does so behind the handshake."""
+"""Timeout for an alert about our certificate, which TLS 1.3 sends after the handshake."""
 
 
 def probe(address: Address, credentials: Credentials | None, is_last: bool) -> None:
-    """Raise NotAuthorised when it is sure that there is no way in; `is_last`: also when it is likely."""
+    """Raise NotAuthorised for a certain refusal; with `is_last` also for a likely one."""
     try:
         with socket.create_connection((address.host.strip("[]"), address.port), PROBE_S) as link:
             _shake(link, address, credentials)
     except OSError:
-        return  # nobody there, or not yet; ssl's errors are among these
+        return  # no router, or not yet; ssl's errors are among these
     else:
         if credentials is not None and is_last:
             raise NotAuthorised(
@@ -34,7 +34,7 @@ def probe(address: Address, credentials: Credentials | None, is_last: bool) -> N
 
 
 def _shake(link: socket.socket, address: Address, credentials: Credentials | None) -> None:
-    """Go through the handshake; raises NotAuthorised, or OSError when it comes to nothing."""
+    """Perform the handshake; raises NotAuthorised, or OSError when it fails otherwise."""
     if credentials is None:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.check_hostname = False
@@ -50,7 +50,7 @@ def _shake(link: socket.socket, address: Address, credentials: Credentials | Non
             try:
                 secured.recv(1)
             except TimeoutError:
-                return  # it waits for what Zenoh would say: we are let in as far as TLS goes
+                return  # it waits for a message of Zenoh: TLS has admitted us
     except ssl.SSLCertVerificationError as error:
         raise NotAuthorised(f"{address}: its certificate is not accepted here: {error.verify_message}") from None
     except ssl.SSLError as error:
@@ -63,5 +63,5 @@ def _shake(link: socket.socket, address: Address, credentials: Credentials | Non
 
 
 def _alert(error: ssl.SSLError) -> str:
-    """Return what the other side complained of, in words."""
+    """Return the alert of the other side, in words."""
     return (error.reason or "").lower().rpartition("alert_")[2].replace("_", " ")
