@@ -1,4 +1,4 @@
-"""What a capture gives as numpy arrays: packets, frames, poses. Plain data, made by `capture_reader`."""
+"""The content of a capture as numpy arrays: packets, frames, poses. Plain data, made by `capture.reader`."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _WORD: Final = re.compile("[0-9a-f]{16}")
 
 
 def word_of(text: str) -> int | None:
-    """Return the draw that a row tells in hex, None where there is none."""
+    """Return the draw of a row, which is in hex; None without one."""
     if not text:
         return None
     if not _WORD.fullmatch(text):

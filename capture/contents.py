@@ -1,4 +1,4 @@
-"""What stands in a capture beside its rows: topics with their schemas, attachments, and entries of its metadata."""
+"""The content of a capture beside its rows: topics with their schemas, attachments, and metadata."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ metadata `foosim`."""
 CUT_REASON: Final = "cut"
 """The reason of its end that a part says."""
 OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
-"""What the files of a capture say otherwise, each for itself."""
+"""The metadata that differ between the files of a capture."""
 
 
 def origin_metadata(origin: Origin | None) -> dict[str, str]:
-    """Return what a capture says of where its run began."""
+    """Return the metadata of the origin of a run."""
     if origin is None:
         return {}
     digest, chain = origin.digest.hex(), origin.chain.hex()
@@ -55,7 +55,7 @@ def origin_metadata(origin: Origin | None) -> dict[str, str]:
 
 
 def ending_metadata(end: End) -> dict[str, str]:
-    """Return what a capture says of how its run ended."""
+    """Return the metadata of the end of a run."""
     return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
 
 

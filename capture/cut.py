@@ -53,7 +53,7 @@ class Cut:
 
 @dataclass(slots=True)
 class _Start:
-    """What is in force at the last tick that was read."""
+    """The latched state at the last tick that was read."""
 
     in_force: ActiveState
     tick: int = -1

@@ -1,4 +1,4 @@
-"""The reader of captures: a finished or an unfinished file as numpy arrays, and what a re-simulation is fed with.
+"""The reader of captures: a finished or an unfinished file as numpy arrays, and the inputs of a re-simulation.
 
 A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for: frames,
 packets and rows are read when they are used. What is damaged or is no capture raises `CaptureError`; a file whose
@@ -111,7 +111,7 @@ class CapturedTick:
 
 @dataclass(slots=True)
 class About:
-    """What a capture says about itself, beside its rows."""
+    """The description of a capture, beside its rows."""
 
     path: Path
     library: str = ""
@@ -181,7 +181,7 @@ class Scan:
             raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
 
     def _check(self, file: Joined) -> None:
-        """Refuse what is no capture, or one of another version, before its rows are looked at."""
+        """Refuse a file that is no capture, or one of another version, before its rows are read."""
         if file.profile != PROFILE or not self.about.metadata:
             raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
         self._check_format(self.about.metadata.get("format", ""))
@@ -292,7 +292,7 @@ class CaptureData:
             yield row
 
     def captured_ticks(self) -> Iterator[CapturedTick]:
-        """Yield what a re-simulation needs, tick by tick."""
+        """Yield the inputs of a re-simulation, tick by tick."""
         for row in self.rows(TICK):
             assert isinstance(row, TickRow)
             yield captured_tick(row)
@@ -317,7 +317,7 @@ class CaptureData:
 
 
 def captured_tick(row: TickRow) -> CapturedTick:
-    """Return what a re-simulation needs of a row."""
+    """Return the inputs of a re-simulation in a row."""
     return CapturedTick(
         row.tick,
         bytes.fromhex(row.digest),
@@ -328,7 +328,7 @@ def captured_tick(row: TickRow) -> CapturedTick:
 
 
 def read_about(path: Path) -> About:
-    """Return what a capture, finished or not, says about itself before its first row. Raises CaptureError."""
+    """Return the description of a capture, finished or not, before its first row. Raises CaptureError."""
     scan = Scan(path)
     for _ in scan.messages():
         break

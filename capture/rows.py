@@ -1,4 +1,4 @@
-"""The rows of a capture: what is kept of every closed tick, as types of their own.
+"""The rows of a capture, as types.
 
 A row is a JSON object; its JSON Schema is generated from its type. Viewers (Foxglove, Lichtblick) parse only a part of
 JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
@@ -27,7 +27,7 @@ EARLIER_FORMATS: Final = frozenset({"2"})
 PROFILE: Final = "foosim"
 
 CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
-"""-1 where there is nothing to say."""
+"""-1 where there is no value."""
 DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
 ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
@@ -66,7 +66,7 @@ class DeliveredRow(Row, frozen=True, omit_defaults=True):
 
 
 class TickRow(Row, frozen=True):
-    """Frame `tick`: its digest D(tick), a 64-bit digest per entity in name order (all in hex), and what it came from:
+    """Frame `tick`: its digest D(tick), a 64-bit digest per entity in name order (all in hex), and its inputs:
     edits and deliveries of tick - 1. `wall_closed_ns` is the vHub's monotonic clock."""
 
     tick: Counter
@@ -120,7 +120,7 @@ class FrameRow(Row, frozen=True):
 
 
 class DecidedRow(Row, frozen=True, omit_defaults=True):
-    """By what a packet was dropped, where its cause has numbers of its own.
+    """The numbers of a cause, where it has some.
 
     A `collision` is `contention` (the medium's), `interference`, or `half_duplex`: its receiver was on air itself.
     `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
@@ -202,7 +202,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
 
 
 class SubscriptionRow(Row, frozen=True):
-    """A channel of an endpoint that a client hears."""
+    """A channel of an endpoint to which a client subscribes."""
 
     source: str
     channel: str
@@ -212,7 +212,7 @@ class ClientRow(Row, frozen=True):
     """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
 
     One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period. One that
-    `leaves_owing` was told its turn at that tick, and is gone without an answer.
+    `leaves_owing` was sent its Go at that tick, and has left without an answer.
     """
 
     tick: Counter
@@ -225,11 +225,11 @@ class ClientRow(Row, frozen=True):
 
 
 class AgeRow(Row, frozen=True):
-    """How old the newest packet of a channel was when its receiver acted, since the row before: told each second of
+    """The age of the newest packet of a channel when its receiver acted, since the previous row: written each second of
     simulated time, up to the closing of `tick`, and at the end.
 
     `uses` counts the ticks at which the client acted and had something of the channel; `p50_ns`, `p99_ns` and `most_ns`
-    are of these. `counts` says how often each of `ages_ns` was seen; ages of 64 ticks and more are rounded down to
+    are of these. `counts` has the number of times of each of `ages_ns`; ages of 64 ticks and more are rounded down to
     1/32.
     """
 
@@ -253,10 +253,10 @@ class OwnerRow(Row, frozen=True):
 
 
 class EpochRow(Row, frozen=True):
-    """Who computes from frame `tick` on, whose digest D(tick) is named: the nodes, and the owner of every robot.
+    """The nodes, and the owner of every robot, from frame `tick` on; `digest` is D(tick).
 
-    `arithmetic` is the digest of a fixed small run of the nodes' engine, in hex: where it differs, worlds may differ.
-    It is empty where nodes of several kinds take part.
+    `arithmetic` is the digest of a fixed short run of the nodes' engine, in hex: where it differs, worlds may differ.
+    It is empty where different ones are admitted.
     """
 
     tick: Counter
@@ -313,7 +313,7 @@ def row_schema(kind: type[Row]) -> dict[str, Any]:
 
 
 def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
-    """Return a schema with references replaced by what they name, and the type said of every list of choices."""
+    """Return a schema with references resolved, and with a type for every list of choices."""
     if isinstance(schema, list):
         return [_in_place(item, definitions) for item in schema]
     if not isinstance(schema, dict):
@@ -325,7 +325,7 @@ def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
 
 
 def edit_of(row: EditRow) -> Edit:
-    """Return the edit that a row tells; the inverse of `to_rows.edit_row`."""
+    """Return the edit of a row; the inverse of `rows_of_closing.edit_row`."""
     if row.kind == "add":
         return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
     if row.kind == "remove":
@@ -338,7 +338,7 @@ def edit_of(row: EditRow) -> Edit:
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:
-    """Return the delivery that a row tells."""
+    """Return the delivery of a row."""
     return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
 
 

@@ -104,7 +104,7 @@ def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
     inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
     # Players print to standard error: standard output has the result and nothing else.
     with redirect_stdout(sys.stderr), Interrupts(_note) as interrupts:
-        settings = Settings(on_say=_show)
+        settings = Settings(on_log=_show)
         looks: dict[str, Any] = {"prepare": interrupts.attend, "progress": _note, "on_stuck": stuck}
         try:
             result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settings, **inputs, **looks).json
@@ -118,7 +118,7 @@ def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
 
 
 def _note(line: str) -> None:
-    """Say something beside the result."""
+    """Log something beside the result."""
     typer.echo(line, err=True)
 
 

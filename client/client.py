@@ -100,7 +100,7 @@ class Actuator:
         self._robot = robot
 
     def set(self, slide: float, spin: float) -> None:
-        """Say where the rod shall go: `slide` in m along world +y from its middle, `spin` in rad about +y, 0 feet down.
+        """Log where the rod shall go: `slide` in m along world +y from its middle, `spin` in rad about +y, 0 feet down.
 
         In lockstep it is sent at the tick's end, and of several the last one counts; after `listen` it is sent at once.
         The rod keeps its last command. Raises BadValue for what is out of its reach or not finite, NotJoined, RunEnded.
@@ -117,7 +117,7 @@ class DriveActuator:
         self._robot = robot
 
     def set(self, left: float, right: float) -> None:
-        """Say how fast the wheels shall roll, in m/s; the rover keeps its last command. Otherwise as for a rod."""
+        """Log how fast the wheels shall roll, in m/s; the rover keeps its last command. Otherwise as for a rod."""
         payload = encode_command(self._client.deployment, self._robot, Drive(float(left), float(right)))
         self._client._command(self._robot, payload, CHANNEL_DRIVE)
 
@@ -173,7 +173,7 @@ class Link:
         self._wire.watch_alive(VHUB)
 
     def perform(self) -> None:
-        """Say what the core has to say."""
+        """Log what the core has to say."""
         self._loop.perform()
 
     def wait(self, reached: Callable[[], bool], timeout_s: float | None) -> None:

@@ -23,7 +23,7 @@ from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import (
@@ -173,7 +173,7 @@ class ClientCore:
         self._lost_ns = now_ns + self._patience_ns(self.deployment)
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
-        self.actions.append(Say("warning", "the vHub is gone; waits for it to come back"))
+        self.actions.append(Log("warning", "the vHub is gone; waits for it to come back"))
 
     def hub_here(self, now_ns: int) -> None:
         """A vHub is present."""
@@ -251,7 +251,7 @@ class ClientCore:
         if len(self._unrecorded) + len(sent) > limits.UPLINKS_KEPT_MAX:
             if not self._unsent:
                 self.actions.append(
-                    Say("warning", f"{len(self._unrecorded)} packets wait for the vHub: no more is sent")
+                    Log("warning", f"{len(self._unrecorded)} packets wait for the vHub: no more is sent")
                 )
             self._unsent += len(sent)
             return
@@ -268,8 +268,8 @@ class ClientCore:
     def fail(self, reason: str, trace: str = "") -> None:
         """Report that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
         if trace:
-            self.actions.append(Say("error", trace))
-        self.actions.append(Say("error", reason))
+            self.actions.append(Log("error", trace))
+        self.actions.append(Log("error", reason))
         self._publish(encode(Failure(self.name, self.boot, reason)))
 
     # --- messages --------------------------------------------------------------------------------------------------
@@ -307,7 +307,7 @@ class ClientCore:
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
         self._resend(whole=True)
-        self.actions.append(Say("info", "the vHub is back"))
+        self.actions.append(Log("info", "the vHub is back"))
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:
         is_in = self.welcome is not None and not self.is_away
@@ -318,7 +318,7 @@ class ClientCore:
 
     def _refused(self, reason: str) -> None:
         self.refusal = reason or "no reason given"
-        self.actions.append(Say("error", f"refused by the vHub: {self.refusal}"))
+        self.actions.append(Log("error", f"refused by the vHub: {self.refusal}"))
 
     def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
         if message.name != self.name:

@@ -13,7 +13,7 @@ from foosim.client.errors import PlayerError
 from foosim.client.failing import report_failure
 from foosim.client.loading import load_player
 from foosim.client.player import PlayerFactory, PlayerLoop
-from foosim.protocol.actions import Action, Say
+from foosim.protocol.actions import Action, Log
 from foosim.protocol.channels import Channel
 from foosim.runtime.command import DONE, FAILED, REFUSED
 
@@ -63,7 +63,7 @@ class Crew:
             self.actions += core.actions
         else:
             self.actions += [
-                Say(action.level, f"{core.name}: {action.text}") if isinstance(action, Say) else action
+                Log(action.level, f"{core.name}: {action.text}") if isinstance(action, Log) else action
                 for action in core.actions
             ]
         core.actions.clear()
@@ -95,7 +95,7 @@ class Crew:
         """Report the players that have lost the vHub; return the exit code."""
         for core in self.cores:
             if core.lost:
-                core.actions.append(Say("error", "lost the vHub"))
+                core.actions.append(Log("error", "lost the vHub"))
             self._speak(core)
         if any(core.refusal for core in self.cores):
             return REFUSED

@@ -85,7 +85,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "its own time-keeping thread to end; then it ends without it",
     ),
     ("runtime.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
-    ("runtime.standstill", "TOLD_NS"): (
+    ("runtime.standstill", "REPORTED_NS"): (
         "supervisor, vHub",
         "their own loop; one that stood still for longer says so, and takes no closed connection for a loss",
     ),

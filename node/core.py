@@ -18,11 +18,10 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
-from foosim.node.held import Held
-from foosim.node.inputs import Inputs, check_near
+from foosim.node.inputs import Inputs, PendingEpochMessages, check_near
 from foosim.node.tick import Stepper, Work, moved_counters
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
@@ -53,7 +52,7 @@ from foosim.world.robot_packets import Outbox
 
 @dataclass(frozen=True, slots=True)
 class NodeStatistics:
-    """What a node has done so far."""
+    """The counters of a node."""
 
     tick: int
     epoch: int
@@ -66,7 +65,7 @@ class NodeStatistics:
 
 @dataclass(frozen=True)
 class _Term:
-    """Everything that changes with an epoch or a layout: who computes and writes what."""
+    """The state that changes with an epoch or a layout: solvers and writers."""
 
     stepper: Stepper
     slots: Slots
@@ -76,7 +75,7 @@ class _Term:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NodeCore:
-    """One node's state machine. `actions` is what the shell performs next; `work` what it solves next."""
+    """One node's state machine. `actions` are performed next by the shell, `work` is solved next."""
 
     def __init__(self, name: str, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.name = name
@@ -100,7 +99,7 @@ class NodeCore:
         self._sent_parts: dict[int, bytes] = {}
         self._unsampled: set[int] = set()
         """Ticks at which samples are wanted of frames that are not here."""
-        self._held = Held()
+        self._pending = PendingEpochMessages()
         self._counters: list[int] = []
         self._barrier: Barrier | None = None
         self._input_digest = b""
@@ -137,7 +136,7 @@ class NodeCore:
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
-        """Go on as far as the inputs allow; `work` is set when the engine has to solve."""
+        """Advance as far as the inputs allow; `work` is set when the engine has to solve."""
         while self.frame is not None and self._term is not None and self.work is None and self.ended is None:
             if not self._sensed:
                 self._sense()
@@ -148,7 +147,7 @@ class NodeCore:
                 return
 
     def solved(self, work: Work) -> None:
-        """Take the solved work back: say my part of the next frame."""
+        """Accept the solved work, and publish this node's part of the next frame."""
         assert work is self.work
         assert self.frame is not None and self._term is not None and self._barrier is not None
         self.work = None
@@ -179,7 +178,7 @@ class NodeCore:
         self.member.ready(layout)
 
     def wake(self, now_ns: int) -> None:
-        """Do what is due by time: hello, heartbeat, asking again."""
+        """Send what is due by time: hello, heartbeat, repeated requests."""
         self.member.wake(now_ns, self._heartbeat)
         if self._is_in and self._patience.is_over(now_ns) and self.work is None:
             self._ask_again(now_ns)
@@ -190,7 +189,7 @@ class NodeCore:
 
     @property
     def _is_in(self) -> bool:
-        """Whether there is an epoch to go on with."""
+        """Whether this node is a member of the current epoch."""
         return self.ended is None and (self.frame is not None or self._awaited_epoch is not None)
 
     @property
@@ -208,12 +207,12 @@ class NodeCore:
 
     def statistics(self) -> NodeStatistics:
         tick = self.frame.tick if self.frame is not None else 0
-        counts = self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
+        counts = self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._pending)
         return NodeStatistics(tick, self.epoch, *counts)
 
     @property
     def lacking(self) -> tuple[Channel, int] | None:
-        """The channel, and how many messages of it, without which the tick cannot go on; None when there is no tick."""
+        """The channel, and the number of its messages, that the tick waits for; None without a tick."""
         if self.frame is None or self.ended is not None or self._awaited_epoch is not None:
             return None
         if self._barrier is not None:
@@ -233,7 +232,7 @@ class NodeCore:
     # --- one tick ----------------------------------------------------------------------------------------------------
 
     def _sense(self) -> None:
-        """Step 1: say what my robots send at this frame, also when it is nothing; at a silent tick all know that."""
+        """Step 1: publish the samples of this node's robots at this frame, also empty ones, except at a silent tick."""
         frame, term = self.frame, self._term
         assert frame is not None and term is not None
         self._sensed = True
@@ -243,7 +242,7 @@ class NodeCore:
         self._counters = self._say_samples(frame, term.mine)
 
     def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> list[int]:
-        """Say what these robots send at a frame; return the counters of the sensors that sampled."""
+        """Log what these robots send at a frame; return the counters of the sensors that sampled."""
         packets, counters = self.stepper(frame.layout).sense(frame, robots)
         samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in robots], packets)
         self.actions.append(Publish(channels.SAMPLES, self.name, encode(samples)))
@@ -286,7 +285,7 @@ class NodeCore:
             frame = barrier.assemble()
         except BadParts as bad:
             self._refused += 1
-            self.actions.append(Say("error", f"{bad}: asked for again"))
+            self.actions.append(Log("error", f"{bad}: asked for again"))
             barrier.drop(node for node in bad.nodes if node != self.name)
             return False
         self._enter(frame, now_ns)
@@ -295,16 +294,16 @@ class NodeCore:
     def _take_part(self, barrier: Barrier, part: Part) -> None:
         if part.input_digest != self._input_digest:
             self._diverged += 1
-            self.actions.append(Say("error", f"part {part.tick} of {part.node} has another input digest: kept"))
+            self.actions.append(Log("error", f"part {part.tick} of {part.node} has another input digest: kept"))
             return
         try:
             barrier.add(part)
         except Malformed as error:
             self._refused += 1
-            self.actions.append(Say("error", str(error)))
+            self.actions.append(Log("error", str(error)))
 
     def _enter(self, frame: Frame, now_ns: int) -> None:
-        """Take `frame` as mine and forget what is older than anybody may ask for."""
+        """Enter `frame`, and drop data that is older than any request."""
         self.frame = frame
         self._barrier = None
         self._sensed = False
@@ -322,7 +321,7 @@ class NodeCore:
         if message.epoch == self.epoch and self._awaited_epoch is None:
             return False
         if message.epoch >= self.epoch:
-            self._held.add(channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload)
+            self._pending.add(channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload)
         else:
             self._repeated += 1
         return True
@@ -363,7 +362,7 @@ class NodeCore:
             self._sample_again(want.tick)
 
     def _sample_again(self, tick: int) -> None:
-        """Say what my robots, also those that I had not at that tick, send at a frame; ask for one that I had not."""
+        """Log what my robots, also those that I had not at that tick, send at a frame; ask for one that I had not."""
         frame = self._history.get(tick)
         if frame is not None:
             mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
@@ -436,14 +435,14 @@ class NodeCore:
             self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _begin_anew(self, epoch: Epoch) -> None:
-        """Others go on without this node: nothing of what it computes counts, so it comes back as a newcomer."""
+        """The other nodes continue without this one: its results are void, so it joins again."""
         if self.epoch == 0:
             return  # it has not been in yet
-        self.actions.append(Say("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
+        self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
         self._inputs.begin(epoch)
-        self._held.take()
+        self._pending.take()
         for kept in (self._history, self._parts, self._sent_parts):
             kept.clear()
         self.member.begin_anew()
@@ -475,12 +474,12 @@ class NodeCore:
         raise Malformed(f"commit {commit.tick} whose frame has another digest in every layout")
 
     def _resume(self, frame: Frame, now_ns: int) -> None:
-        """Go on from the epoch's frame with the epoch's roster and owners, and with what was held for it."""
+        """Continue from the epoch's frame, with its roster and owners and its pending messages."""
         self._awaited_epoch = None
         self._history = {tick: kept for tick, kept in self._history.items() if tick < frame.tick}
         self._enter(frame, now_ns)
         self._term = self._make_term(frame.layout)
-        for channel, name, payload in self._held.take():
+        for channel, name, payload in self._pending.take():
             self.receive(channel, name, payload, now_ns)
 
     def _make_term(self, layout: Layout) -> _Term:

@@ -26,7 +26,7 @@ ENGINES_KEPT: Final = 3
 
 
 class Solver:
-    """Builds what a node's core wants and solves its work. The engines that were used last are kept."""
+    """Builds the engines that a node's core needs, and solves its work. The last used engines are kept."""
 
     def __init__(self, core: NodeCore, factory: EngineFactory | None = None, fingerprint: bytes = b"") -> None:
         """`factory` overrides the deployment's engine; `fingerprint` is that of another solver of this process."""
@@ -35,7 +35,7 @@ class Solver:
         self._engines: dict[bytes, Engine] = {}
         """By layout, the one that was used last at the end."""
         self._told = 0
-        """For how many of the layouts that the core wants it was told of an engine."""
+        """The number of the core's layouts whose engine has been reported."""
         self._building: tuple[Layout, Generator[None, None, Engine]] | None = None
         self.fingerprint = fingerprint
         """The digest of the fixed small run, empty before the first engine is built."""
@@ -48,7 +48,7 @@ class Solver:
             continue
 
     def build_some(self) -> bool:
-        """Do one step of building what is wanted; False when there is nothing to build."""
+        """Do one step of building a needed engine; False when there is nothing to build."""
         if self._building is None:
             wanted = self._core.layouts_wanted
             if self._told == len(wanted):
@@ -79,7 +79,7 @@ class Solver:
         return (yield from build_in_steps(deployment, layout))
 
     def _take(self, layout: Layout, engine: Engine) -> None:
-        """Keep a new engine and tell the core."""
+        """Keep a new engine and report it to the core."""
         self._engines[layout.digest] = engine
         if not self.fingerprint:
             self.fingerprint = engine_fingerprint(engine, self._core.stepper(layout))

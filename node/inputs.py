@@ -1,4 +1,4 @@
-"""What a node has been told for its ticks: orders and deliveries, each by tick.
+"""The inputs of a node's ticks: orders and deliveries, each by tick, and messages of epochs to come.
 
 Both may be about several ticks at once. Deliveries are final.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol import channels
+from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries, Epoch, Order
 from foosim.world.edits import Edit, check_edits
@@ -23,7 +24,7 @@ class Inputs:
     def begin(self, epoch: Epoch) -> None:
         """A new epoch issues orders again. Deliveries stay true.
 
-        A node that was away for long has some of ticks that nobody asks for any more.
+        A node that was away for long has some of ticks that are not requested any more.
         """
         self._orders.clear()
         oldest = epoch.tick - limits.KEPT_TICKS
@@ -60,17 +61,43 @@ class Inputs:
         return self._deliveries.get(tick)
 
     def missing(self, tick: int) -> list[channels.Channel]:
-        """Return what has not come of a tick's inputs."""
+        """Return the missing inputs of a tick."""
         missing = [] if tick in self._orders else [channels.ORDER]
         return missing if tick in self._deliveries else [*missing, channels.DELIVERIES]
 
     def forget(self, tick: int) -> None:
-        """Nobody computes this tick again."""
+        """Drop the inputs of a tick that is not computed again."""
         self._orders.pop(tick, None)
         self._deliveries.pop(tick, None)
 
 
 def check_near(tick: int, own_tick: int) -> None:
-    """Refuse what is for a tick so far off that nobody can have reached it."""
+    """Raise `Malformed` for a tick that no process can have reached."""
     if tick > own_tick + limits.KEPT_TICKS:
         raise Malformed(f"tick {tick}, this node is at {own_tick}")
+
+
+class PendingEpochMessages:
+    """Messages of an epoch that this node has not entered, in order of arrival: (channel, name in its key).
+
+    Each message is kept once, since it may be requested and published many times. When there are too many, because the
+    other nodes continue without this one, the oldest is dropped.
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[bytes, tuple[Channel, str]] = {}
+
+    def __len__(self) -> int:
+        return len(self._messages)
+
+    def add(self, channel: Channel, name: str, payload: bytes) -> None:
+        """Keep a message."""
+        if len(self._messages) >= limits.HELD_MESSAGES_MAX:
+            self._messages.pop(next(iter(self._messages)))
+        self._messages[payload] = channel, name
+
+    def take(self) -> list[tuple[Channel, str, bytes]]:
+        """Return and remove all messages."""
+        taken = [(channel, name, payload) for payload, (channel, name) in self._messages.items()]
+        self._messages.clear()
+        return taken

@@ -16,7 +16,7 @@ from foosim.common.names import is_name
 from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
 from foosim.protocol import channels, identity
-from foosim.protocol.actions import Say
+from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
@@ -72,7 +72,7 @@ class NodeProcess:
         return self._shell.stopped or self.core.ended is not None or bool(self.core.member.refusal)
 
     def _turn(self, now_ns: int) -> None:
-        """Compute ticks as far as the inputs allow; what a tick says first is said before it is solved."""
+        """Compute ticks as far as the inputs allow; a tick's first messages are published before it is solved."""
         core = self.core
         core.busy = self._loop.busy
         self._shell.check(now_ns)
@@ -80,7 +80,7 @@ class NodeProcess:
             self._is_present = True
             self._shell.wire.declare_alive()
         if self._orphan.is_over(core.deployment, now_ns) and not self._is_over():
-            core.actions.append(Say("error", "lost the supervisor, and it has not come back"))
+            core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
         core.advance(now_ns)
         while core.work is not None:
@@ -100,12 +100,12 @@ class NodeProcess:
         if name != SUPERVISOR or self.core.ended is not None:
             return
         if not is_alive:
-            self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
+            self.core.actions.append(Log("warning", "lost the supervisor: holds until it is back"))
         self._orphan.hear(is_alive, time.monotonic_ns())
 
 
 def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None) -> int:
-    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
+    """Run a node until its run ends; return the exit code. Raises Refused when no router answers.
 
     `pki` is the folder with its certificate.
     """

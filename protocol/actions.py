@@ -28,11 +28,11 @@ class Journal:
 
 
 @dataclass(frozen=True)
-class Say:
+class Log:
     """Write a line to the log; `level` is info, warning or error."""
 
     level: str
     text: str
 
 
-Action = Publish | Journal | Say
+Action = Publish | Journal | Log

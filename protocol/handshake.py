@@ -15,7 +15,7 @@ from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, Epoch, Fetch, Heartbeat, Hello, Piece, Ready, Recall, Refusal
@@ -132,7 +132,7 @@ class Member:
             return False
         if (build.run, build.deployment) != (known.run, known.deployment):
             self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {known.run}"
-            self._actions.append(Say("error", self.refusal))
+            self._actions.append(Log("error", self.refusal))
             return False
         self._recalled_by = ""
         self.layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in build.added])
@@ -144,7 +144,7 @@ class Member:
         """Send a hello to a supervisor that does not know this process, unless it is the known one."""
         if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
             return False
-        self._actions.append(Say("warning", "recalled by a restarted supervisor"))
+        self._actions.append(Log("warning", "recalled by a restarted supervisor"))
         self._recalled_by = recall.boot
         self._entered = False
         self.deadline_ns = 0
@@ -155,7 +155,7 @@ class Member:
         if refusal.boot != self.boot:
             return False
         self.refusal = refusal.reason
-        self._actions.append(Say("error", f"refused by the supervisor: {refusal.reason}"))
+        self._actions.append(Log("error", f"refused by the supervisor: {refusal.reason}"))
         return True
 
     def check_epoch(self, epoch: Epoch) -> None:

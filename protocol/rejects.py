@@ -16,7 +16,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed, Refused, show
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Say
+from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 
 TOLD_EACH: Final = 3
@@ -50,7 +50,7 @@ class Quarantined(Malformed):
 class Refusals:
     """Decodes messages, and counts refusals."""
 
-    def __init__(self, say: Callable[[Say], object], deployment: Callable[[], Deployment | None]) -> None:
+    def __init__(self, say: Callable[[Log], object], deployment: Callable[[], Deployment | None]) -> None:
         """`deployment` returns the deployment, which declares names; without one, every name counts as declared."""
         self.counts: dict[tuple[str, str], int] = {}
         """Refusals by channel and sender."""
@@ -79,7 +79,7 @@ class Refusals:
             self._told += 1
             first = payload[:BYTES_TOLD].hex()
             what = f"{error} ({len(payload)} bytes{': ' if first else ''}{first})"
-            self._say(Say("warning", f"refused from {show_name(name)} on {channel.name}: {what}"))
+            self._say(Log("warning", f"refused from {show_name(name)} on {channel.name}: {what}"))
         self._watch(name, now_ns)
 
     def _watch(self, name: str, now_ns: int) -> None:
@@ -102,7 +102,7 @@ class Refusals:
             much += f": it is in quarantine for {QUARANTINE_NS // 10**9} s"
         if not sender.is_named:
             sender.is_named = True
-            self._say(Say("error", much))
+            self._say(Log("error", much))
 
     def by_sender(self) -> dict[str, int]:
         """Return the counts by `channel sender`, for display."""

@@ -158,7 +158,7 @@ def _open_capture(
     metadata = {"run": run.run, "pace": str(run.pace), "fingerprint": library_fingerprint().hex()}
     metadata |= origin_metadata(run.origin)
     writer = CaptureWriter(path, deployment, name, text, metadata)
-    on_closing, on_epoch, on_say = settings.on_closing, settings.on_epoch, settings.on_say
+    on_closing, on_epoch, on_log = settings.on_closing, settings.on_epoch, settings.on_log
     tick = 0
 
     def keep(closing: Closing) -> None:
@@ -176,8 +176,8 @@ def _open_capture(
 
     def log(process: str, level: str, line: str) -> None:
         writer.log(level, f"{process}: {line}", tick)
-        if on_say is not None:
-            on_say(process, level, line)
+        if on_log is not None:
+            on_log(process, level, line)
 
-    settings.on_closing, settings.on_epoch, settings.on_say = keep, begin, log
+    settings.on_closing, settings.on_epoch, settings.on_log = keep, begin, log
     return writer

@@ -99,5 +99,5 @@ class Settings:
     on_epoch: Callable[[Epoch], None] | None = None
     closing: Callable[[HubCore, int], bool] = lambda hub, passed_ns: True
     """State of the vHub's capture, including `recording`, this long after the run's end."""
-    on_say: Callable[[str, str, str], None] | None = None
+    on_log: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

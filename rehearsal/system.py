@@ -21,7 +21,7 @@ from foosim.client.player import PlayerLoop
 from foosim.common import limits
 from foosim.node.engines_pool import Solver
 from foosim.protocol import channels
-from foosim.protocol.actions import Journal, Publish, Say
+from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.rehearsal.bus import Bus, Message, Traced
@@ -349,8 +349,8 @@ class System:
             self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)
-        elif isinstance(action, Say) and settings.on_say is not None:
-            settings.on_say(process.name, action.level, action.text)
+        elif isinstance(action, Log) and settings.on_log is not None:
+            settings.on_log(process.name, action.level, action.text)
 
     def _trace(  # what a Traced has
         self, now_ns: int, process: Process, what: str, channel: str, payload: bytes, name: str = ""

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from foosim.protocol.actions import Journal, Publish, Say
+from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.runtime.journal import JournalError
 from foosim.runtime.progress import EVERY_NS, ProgressFile
@@ -133,7 +133,7 @@ class Loop:
         """The presence of a process has begun or ended."""
         self.notify = Notify({})
         """Notifies a service manager that the loop advances; none by default."""
-        self.on_say: Callable[[Say], None] = lambda say: None
+        self.on_log: Callable[[Log], None] = lambda say: None
         self.on_unwritten: Callable[[JournalError], None] | None = None
         """Called once when a record could not be written; later decisions are in no journal."""
         self.holds_back: Callable[[Publish], bool] | None = None
@@ -220,9 +220,9 @@ class Loop:
                     self._wires[action.channel.plane].put(action.channel, action.name, action.payload)
             elif kind is Journal:
                 self._append(action.record)
-            elif kind is Say:
+            elif kind is Log:
                 self._log.log(_LEVELS[action.level], action.text)
-                self.on_say(action)
+                self.on_log(action)
             else:
                 assert self.other is not None, action
                 self.other(action)

@@ -10,7 +10,7 @@ from typing import Final
 
 from foosim.common import limits
 from foosim.common.addresses import parse_address
-from foosim.protocol.actions import Say
+from foosim.protocol.actions import Log
 from foosim.runtime.loop import Core, Loop, Wire
 from foosim.runtime.process import Stop, start_log
 from foosim.runtime.systemd import Notify
@@ -72,7 +72,7 @@ class ProcessShell:
         if self._admission is not None:
             self._admission.check(now_ns)
         if self._exposure is not None and (reminder := self._exposure.due(now_ns)):
-            self._core.actions.append(Say("warning", reminder))
+            self._core.actions.append(Log("warning", reminder))
 
     def stop(self) -> None:
         """Have the loop look whether it is over; a signal handler may call this."""

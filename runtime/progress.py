@@ -39,7 +39,7 @@ class ProgressFile:
             raise Failed(f"--progress-file {path}: cannot be written, {error.strerror}") from None
 
     def write(self, now_ns: int) -> None:
-        """Say that the loop went round at `now_ns`. Raises OSError."""
+        """Log that the loop went round at `now_ns`. Raises OSError."""
         os.pwrite(self._file, b"%020d\n" % now_ns, 0)
 
 

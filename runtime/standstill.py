@@ -11,7 +11,7 @@ from typing import Final
 
 STOOD_NS: Final = 20_000_000
 """A loop that looks again later than it meant to by no more than this has not stood still."""
-TOLD_NS: Final = 1_000_000_000
+REPORTED_NS: Final = 1_000_000_000
 """One that stood still for so long says so. Its connections may have closed, which is no fault of the others either:
 `session_settings.LEASE_MS`."""
 
@@ -32,6 +32,6 @@ class Standstill:
         return late_ns if late_ns > STOOD_NS else 0
 
 
-def told(stood_ns: int) -> str:
+def standstill_text(stood_ns: int) -> str:
     """Return what people are told of it; empty when it is too short for that."""
-    return f"stood still for {stood_ns / 1e9:.1f} s: no other process is blamed" if stood_ns >= TOLD_NS else ""
+    return f"stood still for {stood_ns / 1e9:.1f} s: no other process is blamed" if stood_ns >= REPORTED_NS else ""

@@ -35,7 +35,7 @@ class Notify:
         self._is_ready = self._is_stopping = False
 
     def ready(self, now_ns: int) -> None:
-        """Say that the process takes part: from now on the watchdog waits for its loop."""
+        """Log that the process takes part: from now on the watchdog waits for its loop."""
         self._is_ready = True
         self._say("READY=1")
         self.goes_on(now_ns)
@@ -47,7 +47,7 @@ class Notify:
             self._say("WATCHDOG=1")
 
     def stopping(self) -> None:
-        """Say that the process ends, which may take a while."""
+        """Log that the process ends, which may take a while."""
         if not self._is_stopping:
             self._is_stopping = True
             self._say(f"STOPPING=1\nWATCHDOG_USEC={CLOSING_US}" if self._every_ns else "STOPPING=1")

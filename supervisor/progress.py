@@ -14,7 +14,7 @@ from typing import Any, Final
 from foosim.common import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
-from foosim.runtime.standstill import TOLD_NS, told
+from foosim.runtime.standstill import REPORTED_NS, standstill_text
 from foosim.supervisor.roster import Process
 from foosim.supervisor.state import RunState
 
@@ -68,9 +68,9 @@ class ProgressMonitor:
             process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
         self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
-        if stood_ns >= TOLD_NS:
+        if stood_ns >= REPORTED_NS:
             self._doubt_ns = now_ns + DOUBT_NS
-            self._state.log("warning", told(stood_ns))
+            self._state.log("warning", standstill_text(stood_ns))
 
     def doubts(self, process: Process, now_ns: int) -> bool:
         """Whether a closed connection may be due to the supervisor's own standstill: then its process is lost only when

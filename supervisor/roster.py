@@ -14,7 +14,7 @@ from foosim.common.errors import show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Heartbeat, Hello, Ready, Refusal
@@ -165,4 +165,4 @@ class Roster:
 def refuse(role: str, name: str, boot: str, reason: str) -> list[Action]:
     """Return the actions that refuse a process, with the reason."""
     refusal = encode(Refusal(name, boot, reason))
-    return [Say("warning", f"{role} {name} refused: {reason}"), Publish(channels.REFUSAL, name, refusal)]
+    return [Log("warning", f"{role} {name} refused: {reason}"), Publish(channels.REFUSAL, name, refusal)]

@@ -16,7 +16,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.units import parse_pace
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.actions import Action, Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
@@ -208,7 +208,7 @@ class RunState:
 
     def log(self, level: str, text: str) -> None:
         """Log a line for people."""
-        self.actions.append(Say(level, text))
+        self.actions.append(Log(level, text))
 
     def publish(self, channel: Channel, name: str, message: Any) -> None:
         """Publish a message on a channel; `name` fills the key."""

@@ -17,7 +17,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.actions import Action, Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, ClientHello, Done, Failure, Go, Join, Tempo, Up
-from foosim.runtime.standstill import TOLD_NS
+from foosim.runtime.standstill import REPORTED_NS
 from foosim.vhub.absences import Absences
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, received
@@ -320,7 +320,7 @@ class Clients:
 
         Where connections may have closed by it, clients have their whole time from now on (`standstill`).
         """
-        self._sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._sessions.rest(limits.COUNTER_MAX if stood_ns >= REPORTED_NS else stood_ns, now_ns)
         self._looked_ns = now_ns
 
     def wake(self, now_ns: int, *, holds: bool) -> None:

@@ -22,7 +22,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed, Refused
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.actions import Action, Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.handshake import Member
@@ -54,7 +54,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
-from foosim.runtime.standstill import TOLD_NS, told
+from foosim.runtime.standstill import REPORTED_NS, standstill_text
 from foosim.runtime.supervisor_timeout import Orphan
 from foosim.vhub.clients import Clients, lost
 from foosim.vhub.network.packet import Flight, received
@@ -255,8 +255,8 @@ class HubCore:
     def rest(self, stood_ns: int, now_ns: int) -> None:
         """The vHub's own loop stood still for so long: that counts neither against clients nor the supervisor."""
         self.orphan.rest(stood_ns, now_ns)
-        if stood_ns >= TOLD_NS:
-            self.actions.append(Say("warning", told(stood_ns)))
+        if stood_ns >= REPORTED_NS:
+            self.actions.append(Log("warning", standstill_text(stood_ns)))
         self.clients.rest(stood_ns, now_ns)
 
     def client_gone(self, name: str, now_ns: int) -> None:
@@ -630,7 +630,7 @@ class HubCore:
         """Ask the supervisor to end the run; the first reason counts."""
         if not self.lost:
             self.lost = reason
-            self.actions.append(Say("error", reason))
+            self.actions.append(Log("error", reason))
             self.send_heartbeat()
 
     def send_heartbeat(self) -> None:

@@ -26,7 +26,7 @@ from foosim.common.errors import BadValue, DeploymentError, Refused
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.access import access_to
-from foosim.protocol.actions import Publish, Say
+from foosim.protocol.actions import Log, Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
@@ -120,7 +120,7 @@ class HubProcess:
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
         self._loop.on_alive = self._on_alive
-        self._loop.on_say = self._on_say
+        self._loop.on_log = self._on_log
         self._loop.on_unwritten = self._on_unwritten
         self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
         self._shell.watch_router(SUPERVISOR, simulation.locator)
@@ -142,7 +142,7 @@ class HubProcess:
             self._close()
         else:
             if self._is_abandoned:
-                self.core.actions.append(Say("error", self._why_abandoned))
+                self.core.actions.append(Log("error", self._why_abandoned))
                 self._loop.perform()
             self._leave()
         if self.core.member.refusal:
@@ -216,15 +216,15 @@ class HubProcess:
                 self._on_unwritten(error)
 
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
-        """Say what gets little, and end the run while what is left to be written still fits."""
+        """Log what gets little, and end the run while what is left to be written still fits."""
         core = self.core
-        core.actions += [Say(level, text) for level, text in room.look(now_ns)]
+        core.actions += [Log(level, text) for level, text in room.look(now_ns)]
         core.shell.recording, core.shell.disk_progress = room.recording, room.disk_progress(now_ns)
         if room.ends is not None and not core.lost and not core.finished:
             core.lose(*room.ends)
 
     def _wait_for_capture(self) -> None:
-        """Say that the vHub lives, and what it waits for, while the capture's full queue holds up the loop."""
+        """Log that the vHub lives, and what it waits for, while the capture's full queue holds up the loop."""
         core = self.core
         if self._room is not None:
             core.shell.recording = self._room.recording
@@ -345,7 +345,7 @@ class HubProcess:
         if self._capture is not None:
             self._capture.keep(action.closing if isinstance(action, RecordClosing) else action.epoch)
 
-    def _on_say(self, say: Say) -> None:
+    def _on_log(self, say: Log) -> None:
         if self._capture is not None and not self._is_closing:
             self._capture.log(say.level, say.text, self.core.statistics().closed + 1)
 
@@ -362,7 +362,7 @@ class HubProcess:
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
-            self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
+            self.core.actions.append(Log("warning", "lost the supervisor: holds until it is back"))
             self.core.orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:

@@ -1,1 +1,1 @@
-"""MCAP as captures use it: what stands in a file, writing, checks, and repair of a file that was left unfinished."""
+"""MCAP as captures use it: the format, the writer, checks, and the scan of an unfinished file."""

@@ -1,4 +1,4 @@
-"""Checksums and digests in an MCAP file: what tells a reader that a byte is not what was written.
+"""Checksums and digests in an MCAP file, by which a reader detects damage.
 
 A chunk and an attachment have a checksum of their own, metadata the entry `digest`. Behind the attachments stands the
 metadata `foosim.digests`: a digest of each attachment, and the checksum of all bytes before. The end has the checksum
@@ -36,7 +36,7 @@ _POLYNOMIAL: Final = 0xEDB88320
 
 
 class CaptureError(Refused):
-    """A capture cannot be written or read: the file, the place in it, and what is wrong."""
+    """A capture cannot be written or read: the file, the place in it, and the defect."""
 
 
 def digest_of(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""The checksum of what a file has already that a writer goes on with."""
+"""The checksum of the existing part of a file that a writer continues."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PIECE_BYTES: Final = 1 << 20
 
 
 class EarlierCrc:
-    """The CRC-32 of a file's first bytes, read by a thread of its own: a run that goes on does not wait for it."""
+    """The CRC-32 of a file's first bytes, read by a thread of its own: the run does not wait for it."""
 
     def __init__(self, file: int, size: int) -> None:
         self.size = size

@@ -81,7 +81,7 @@ class RuleTexts:
                 yield "clogged: packets wait", hold
 
     def _when(self, event: Settings | Cut | Hold, who: Mapping[int, str]) -> str:
-        """Say since when something holds, by whom, until when."""
+        """Log since when something holds, by whom, until when."""
         tick_ns = self._deployment.tick_ns
         tick = event.start_ns // tick_ns
         is_asked = any(asked == tick for asked, _ in self._asked)

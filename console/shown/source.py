@@ -103,13 +103,13 @@ class Feed(Protocol):
     """Receives a source's messages. Called in the event loop's thread."""
 
     def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        """Say the scene, as `scene_json.scene_content` makes it, and what is new about the source."""
+        """Log the scene, as `scene_json.scene_content` makes it, and what is new about the source."""
 
     def show(self, moment: Moment) -> None:
         """Publish a moment; `poses` has as many rows as the scene has links."""
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        """Say a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
+        """Log a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
         `presence`, `note`; its number as a source is added to it."""
 
 

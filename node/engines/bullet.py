@@ -48,7 +48,7 @@ _spare_clients: list[int] = []
 
 
 def connect_spares(count: int) -> None:
-    """Have this many clients at hand, so that an engine can be built while ticks go on."""
+    """Connect this many spare clients, so that an engine can be built while ticks continue."""
     while len(_spare_clients) < count:
         _spare_clients.append(_connect())
 
@@ -253,7 +253,7 @@ class BulletEngine:
         return made
 
     def _make_dynamics(self, body: int, link: int, mass: float, inertia: Vector) -> None:
-        """Set mass, inertia and what slows a body down, and look whether Bullet took it."""
+        """Set mass, inertia and damping of a body, and check that Bullet has accepted them."""
         client = self._client
         # Bullet's own inertia is that of the shapes' bounding box. It must be set together with the mass (alone, it
         # makes the mass 0) and without anything else (together with a damping it is dropped silently).
@@ -337,7 +337,7 @@ class BulletEngine:
         p.performCollisionDetection(physicsClientId=self._client)
 
     def _wake_fetched(self) -> None:
-        """Step once: Bullet notices at the end of a step that a body woke, and lets it stand still until then."""
+        """Step once: Bullet wakes a body at the end of a step, and does not move it before."""
         p.stepSimulation(physicsClientId=self._client)
 
     def _change_rods(self, wanted: set[str]) -> None:

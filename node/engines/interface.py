@@ -1,4 +1,4 @@
-"""What a node asks of a physics engine: load, command, step, read.
+"""The interface of a physics engine to a node: load, command, step, read.
 
 An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
 complete load of what is solved, from the frame. What is not loaded is parked, out of everybody's way. A change of

@@ -25,7 +25,7 @@ from foosim.world.layout import Layout
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
-    "Held._messages": limits.HELD_MESSAGES_MAX,
+    "PendingEpochMessages._messages": limits.HELD_MESSAGES_MAX,
     "RunState.answers": ANSWERS_KEPT,
     "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in the result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace

@@ -17,7 +17,7 @@ from foosim.common import limits
 from foosim.common.errors import UnknownName
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Publish, Say
+from foosim.protocol.actions import Log, Publish
 from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
@@ -456,5 +456,5 @@ def test_only_the_first_few_refused_messages_are_worth_a_line() -> None:
     core = in_run()
     for _ in range(10):
         core.receive(channels.DOWN, "ear", b"?", 0)
-    assert len([action for action in core.actions if isinstance(action, Say)]) == 3
+    assert len([action for action in core.actions if isinstance(action, Log)]) == 3
     assert core.statistics().malformed == 10

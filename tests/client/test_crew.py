@@ -19,7 +19,7 @@ from foosim.client.process_group import Crew
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Publish, Say
+from foosim.protocol.actions import Log, Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import (
     ClientHello,
@@ -68,9 +68,9 @@ def say(crew: Crew, channel: channels.Channel, name: str, message: Any) -> list[
 def heard(crew: Crew) -> list[Any]:
     crew.step(0)
     found = [
-        action.text if isinstance(action, Say) else (action.name, decode_any(action.channel.message, action.payload))
+        action.text if isinstance(action, Log) else (action.name, decode_any(action.channel.message, action.payload))
         for action in crew.actions
-        if isinstance(action, Publish | Say)
+        if isinstance(action, Publish | Log)
     ]
     crew.actions.clear()
     return found
@@ -176,7 +176,7 @@ def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end() -> 
         crew.wake(now_ns)
         over.append(crew.is_over)
     assert over == [False, True] and crew.leave() == FAILED
-    assert [action.text for action in crew.actions if isinstance(action, Say)] == [
+    assert [action.text for action in crew.actions if isinstance(action, Log)] == [
         f"{name}: lost the vHub" for name in (RED, BLUE)
     ]
 

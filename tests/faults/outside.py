@@ -56,7 +56,7 @@ def client_floods(trial: Trial) -> Figures:
 
 
 def lag_ms(cluster: Cluster, client: Client, packets: int) -> float:
-    """Say so many packets a hundred times a second; return the median lag of the ticks that are seen meanwhile."""
+    """Log so many packets a hundred times a second; return the median lag of the ticks that are seen meanwhile."""
     seen = []
     begun_s = time.monotonic()
     for turn in range(1, TURNS + 1):

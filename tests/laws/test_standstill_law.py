@@ -86,7 +86,7 @@ def lose_clients(system: System) -> None:
 def test_a_supervisor_whose_machine_slept_blames_nobody(pace: Pace) -> None:
     """It wakes, and has heard nobody for ten seconds."""
     said: list[str] = []
-    run = fly(lambda system: system.set_forward(SUPERVISOR, 10_000 * MS), pace, on_say=lambda *say: said.append(say[2]))
+    run = fly(lambda system: system.set_forward(SUPERVISOR, 10_000 * MS), pace, on_log=lambda *say: said.append(say[2]))
     assert_nobody_was_lost(run)
     assert [line for line in said if "blamed" in line] == ["stood still for 10.0 s: no other process is blamed"]
 

@@ -12,7 +12,7 @@ from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Say
+from foosim.protocol.actions import Log
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Want
 from foosim.protocol.rejects import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Quarantined, Refusals
@@ -25,7 +25,7 @@ class Guard:
     """Refusals, and what it says. `knock` brings something and returns whether it was let in, refused or shut out."""
 
     def __init__(self, deployment: Deployment | None = DEPLOYMENT) -> None:
-        self.said: list[Say] = []
+        self.said: list[Log] = []
         self.refusals = Refusals(self.said.append, lambda: deployment)
 
     def knock(self, name: str, now_ns: int, payload: bytes = b"\xc1") -> str:

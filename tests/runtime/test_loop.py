@@ -8,7 +8,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.protocol import channels
-from foosim.protocol.actions import Journal, Publish, Say
+from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.runtime.journal import JournalError
 from foosim.runtime.loop import Loop, channel_of
@@ -114,15 +114,15 @@ def test_it_ends_when_it_is_told_to_while_it_sleeps() -> None:
 def test_what_is_said_is_logged_and_what_only_one_process_has_is_its_own(caplog: pytest.LogCaptureFixture) -> None:
     core, inbox = Script(), Inbox(10)
     loop, recorder = make(core, inbox)
-    said: list[Say] = []
+    said: list[Log] = []
     others: list[object] = []
-    loop.on_say = said.append
+    loop.on_log = said.append
     loop.other = others.append
-    core.actions = [Say("warning", "late"), "something else"]
+    core.actions = [Log("warning", "late"), "something else"]
     with caplog.at_level(logging.INFO, "test_loop"):
         loop.perform()
     assert [(record.levelname, record.message) for record in caplog.records] == [("WARNING", "late")]
-    assert said == [Say("warning", "late")]
+    assert said == [Log("warning", "late")]
     assert others == ["something else"]
     assert recorder.did == []
 

@@ -10,7 +10,7 @@ import pytest
 
 from foosim.runtime import loop as loops
 from foosim.runtime.loop import Loop
-from foosim.runtime.standstill import STOOD_NS, Standstill, told
+from foosim.runtime.standstill import STOOD_NS, Standstill, standstill_text
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS, Orphan
 from foosim.runtime.transport.inbox import Inbox
 
@@ -40,7 +40,10 @@ def test_a_process_that_stood_still_waits_for_its_supervisor_as_long_as_it_was_a
 
 
 def test_only_a_long_standstill_is_worth_a_line() -> None:
-    assert told(999 * MS) == "" and told(3_140 * MS) == "stood still for 3.1 s: no other process is blamed"
+    assert (
+        standstill_text(999 * MS) == ""
+        and standstill_text(3_140 * MS) == "stood still for 3.1 s: no other process is blamed"
+    )
 
 
 def test_the_loop_tells_of_it_before_anything_else(monkeypatch: pytest.MonkeyPatch) -> None:

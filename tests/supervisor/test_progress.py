@@ -42,7 +42,7 @@ class Seen:
         self.nodes, self.ticks, self.pace, self.sets = nodes, ticks, pace, sets
         self.lines: list[str] = []
         self.late: dict[int, str] = {}
-        self.settings = Settings(on_say=self._say, on_commit=lambda frame: self._look(frame.tick))
+        self.settings = Settings(on_log=self._say, on_commit=lambda frame: self._look(frame.tick))
         self.prepare: Callable[[System], None] = lambda system: None
 
     def _say(self, process: str, level: str, text: str) -> None:
@@ -258,7 +258,7 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
             system.processes["player-red"].busy_until_ns = 10 * IDLE_NS_MAX
 
         system.at_tick(60, stop)
-        say = system.settings.on_say
+        say = system.settings.on_log
 
         def listen(process: str, level: str, text: str) -> None:
             assert say is not None
@@ -266,7 +266,7 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
             if process == VHUB and "has not answered" in text:
                 waited.append(system.supervisor.progress.waiting_for())
 
-        system.settings.on_say = listen
+        system.settings.on_log = listen
 
     seen.prepare = prepare
     reason, tick = ended(seen.go())
@@ -368,7 +368,7 @@ def test_who_is_started_by_hand_is_waited_for_without_end() -> None:
 def test_nobody_is_overdue_while_the_run_is_paused() -> None:
     text = with_nodes(TEXT, TABLE.name, 2, ["engine=pure"])
     lines: list[str] = []
-    settings = Settings(on_say=lambda process, level, said: lines.append(said))
+    settings = Settings(on_log=lambda process, level, said: lines.append(said))
     system = System(RunSettings("run", TABLE.name, text, REALTIME, TICKS), settings)
     system.at_tick(30, lambda: system.request("pause") and None)
     request = encode(Request(OPERATOR, "resume", "resume", b"{}"))

@@ -34,7 +34,7 @@ class Run:
         text = with_nodes(TABLE.read_text(), TABLE.name, len(NODES), [*PATIENT, *sets])
         self.seen = Rehearsed({})
         self.lines: list[str] = []
-        settings = Settings(keeps_journals=True, on_say=lambda process, level, line: self.lines.append(line))
+        settings = Settings(keeps_journals=True, on_log=lambda process, level, line: self.lines.append(line))
         settings.on_commit = lambda frame: self.seen.digests.append(frame.digest)
         self.system = System(RunSettings("run", TABLE.name, text, Pace("fast"), TICKS), settings)
 

@@ -41,7 +41,7 @@ class Hall:
         return fates
 
     def say(self, numbers: range, channel: str, destination: str = "") -> list[tuple[str, int, str]]:
-        """Say these packets at one tick; return (receiver, sequence, cause) of each that was offered."""
+        """Log these packets at one tick; return (receiver, sequence, cause) of each that was offered."""
         fates = self.close(*[Sent(number, destination, channel, 0, b"here") for number in numbers])
         return sorted((f.destination, f.sequence, f.cause) for f in [*fates, *self.close()])
 

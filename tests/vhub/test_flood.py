@@ -51,7 +51,7 @@ class Flood(Driver):
                     self._say(name, self._packets // 4, ("red.goal", "quiet")[part % 2])
 
     def _say(self, name: str, count: int, destination: str) -> None:
-        """Say as many packets as fit into a message at a time."""
+        """Log as many packets as fit into a message at a time."""
         at_once = limits.RADIO_MESSAGE_BYTES_MAX // (limits.PACKET_HEAD_BYTES_MAX + len(self._payload))
         while count > 0:
             numbers = range(self.sent[name] + 1, self.sent[name] + 1 + min(count, at_once))

@@ -12,7 +12,7 @@ import pytest
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
@@ -81,7 +81,7 @@ class Hub:
         return [decode_any(a.channel.message, a.payload) for a in actions if a.channel in kinds]
 
     def lines(self) -> list[str]:
-        return [action.text for action in self.core.actions if isinstance(action, Say)]
+        return [action.text for action in self.core.actions if isinstance(action, Log)]
 
     def enter(self, name: str, period: int | None = None, boot: str = "one", wanted: Sequence[str] = ()) -> None:
         self.say(channels.CLIENT_HELLO, name, ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0))

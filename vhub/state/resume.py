@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
-from foosim.protocol.actions import Action, Say
+from foosim.protocol.actions import Action, Log
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.network.packet import received
@@ -74,7 +74,7 @@ class Past:
         """Return what is to be done before anything else: complete the capture, log the position."""
         actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
         if self.epoch is not None:
-            actions.append(Say("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
+            actions.append(Log("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
         return actions
 
 
