@@ -1,7 +1,7 @@
 """Writes the generated parts of the docs, and the schema of deployments: `python docs/generate.py`.
 
-A generated part stands between the comments `<!-- generated: NAME -->` and `<!-- end -->` of a page in this folder. It
-says what the code says: the deployment's schema, the commands' options, the table of channels, the rows of a capture.
+A generated part is between the comments `<!-- generated: NAME -->` and `<!-- end -->` of a page in this folder. Its
+sources are the deployment's schema, the commands' options, the table of channels, and the rows of a capture.
 tests/test_readme.py fails when a page and the code differ.
 """
 
@@ -48,103 +48,103 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-doctor": doctor_app,
 }
 DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
-    "heartbeat": ("supervisor", "a word of a node or the vHub; one that is silent for longer is lost"),
-    "tick_named": ("supervisor", "the parts or deliveries of a tick; the log names who is waited for"),
-    "tick_lost": ("supervisor", "the same; who is waited for is lost"),
+    "heartbeat": ("supervisor", "a message of a node or the vHub; a process that is silent for longer is lost"),
+    "tick_named": ("supervisor", "the parts or deliveries of a tick; then the log names the missing process"),
+    "tick_lost": ("supervisor", "the same; then the missing process is lost"),
     "lockstep_fast": ("vHub", "a lockstep client's answer, in `fast`; then the client is lost"),
     "lockstep_realtime": (
         "vHub",
-        "the same at any other pace; it is longer than a connection takes to close, so that a cut is no silence",
+        "the same at any other pace; it is longer than a cut connection takes to close",
     ),
     "start": (
         "supervisor, `up`",
-        "processes and players of a run that is started or resumed, until its first commit nothing else counts; "
-        "before that, the import of players' modules",
+        "the processes and players of a started or resumed run; until its first commit no other deadline counts. "
+        "Before that, the import of players' modules",
     ),
-    "orphan": ("nodes, vHub", "a supervisor that is gone; then they end, and the run can be resumed"),
-    "vhub_back": ("supervisor, clients", "a vHub that is gone; then the run ends, or the client does"),
+    "orphan": ("nodes, vHub", "the return of a lost supervisor; then they end, and the run can be resumed"),
+    "vhub_back": ("supervisor, clients", "the return of a lost vHub; then the run, or the client, ends"),
     "client_back": (
         "vHub",
-        "a client whose connection has closed; then it is lost, unless the time for its answer ends later",
+        "the return of a client after its connection has closed; then it is lost, unless its time to answer ends later",
     ),
     "close": (
         "supervisor",
-        "progress of the vHub in closing its capture; then the capture is cut off; while the run goes on, a vHub that "
-        "waits for the disk of its capture; then it is lost",
+        "progress of the vHub in closing its capture; then the capture is cut off. During the run, a vHub that waits "
+        "for the disk of its capture; then it is lost",
     ),
 }
-"""Who waits how long for what: the deadlines of a deployment."""
+"""The deadlines of a deployment: the waiting process, and the event that it waits for."""
 CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
-    ("runtime.transport.settings", "LEASE_MS"): ("every process", "a word on a connection; then it is closed"),
+    ("runtime.transport.settings", "LEASE_MS"): ("every process", "a message on a connection; then it is closed"),
     ("runtime.transport.settings", "BLOCK_US"): (
         "every process",
-        "a reader that takes nothing; its connection is closed",
+        "a stuck reader; then its connection is closed",
     ),
     ("runtime.transport.inbox", "ALARM_S"): (
         "every process",
-        "its own time-keeping thread to end; then it ends without it",
+        "the end of its own alarm thread; then it ends without it",
     ),
-    ("runtime.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
+    ("runtime.standstill", "STOOD_NS"): ("every process", "its own loop; a longer pause is a standstill"),
     ("runtime.standstill", "REPORTED_NS"): (
         "supervisor, vHub",
-        "their own loop; one that stood still for longer says so, and takes no closed connection for a loss",
+        "their own loop; a longer standstill is logged, and a closed connection after it is no loss",
     ),
     ("runtime.supervisor_timeout", "UNKNOWN_NS"): (
         "nodes, vHub",
-        "a supervisor that went before it told the deployment",
+        "the return of a supervisor that was lost before it sent the deployment",
     ),
     ("supervisor.progress", "DOUBT_NS"): (
         "supervisor",
-        "connections that close behind a standstill of its own: their processes have `heartbeat` to be heard again",
+        "connections that close after a standstill of its own: their processes have `heartbeat` for their next message",
     ),
     ("supervisor.progress", "CUT_SEEN_NS"): (
         "supervisor",
-        "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
+        "the end of the vHub's connection, before nodes are lost whose samples were sent and did not reach it",
     ),
     ("supervisor.roster", "IN_FLIGHT_NS"): ("supervisor", "the last messages of a process whose connection has closed"),
     ("supervisor.roster", "SILENT_NS"): (
         "supervisor",
-        "a sign of life; until then the hello of a successor is refused, afterwards it waits for the connection's end",
+        "a message; until then the hello of a successor is refused, afterwards it waits for the connection's end",
     ),
     ("supervisor.failover", "REJOIN_NS"): (
         "supervisor",
-        "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
+        "the nodes, after its restart, in addition to `heartbeat`; then it continues without them",
     ),
     ("launcher.liveness", "QUESTION_S"): (
         "`up`",
-        "the supervisor's answer; after five in a row that do not come it is killed, and started again",
+        "an answer of the supervisor; after five missing ones in a row it is killed and started again",
     ),
-    ("launcher.liveness", "STALLED_S"): ("`up`", "a lost process that lives to be taken back; then it is killed"),
+    ("launcher.liveness", "STALLED_S"): ("`up`", "the recovery of a lost process that lives; then it is killed"),
     ("launcher.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
-    ("launcher.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; what is longer is its own standstill"),
-    ("launcher.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, once more each time"),
-    ("launcher.restarts", "AWAY_S"): ("`up`", "the same where the machine could not be reached"),
-    ("launcher.restarts", "WINDOW_S"): ("`up`", "in which as many ends and one more give a process up"),
-    ("launcher.up", "LOST_S"): ("`up`", "the supervisor to notice that a process has ended; then the run is ended"),
-    ("launcher.up", "END_S"): ("`up`", "a supervisor that was told to end and does not answer; then all are ended"),
-    ("launcher.up", "LEAVE_S"): ("`up`", "the others to end once the supervisor has; then they are ended"),
+    ("launcher.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; a longer pause is a standstill"),
+    ("launcher.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, in this order"),
+    ("launcher.restarts", "AWAY_S"): ("`up`", "the same if the machine could not be reached"),
+    ("launcher.restarts", "WINDOW_S"): ("`up`", "in which one end more than these waits gives a process up"),
+    ("launcher.up", "LOST_S"): ("`up`", "the supervisor to detect the end of a process; then the run is ended"),
+    ("launcher.up", "END_S"): ("`up`", "the answer of a supervisor to a request to end; then all processes are ended"),
+    ("launcher.up", "LEAVE_S"): ("`up`", "the end of the other processes after the supervisor's; then they are ended"),
     ("launcher.up", "AWAY_S"): ("`up`", "the same on other machines"),
-    ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to tell its pages that the run has ended"),
-    ("runtime.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
-    ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
+    ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to report the end of the run to its pages"),
+    ("runtime.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process after SIGTERM; then it is killed"),
+    ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the end of the previous guard"),
     ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
     ("runtime.process_shell", "CONNECT_S"): (
         "vHub, nodes, players",
         "a supervisor or vHub to connect to; then they fail",
     ),
-    ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
+    ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, by default"),
     ("runtime.transport.admission", "ADMISSION_NS"): (
         "every process",
-        "with certificates, to be let in; then the log says so",
+        "with certificates, its admission; then it ends",
     ),
 }
-"""The same of what no deployment sets: constants, whose names end with their units."""
+"""The same for constants, whose names end with their units."""
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
 
 
 def commands() -> Iterator[tuple[str, Any]]:
-    """Yield every command that can be typed, with what typer knows of it: `foosim-replay verify` and the like."""
+    """Yield every command, such as `foosim-replay verify`, with its description by typer."""
     for name, app in COMMANDS.items():
         command = typer.main.get_command(app)
         subcommands = getattr(command, "commands", None)
@@ -156,7 +156,7 @@ def commands() -> Iterator[tuple[str, Any]]:
 
 
 def write_commands() -> Iterator[str]:
-    """Yield a section for each command: what it does, its arguments and options."""
+    """Yield a section for each command: description, arguments and options."""
     for name, command in commands():
         words = [_argument(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
         yield f"### `{' '.join([name, *words])}`\n\n"
@@ -202,7 +202,7 @@ def _default(value: Mapping[str, Any]) -> str:
 
 
 def _value(value: Mapping[str, Any]) -> str:  # noqa: PLR0911  # a line for each kind of schema
-    """Return what a schema accepts, in words."""
+    """Return the values that a schema accepts, in words."""
     if "$ref" in value:
         name = value["$ref"].rpartition("/")[2]
         return "anything" if name == "JsonValue" else f"see {name}"
@@ -283,10 +283,10 @@ def write_limits() -> Iterator[str]:
 
 
 def write_deadlines() -> Iterator[str]:
-    """Yield all that guards against a slow machine: the deployment's deadlines, then those that are constants."""
+    """Yield the deployment's deadlines, then those that are constants."""
     keys = deployment_schema()["$defs"]["Deadlines"]["properties"]
-    assert keys.keys() == DEADLINES.keys(), f"who waits how long for what? {sorted(keys.keys() ^ DEADLINES.keys())}"
-    yield "| deadline | time | who waits | for what, and what follows |\n|---|---|---|---|\n"
+    assert keys.keys() == DEADLINES.keys(), f"deadlines without a description: {sorted(keys.keys() ^ DEADLINES.keys())}"
+    yield "| deadline | time | process | waits for, and consequence |\n|---|---|---|---|\n"
     for key, (who, what) in DEADLINES.items():
         yield f"| `{key}` | `{keys[key]['default']}` | {who} | {what} |\n"
     for (module, name), (who, what) in CONSTANTS.items():
