@@ -1,8 +1,8 @@
-"""What the bytes of a packet mean: typed values to and from payloads, by the kind of a robot's channel.
+"""Payloads of packets: typed values to and from bytes, by the kind of a robot's channel.
 
 Numbers are little-endian float64 in SI units. `encoder` and `position` carry a rod's slide and spin, `ball` a position,
-`pose`, `odometry`, `proximity` and `battery` what a rover measures, `drive` what its wheels shall do, `echo` whatever
-was sent. To add a kind: a value type and a row in `_NUMBERS`.
+`pose`, `odometry`, `proximity` and `battery` a rover's measurements, `drive` the set-points of its wheels, `echo` any
+bytes. To add a kind: a value type and a row in `_NUMBERS`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from foosim.world.robots.rover import RAYS_MAX
 from foosim.world.spec import Robot, WorldSpec
 
 ANGLE_RAD_MAX: Final = 1000.0
-"""The greatest angle that a rod's actuator takes."""
+"""The greatest angle that a rod's actuator accepts."""
 FLOAT_MAX: Final = sys.float_info.max
 
 
@@ -40,7 +40,7 @@ class BallPosition(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Where a rod shall go: `slide` in m along world +y from its middle, `spin` in rad about +y."""
+    """The set-point of a rod: `slide` in m along world +y from its middle, `spin` in rad about +y."""
 
     slide: float
     spin: float
@@ -62,20 +62,20 @@ class WheelTravel(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """What a rover has left: `share` of its capacity, `voltage` in V."""
+    """A rover's battery: `share` of its capacity, `voltage` in V."""
 
     share: float
     voltage: float
 
 
 class Ranges(NamedTuple):
-    """What is near a rover: the free way in m from its hull for each ray, the first ahead, then around to the left."""
+    """The free space around a rover: a distance in m from its hull for each ray, the first ahead, then to the left."""
 
     ways: tuple[float, ...]
 
 
 class Drive(NamedTuple):
-    """How fast a rover's wheels shall roll, in m/s; both forwards is ahead, the right one faster is to the left."""
+    """The set-points of a rover's wheels in m/s; both positive is ahead, a faster right one turns left."""
 
     left: float
     right: float
@@ -83,24 +83,25 @@ class Drive(NamedTuple):
 
 Value = RodPosition | BallPosition | Pose | WheelTravel | Battery | Ranges | Command | Drive | bytes
 
-_NUMBERS: Final[Mapping[str, tuple[struct.Struct, Any]]] = {
-    "encoder": (struct.Struct("<2d"), RodPosition),
-    "ball": (struct.Struct("<3d"), BallPosition),
-    "pose": (struct.Struct("<3d"), Pose),
-    "odometry": (struct.Struct("<2d"), WheelTravel),
-    "battery": (struct.Struct("<2d"), Battery),
-    CHANNEL_POSITION: (struct.Struct("<2d"), Command),
-    CHANNEL_DRIVE: (struct.Struct("<2d"), Drive),
+_NUMBERS: Final[Mapping[str, Any]] = {
+    "encoder": RodPosition,
+    "ball": BallPosition,
+    "pose": Pose,
+    "odometry": WheelTravel,
+    "battery": Battery,
+    CHANNEL_POSITION: Command,
+    CHANNEL_DRIVE: Drive,
 }
+_PACKED: Final = {kind: struct.Struct(f"<{len(value._fields)}d") for kind, value in _NUMBERS.items()}
 PROXIMITY: Final = "proximity"
 KINDS: Final = (*_NUMBERS, PROXIMITY, CHANNEL_ECHO)
 COMMAND_KINDS: Final = tuple(kind for kind in _NUMBERS if kind in CHANNEL_NAMES_RESERVED)
-"""What moves a robot: channels that are no sensor's."""
+"""The kinds of commands."""
 COMMANDS: Final[Mapping[str, tuple[str, type[Command] | type[Drive]]]] = {
     "rod": (CHANNEL_POSITION, Command),
     "rover": (CHANNEL_DRIVE, Drive),
 }
-"""By model of robot: the channel of its commands, and what they are."""
+"""The channel and the type of commands, by model of robot."""
 
 
 def command_channels(robot: Robot) -> list[str]:
@@ -110,8 +111,13 @@ def command_channels(robot: Robot) -> list[str]:
 
 def value_fields(kind: str) -> tuple[str, ...]:
     """Return the names of the numbers that a kind carries; none for bytes."""
-    fields: tuple[str, ...] = _NUMBERS[kind][1]._fields if kind in _NUMBERS else ()
+    fields: tuple[str, ...] = _NUMBERS[kind]._fields if kind in _NUMBERS else ()
     return fields
+
+
+def payload_struct(kind: str) -> struct.Struct:
+    """Return the packing of a kind's numbers, for the sensor or actuator of that kind."""
+    return _PACKED[kind]
 
 
 def decode_payload(kind: str, payload: bytes) -> Value:
@@ -120,7 +126,7 @@ def decode_payload(kind: str, payload: bytes) -> Value:
         return payload
     if kind == PROXIMITY:
         return _ranges(payload)
-    packed, make = _NUMBERS[kind]
+    packed, make = _PACKED[kind], _NUMBERS[kind]
     if len(payload) != packed.size:
         raise Malformed(f"{len(payload)} bytes, {kind} has {packed.size}")
     numbers = packed.unpack(payload)
@@ -140,14 +146,14 @@ def _ranges(payload: bytes) -> Ranges:
 
 
 def encode_payload(kind: str, value: Value) -> bytes:
-    """Return the payload of a value; raises BadValue for what is no number or not finite."""
+    """Return the payload of a value; raises BadValue for a number that is none or not finite."""
     if kind == CHANNEL_ECHO:
         assert isinstance(value, bytes), f"echo carries bytes, not {type(value).__name__}"
         return value
     if kind == PROXIMITY:
         assert isinstance(value, Ranges), f"{kind} carries Ranges, not {type(value).__name__}"
         return struct.pack(f"<{len(value.ways)}d", *value.ways)
-    packed, make = _NUMBERS[kind]
+    packed, make = _PACKED[kind], _NUMBERS[kind]
     assert isinstance(value, make), f"{kind} carries {make.__name__}, not {type(value).__name__}"
     for field, number in zip(make._fields, value, strict=True):
         if not isinstance(number, int | float):
@@ -168,10 +174,10 @@ def command_channel(spec: WorldSpec, robot: str, command: Command | Drive) -> st
 
 
 def encode_command(spec: WorldSpec, robot: str, command: Command | Drive) -> bytes:
-    """Return the payload of a robot's command; raises UnknownName for one that takes none, BadValue out of its reach.
+    """Return the payload of a robot's command; raises UnknownName for one that takes none, BadValue out of its bounds.
 
-    A node refuses, and counts, what is out of a rod's reach, and holds a rover's speeds within its drive's; here the
-    sender is told.
+    A node refuses, and counts, commands out of a rod's bounds, and clips a rover's speeds to its drive's; here the
+    sender gets an error.
     """
     payload = encode_payload(command_channel(spec, robot, command), command)
     if isinstance(command, Drive):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from math import isfinite
 
 from foosim.common.names import CHANNEL_DRIVE
 from foosim.world.layout import Entity
+from foosim.world.payloads import payload_struct
 from foosim.world.spec import WorldSpec
 
-_PAYLOAD = struct.Struct("<2d")
+_PAYLOAD = payload_struct(CHANNEL_DRIVE)
 
 
 class DriveActuator:

@@ -6,17 +6,16 @@ the one of the original table (`docs/reference/table.md`); its gains and limits 
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from math import isfinite
 
 from foosim.common.names import CHANNEL_POSITION
 from foosim.world.layout import Entity
+from foosim.world.payloads import ANGLE_RAD_MAX, payload_struct
 from foosim.world.robots.foosball_rod import RodRobot
 from foosim.world.spec import WorldSpec
 
-ANGLE_RAD_MAX = 1000.0
-_PAYLOAD = struct.Struct("<2d")
+_PAYLOAD = payload_struct(CHANNEL_POSITION)
 
 
 class PositionActuator:

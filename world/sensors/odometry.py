@@ -5,14 +5,14 @@ What the wheels slip is in it, and what they turned while the rover was blocked:
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 
 from foosim.common.keyed_random import draw_words, gaussian
+from foosim.world.payloads import payload_struct
 from foosim.world.robots.rover import OdometrySensor
 from foosim.world.sensors.fitting import Fitting
 
-_PAYLOAD = struct.Struct("<2d")
+_PAYLOAD = payload_struct("odometry")
 
 
 class Odometry:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 
 from foosim.common.keyed_random import draw_words, gaussian
+from foosim.world.payloads import payload_struct
 from foosim.world.robots.rover import PoseSensor
 from foosim.world.sensors.fitting import Fitting
 
-_PAYLOAD = struct.Struct("<3d")
+_PAYLOAD = payload_struct("pose")
 
 
 class PoseTracker:
