@@ -37,18 +37,18 @@ Told = tuple[str, dict[str, Any]]
 """What a stage found, as a text and as facts."""
 
 STAGE_NAMES: Final = (
-    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "model", "mangle", "delay"),
+    *("admission", "policy", "duty", "queue", "medium", "channel", "residual", "custom_model", "corruption", "delay"),
     *("capacity", "receiver"),
 )
 _AT_SENDING: Final = {
-    **dict.fromkeys(("too_big", "node_down", "no_route"), "admit"),
+    **dict.fromkeys(("too_big", "node_down", "no_route"), "admission"),
     **dict.fromkeys(("partition", "filtered"), "policy"),
     **dict.fromkeys(("duty_cycle",), "duty"),
     **dict.fromkeys(("queue_full", "queue_codel", "expired"), "queue"),
     **dict.fromkeys(("out_of_range", "blocked", "snr", "collision"), "channel"),
     **dict.fromkeys(("random_loss", "burst_loss"), "residual"),
-    **dict.fromkeys((MODEL, MODEL_FAILED), "model"),
-    **dict.fromkeys(("crc_fail",), "mangle"),
+    **dict.fromkeys((MODEL, MODEL_FAILED), "custom_model"),
+    **dict.fromkeys(("crc_fail",), "corruption"),
     **dict.fromkeys((TRANSIT_FULL,), "receiver"),
 }
 _AT_ARRIVAL: Final = {
@@ -141,7 +141,7 @@ class Stages:
 
     # --- stages ------------------------------------------------------------------------------------------------------
 
-    def _admit(self) -> Told:
+    def _admission(self) -> Told:
         row, longest = self.row, self.settings.payload_max
         if not self.setup.is_routed:
             return "the ends have no radio in common, or not that of their rule", {"routed": False}
@@ -310,7 +310,7 @@ class Stages:
         facts = {"state": state, "loss_rate": threshold / UNIT, "loss_draw": draw / UNIT}
         return f"{state} state, loss draw {_share(draw)} is {below} {_share(threshold)}", facts
 
-    def _model(self) -> Told:
+    def _custom_model(self) -> Told:
         model, extra_ns = self.settings.model, self.row.model_ns
         assert model is not None, "a link with a model of one's own"
         facts = {"model": model.name, "parameters": dict(model.parameters), "extra_ns": extra_ns}
@@ -318,8 +318,8 @@ class Stages:
         failed = ", which failed" if self.row.cause == MODEL_FAILED else ""
         return f"{model.name} of {facts['package']}{failed}, {_time(extra_ns)} more delay", facts
 
-    def _mangle(self) -> Told:
-        row, settings, stage = self.row, self.settings, self.stages["mangle"]
+    def _corruption(self) -> Told:
+        row, settings, stage = self.row, self.settings, self.stages["corruption"]
         assert isinstance(stage, Mangle)
         parts: list[str] = []
         facts: dict[str, Any] = {"bits_flipped": row.bits_flipped}

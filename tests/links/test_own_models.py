@@ -203,7 +203,7 @@ def test_fates_do_not_know_nodes_or_a_vhub_that_was_killed(tmp_path: Path) -> No
     late = next(row for row in told if row.model_ns)
     for row, outcome in ((lost, "dropped"), (late, "passed")):
         explained = explain_packet(capture, PacketName(row.source, row.sequence, row.destination))
-        (step,) = [step for step in explained.steps if step.stage == "model"]
+        (step,) = [step for step in explained.steps if step.stage == "custom_model"]
         assert step.outcome == outcome and step.text.startswith("fog of foggy 1.2") and explained.agrees
     assert "link model 3 ms" in next(step.text for step in explained.steps if step.stage == "delay")
 
@@ -284,7 +284,7 @@ def test_a_run_whose_model_fails_ends_in_order(tmp_path: Path) -> None:
     failed = [row for row in capture.rows(PACKETS) if isinstance(row, PacketRow) and row.cause == MODEL_FAILED]
     assert f"packet {failed[0].source}:{failed[0].sequence}:{failed[0].destination}" in done.json["reason"]
     explained = explain_packet(capture, PacketName(failed[0].source, failed[0].sequence, failed[0].destination))
-    assert "which failed" in next(step.text for step in explained.steps if step.stage == "model")
+    assert "which failed" in next(step.text for step in explained.steps if step.stage == "custom_model")
 
 
 # --- what is refused --------------------------------------------------------------------------------------------------

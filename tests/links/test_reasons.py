@@ -84,7 +84,7 @@ def steps(capture: CaptureData, row: PacketRow) -> dict[str, Step]:
 
 STAGES: Final[dict[tuple[str, str, str], str]] = {
     ("back", "queue_full", ""): "queue",
-    ("evict", "crc_fail", ""): "mangle",
+    ("evict", "crc_fail", ""): "corruption",
     ("evict", "evicted", ""): "capacity",
     ("evict", "partition", ""): "policy",
     ("far", "out_of_range", ""): "channel",
@@ -160,7 +160,7 @@ def test_what_was_evicted_is_told_of_the_packet_that_came(capture: CaptureData, 
 
 def test_who_does_not_get_as_far_as_copying_has_no_copy(capture: CaptureData, lost: Lost) -> None:
     told = steps(capture, lost["out", "crc_fail", ""][0])
-    assert "copy" not in told["mangle"].text and "is below" in told["mangle"].text
+    assert "copy" not in told["corruption"].text and "is below" in told["corruption"].text
 
 
 def test_fields_of_other_causes_are_left_out(capture: CaptureData) -> None:

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
-from foosim.world.actuators.joint_position import ANGLE_RAD_MAX, PositionActuator
+from foosim.world.actuators.joint_position import PositionActuator
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
+from foosim.world.payloads import ANGLE_RAD_MAX
 from foosim.world.robot_packets import Delivered
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
