@@ -329,7 +329,7 @@ def assert_packets_were_cut(house: House, cut: int, healed: int) -> None:
     one = next(row for row in lost if row.source == "camera")
     code, out, err = house.ask("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
     assert code == 0, err
-    assert "policy    at sending cut by request 0, from " in out and ": partition\n" in out
+    assert "policy        at sending cut by request 0, from " in out and ": partition\n" in out
     assert out.endswith("dropped at sending: partition (policy)\n")
 
 
