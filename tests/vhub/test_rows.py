@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 import jsonschema
 import msgspec
@@ -11,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.capture.columns import word_of
+from foosim.capture.columns import Packets, word_of
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import (
     AGES,
@@ -19,6 +21,7 @@ from foosim.capture.rows import (
     EPOCHS,
     FRAME,
     LAYOUT,
+    NOTHING_MORE,
     PACKETS,
     RECOVERIES,
     ROW_TYPES,
@@ -34,7 +37,17 @@ from foosim.capture.rows import (
     row_schema,
 )
 from foosim.common.keyed_random import Slot, chance_threshold, draw_key, draw_words
-from foosim.vhub.recording.rows_of_closing import Entry, edit_row, epoch_entry, packet_entry, plan_of, world_rows
+from foosim.vhub.network.memory import FlightState
+from foosim.vhub.network.packet import Flight, flight_of, level_cdbm, state_of
+from foosim.vhub.recording.rows_of_closing import (
+    Entry,
+    edit_row,
+    epoch_entry,
+    packet_entry,
+    packet_row,
+    plan_of,
+    world_rows,
+)
 from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
@@ -222,3 +235,50 @@ def test_a_draw_is_read_or_refused() -> None:
     for text in ("ff", "0x000000000000ff", "00000000000000FF", "00000000000000ff\n", "00000000000000f_f"):
         with pytest.raises(CaptureError, match="it has 16 hex digits"):
             word_of(text)
+
+
+def distinct_flight() -> Flight:
+    """Return a delivered radio packet whose every field has a value of its own."""
+    types = get_type_hints(FlightState)
+    kinds: dict[type, Callable[[str], Any]] = {str: str, bytes: str.encode, bool: "published".__eq__}
+    values: dict[str, Any] = {
+        name: kinds[types[name]](name) if types[name] in kinds else 1000 + place
+        for place, name in enumerate(FlightState.__struct_fields__)
+    }
+    lists = {"walls": ("wall",), "by_factor": (), "decided_by": (), "words": tuple(range(5000, 5008))}
+    return flight_of(FlightState(**{**values, **lists, "cause": "", "slots": 1 << Slot.LOSS | 1 << Slot.JITTER}))
+
+
+def test_a_packet_begins_as_its_state_does_and_comes_back_whole() -> None:
+    addressed = Flight("camera", "controller", "ball", 1, 2, 3, b"payload")
+    assert state_of(addressed) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload")
+    copied = Flight("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1)
+    assert state_of(copied) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1)
+    state = state_of(distinct_flight())
+    assert state_of(flight_of(state)) == state
+
+
+def test_a_row_has_each_column_of_its_packet_in_its_place() -> None:
+    flight = distinct_flight()
+    row = packet_row(flight)
+    same = set(PacketRow.__struct_fields__) & set(FlightState.__struct_fields__) - {"walls", "decided_by"}
+    assert {name: getattr(row, name) for name in same} == {name: getattr(flight, name) for name in same}
+    derived = {
+        "walls": ["wall"],
+        "decided_by": NOTHING_MORE,
+        "fate": "delivered",
+        "loss_word": flight.words[Slot.LOSS].to_bytes(8).hex(),
+        "jitter_word": flight.words[Slot.JITTER].to_bytes(8).hex(),
+        "size": len(flight.payload),
+        "wall_released_ns": flight.released_wall_ns,
+        "interference_cdbm": level_cdbm(flight.interference),
+        "error_ppm": flight.error_threshold * 1_000_000 >> 64,
+        "error_word": flight.words[Slot.ERROR].to_bytes(8).hex(),
+    }
+    assert {name: getattr(row, name) for name in derived} == derived
+    assert same | derived.keys() == set(PacketRow.__struct_fields__)
+
+
+def test_the_columns_of_a_capture_are_the_first_of_its_rows() -> None:
+    names = tuple(field.name for field in fields(Packets))
+    assert names == PacketRow.__struct_fields__[: len(names)]
