@@ -100,7 +100,7 @@ class NodeProcess:
         if name != SUPERVISOR or self.core.ended is not None:
             return
         if not is_alive:
-            self.core.actions.append(Log("warning", "lost the supervisor: holds until it is back"))
+            self.core.actions.append(Log("warning", "lost the supervisor: waits until it is back"))
         self._orphan.hear(is_alive, time.monotonic_ns())
 
 

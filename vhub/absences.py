@@ -1,7 +1,7 @@
-"""Players that were away and returned, or left the run: the vHub's part of the run's account.
+"""Absences of players: who is away, who returned, who left the run. The vHub's part of the run's recoveries.
 
-Entries are numbered and repeated in every heartbeat, since heartbeats may be lost. They are in the journal before that,
-so that a restarted vHub reports them again.
+Entries are numbered and repeated in every heartbeat, since heartbeats may be lost. They are journalled first, so that
+a restarted vHub reports them again.
 """
 
 from __future__ import annotations
@@ -11,24 +11,23 @@ from typing import Any, Final
 
 from foosim.vhub.state.records import AbsencesRecord
 
-TOLD_MAX: Final = 64
-"""How many of the last ones are told."""
+REPORTED_MAX: Final = 64
+"""How many of the newest entries a heartbeat contains."""
 
 
 class Absences:
-    """Who is away, and what is over of it."""
+    """The players that are away, and the entries of absences that have ended."""
 
     def __init__(self) -> None:
         self._away: dict[str, tuple[str, str, int]] = {}
-        """Of each that is away: its process, why it is, and the tick that was to be closed next when it went."""
+        """By player: the boot of its process, the reason, and the tick that was closed next at its disconnect."""
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False
-        """Whether there is something that is neither written nor told."""
+        """Whether there are changes that are neither journalled nor reported."""
 
-    def go_on(self, written: AbsencesRecord, here: Collection[str], came: Collection[str], tick: int) -> None:
-        """Go on from what the vHub before wrote. Behind it others may have left the run or come back (`came`), at the
-        tick that it wrote last: `here` are those who take part then."""
+    def restore(self, written: AbsencesRecord, here: Collection[str], came: Collection[str], tick: int) -> None:
+        """Restore from the journal. `tick` is its last one: `here` take part after it, `came` returned at it."""
         self._away = {name: (boot, reason, went) for name, boot, reason, went in written.away}
         self._over = [(number, *line) for number, line in enumerate(written.over, 1)]
         self._count = len(self._over)
@@ -39,17 +38,17 @@ class Absences:
                 self.come_back(name, tick)
 
     def record(self) -> AbsencesRecord:
-        """Return it as it is written down."""
+        """Return the journal's record."""
         away = [(name, *about) for name, about in sorted(self._away.items())]
         return AbsencesRecord(away, [(what, name, reason, tick) for _, what, name, reason, tick in self._over])
 
     def begin(self, name: str, boot: str, reason: str, tick: int) -> None:
-        """A player's process, which was started as `boot`, is away, and waited for."""
+        """Begin the absence of a player, whose process was `boot`; the run waits for it."""
         self._away.setdefault(name, (boot, reason, tick))
         self.is_new = True
 
     def end(self, name: str, boot: str) -> None:
-        """A player is here again before it was given up; where it is the same process, only its connection was cut."""
+        """End an absence with the player's return. The same `boot` means that only its connection was cut: no entry."""
         if name in self._away:
             before, reason, tick = self._away.pop(name)
             self.is_new = True
@@ -57,7 +56,7 @@ class Absences:
                 self._note("player", name, reason, tick)
 
     def deny(self, name: str) -> None:
-        """A player is here that a hello of another process had told to be lost while the vHub was away."""
+        """Cancel the absence of a player that a late hello of another process had wrongly reported."""
         self._away.pop(name)
         self.is_new = True
 
@@ -66,19 +65,19 @@ class Absences:
         return name in self._away
 
     def leave(self, name: str, tick: int) -> None:
-        """The run goes on without a player that was waited for, from a tick on, which is written."""
+        """End an absence without a return: the run continues without the player from `tick` on, which is journalled."""
         if name in self._away:
             _, reason, _ = self._away.pop(name)
             self._note("player", name, f"{reason}; the run goes on without it", tick)
 
     def come_back(self, name: str, tick: int) -> None:
-        """A player that had left takes part from a tick on, which is written."""
+        """Add the return of a player that had left; it takes part from `tick` on, which is journalled."""
         self._note("return", name, "back", tick)
 
     def report(self) -> dict[str, Any]:
-        """Return who is away, and what is over: [number, what, name, reason, tick]."""
+        """Return the players that are away and the newest entries: [number, what, name, reason, tick]."""
         return {"away": sorted(self._away), "over": self._over}
 
     def _note(self, what: str, name: str, reason: str, tick: int) -> None:
         self._count, self.is_new = self._count + 1, True
-        self._over = [*self._over[1 - TOLD_MAX :], (self._count, what, name, reason, tick)]
+        self._over = [*self._over[1 - REPORTED_MAX :], (self._count, what, name, reason, tick)]

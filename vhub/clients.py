@@ -58,10 +58,10 @@ class Clients:
         self._state: HubState | None = None
         self._releases: Releases | None = None
         self.written: InputsRecord | None = None
-        """Who joins and leaves at the tick that is closed next, where that is written already."""
+        """The joins and leaves of the next tick, where they are journalled already."""
         self._leaves: list[str] = []
         self._owing: list[str] = []
-        """Who leaves at the tick that waits for their Dones."""
+        """Clients that leave at the tick that waits for their Dones."""
         self.absences = Absences()
         self._looked_ns = 0
 
@@ -69,9 +69,9 @@ class Clients:
         """Take part in a run; before this every message of a client is dropped."""
         self._deployment, self._state, self._releases = deployment, state, releases
 
-    def go_on(self, written: InputsRecord | None, absences: AbsencesRecord, now_ns: int) -> None:
-        """Wait for the clients of the vHub process before this one; `written` is its record of who joins and leaves at
-        the next tick, `absences` names the players that it knew to be away."""
+    def resume(self, written: InputsRecord | None, absences: AbsencesRecord, now_ns: int) -> None:
+        """Wait for the clients of the vHub process before this one; `written` is its record of joins and leaves at
+        the next tick, `absences` its record of absent players."""
         assert self._state is not None and self._deployment is not None
         self.written = written
         members, came = self._state.members, set()
@@ -79,7 +79,7 @@ class Clients:
         if written is not None:
             came = {joining.name for joining in written.joins if _is_return(joining, members)}
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        self.absences.go_on(absences, here, came, self._state.closed if written is None else written.tick)
+        self.absences.restore(absences, here, came, self._state.closed if written is None else written.tick)
         self._sessions.expect(here, self._start_ns, now_ns)  # their processes may have ended as well, and be restarted
 
     def _known(self, name: str) -> Member | Joining | None:

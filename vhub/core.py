@@ -466,11 +466,11 @@ class HubCore:
             self.clients.begin(deployment, self.state, self.releases)
             self.commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
-            self._go_on(past, now_ns)
+            self._resume(past, now_ns)
         self.actions.append(Journal(self.head()))
         self.ready_if_complete()
 
-    def _go_on(self, past: Past, now_ns: int) -> None:
+    def _resume(self, past: Past, now_ns: int) -> None:
         """Resume as the vHub before: restore its state, and wait for the supervisor's grant."""
         assert self.deployment is not None and self.releases is not None
         state = self.state = past.state
@@ -478,7 +478,7 @@ class HubCore:
         self.commits.start(past.layout, state.closed + 1, past.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
-        self.clients.go_on(past.inputs, past.absences, now_ns)
+        self.clients.resume(past.inputs, past.absences, now_ns)
         self.actions += past.actions()
         if past.epoch is not None:
             self._take_epoch(past.epoch)

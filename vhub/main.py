@@ -1,7 +1,7 @@
-"""The process `foosim-vhub`: the vHub's core between both planes, its journal and the capture.
+"""The process `foosim-vhub`: connects the vHub's core to both planes, the journal and the capture.
 
-It is a client of the simulation plane and the router of the radio plane. Nothing bridges the two but the core. What the
-core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own.
+It is a client of the simulation plane and the router of the radio plane; only the core passes data from one to the
+other. The core's records are in the journal before its messages are sent. A thread writes the capture.
 """
 
 from __future__ import annotations
@@ -65,15 +65,15 @@ from foosim.vhub.state.records import Closing, first_head
 from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
 
 SWITCH_S = 0.0001
-"""For how long the capture's thread may keep the interpreter from the loop. Python's own 5 ms would hold up ticks: at
-each of the loop's calls into journal and network, some a tick, that thread may come in between."""
+"""The interpreter's switch interval. Python's default of 5 ms would delay ticks: at each call of the loop into journal
+and network, several a tick, the capture's thread may take the interpreter's lock."""
 FORGET_EVERY_NS = 1_000_000_000
 LOOK_EVERY_NS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class HubOptions:
-    """What a vHub is started with. `capture` None: where captures go by default; `keeps` False: none is written."""
+    """The options of a vHub. `capture` None: the default path; `keeps` False: no capture is written."""
 
     capture: Path | None = None
     keeps: bool = True
@@ -81,13 +81,13 @@ class HubOptions:
     progress: Path | None = None
 
 
-def needs_record(said: Publish) -> bool:
-    """Whether this tells of what has to be in the journal: all does but how the vHub is and what it lacks."""
-    return said.channel not in (channels.HEARTBEAT, channels.WANT)
+def needs_record(message: Publish) -> bool:
+    """Whether a message depends on the journal: all do but heartbeats and requests for missing messages."""
+    return message.channel not in (channels.HEARTBEAT, channels.WANT)
 
 
 class HubProcess:
-    """The vHub on its two sessions, until the run ends, the supervisor is gone for too long, or `stop`."""
+    """The vHub on its two sessions, until the run ends, the supervisor's timeout passes, or `stop` is called."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class HubProcess:
         options: HubOptions,
         credentials: Credentials | None = None,
     ) -> None:
-        """`open_radio` listens for the clients of a deployment, which comes with the handshake."""
+        """`open_radio` opens the radio plane for the clients of the deployment, which the handshake delivers."""
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), machine=machine_start())
         self._options = options
         self._open_radio = open_radio
@@ -107,9 +107,9 @@ class HubProcess:
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
         self._is_closing = False
-        """Whether the run has ended, and the capture takes nothing any more."""
+        """Whether the run has ended, and the capture accepts no more records."""
         self._why_abandoned = ""
-        """Why it ends though the run has not."""
+        """Why this process ends before its run."""
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
         self._shell = ProcessShell(
             self.core, VHUB, self._wire, inbox, lambda now_ns: self.core.deadline_ns(), options.progress, credentials
@@ -126,10 +126,10 @@ class HubProcess:
         self._shell.watch_router(SUPERVISOR, simulation.locator)
 
     def run(self) -> int:
-        """Take part until the end, close the capture, say farewell; return the exit code.
+        """Run until the end of the run, close the capture, send the farewell; return the exit code.
 
-        Whatever else ends it, its supervisor's absence among them, leaves the capture without an end, and the journal:
-        a vHub that is started again goes on with both.
+        Every other end, the supervisor's timeout among them, leaves the journal and an unfinished capture, with which a
+        restarted vHub resumes.
         """
         sys.setswitchinterval(SWITCH_S)
         try:
@@ -157,7 +157,7 @@ class HubProcess:
         return DONE
 
     def stop(self) -> None:
-        """Have `run` leave what it has and return; a signal handler may call this."""
+        """Have `run` leave journal and capture as they are and return; a signal handler may call this."""
         self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
         self._inbox.wake()
 
@@ -170,9 +170,9 @@ class HubProcess:
         return self._is_abandoned or bool(core.member.refusal or core.failure)
 
     def _has_closed(self) -> bool:
-        """Begin to close the capture, once all that goes into it is handed over; return whether that is done.
+        """Begin to close the capture once its queue has everything; return whether it is closed.
 
-        Until then the vHub shows that it lives, and how far it is.
+        Until then the heartbeat goes on and reports the progress.
         """
         capture, ended = self._capture, self.core.ended
         if capture is None:
@@ -216,7 +216,7 @@ class HubProcess:
                 self._on_unwritten(error)
 
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
-        """Log what gets little, and end the run while what is left to be written still fits."""
+        """Log low disk space, and end the run while the rest of its records still fits."""
         core = self.core
         core.actions += [Log(level, text) for level, text in room.look(now_ns)]
         core.shell.recording, core.shell.disk_progress = room.recording, room.disk_progress(now_ns)
@@ -224,25 +224,25 @@ class HubProcess:
             core.lose(*room.ends)
 
     def _wait_for_capture(self) -> None:
-        """Log that the vHub lives, and what it waits for, while the capture's full queue holds up the loop."""
+        """Send a heartbeat with what the vHub waits for, while the capture's full queue blocks the loop."""
         core = self.core
         if self._room is not None:
             core.shell.recording = self._room.recording
         self._wire.put(channels.HEARTBEAT, VHUB, encode(replace(core.heartbeat(), waiting_for=CAPTURE)))
 
     def _on_unwritten(self, error: JournalError) -> None:
-        """The journal has failed: nothing is said any more that would have to be in it, and the run ends.
+        """End the run, since the journal has failed; messages that depend on it are withheld.
 
-        What is committed still goes to the capture.
+        Committed frames are still written to the capture.
         """
         core = self.core
-        self._loop.holds_back = lambda said: needs_record(said) and not core.finished
+        self._loop.holds_back = lambda message: needs_record(message) and not core.finished
         core.lose("the journal", str(error))
 
     def _begin(self, build: Build, now_ns: int) -> None:
-        """Be present, since the supervisor has let us in; open journal and capture, go on from them, and listen.
+        """Declare presence after the supervisor's grant; open journal and capture, resume from them, listen.
 
-        Present first: whoever cannot open them ends, and the supervisor knows by the presence that it did.
+        Presence comes first: the supervisor notices the end of a vHub that cannot open its files by its disconnect.
         """
         self._wire.declare_alive()
         core, deployment = self.core, self.core.deployment
@@ -254,14 +254,14 @@ class HubProcess:
             core.lose("the network", error.problems[0])
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
-        goes_on = bool(journal_files(folder, VHUB))
+        resumes = bool(journal_files(folder, VHUB))
         self._journal = self._loop.journal = Journal(folder, VHUB)
         try:
-            self._go_on(build, deployment, folder, now_ns)
+            self._open_records(build, deployment, folder, now_ns)
         except Refused as error:
-            if not goes_on:
+            if not resumes:
                 raise
-            if self._capture is not None:  # it stays as it is, without a line about this
+            if self._capture is not None:  # left unchanged: no log row about this
                 self._capture.leave()
                 self._capture = None
             core.failure = f"cannot go on: {error}"
@@ -269,8 +269,8 @@ class HubProcess:
             return
         self._listen(deployment)
 
-    def _go_on(self, build: Build, deployment: Deployment, folder: Path, now_ns: int) -> None:
-        """Begin, or be the vHub that was there before, with its capture. Raises Refused for what it has left."""
+    def _open_records(self, build: Build, deployment: Deployment, folder: Path, now_ns: int) -> None:
+        """Begin, or resume from the journal and capture that are there. Raises Refused where that is impossible."""
         core = self.core
         records, damaged = read_whole(read_journal(folder, VHUB))
         if damaged is not None:
@@ -280,14 +280,14 @@ class HubProcess:
         core.shell.recording = self._room.recording
         past = recall(deployment, build.run, records, captured, deployment.deadlines.client_back_ns)
         if self._capture is not None and past is not None and past.known is not None:
-            self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
+            self._capture.keep(Closing(past.known, past.known.digest, [], []))  # the frame that the file ends with
         core.begin(past, now_ns)
         for line in start_lines(summaries(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
 
     def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
-        """Return why nobody goes on over a damaged journal, and what helps."""
-        from foosim.capture.start_frame import branch_command  # reads captures: not what a vHub starts with
+        """Return the refusal of a damaged journal, with the command that begins a new run."""
+        from foosim.capture.start_frame import branch_command  # imports the capture reader: slow, and rarely needed
 
         before = was_captured(records)
         capture = self._options.capture if before is None else Path(before) if before else None
@@ -295,14 +295,14 @@ class HubProcess:
         return Refused(f"{what}. {branch_command([build.deployment_name], capture)}")
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
-        """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""
+        """Begin the capture, or resume that of the process before; return how far it is."""
         before, options = was_captured(records), self._options
         if not (options.keeps if before is None else before):
             return None
         path = Path(before) if before else options.capture
         path = path or Path("captures") / f"{deployment.world}-{wall_clock.now_stamp()}.mcap"
         self.core.shell.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
-        if before is None:  # who is killed before the capture is there finds here that what is found is its own
+        if before is None:  # a vHub that is killed before the file exists finds here that the path is its own
             check_new(path, is_split=deployment.capture.is_split)
             assert self._journal is not None
             self._journal.append(first_head(build, deployment, self.core.capture_file))
@@ -313,7 +313,7 @@ class HubProcess:
             "fingerprint": library_fingerprint().hex(),
             **origin_metadata(build.origin),
         }
-        described = build.deployment_name, build.deployment, metadata, self._say
+        described = build.deployment_name, build.deployment, metadata, self._log_text
         self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records))
         self._capture.while_waiting = self._wait_for_capture
         return self._capture.begun_with
@@ -330,7 +330,7 @@ class HubProcess:
         radio.declare_alive()
 
     def _turn_journal(self, closed: int) -> None:
-        """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
+        """Between ticks, begin a new file when one is full; drop records that the capture has on disk."""
         journal = self._journal
         assert journal is not None
         if self.core.is_between_ticks and not self.core.actions:
@@ -345,11 +345,11 @@ class HubProcess:
         if self._capture is not None:
             self._capture.keep(action.closing if isinstance(action, RecordClosing) else action.epoch)
 
-    def _on_log(self, say: Log) -> None:
+    def _on_log(self, log: Log) -> None:
         if self._capture is not None and not self._is_closing:
-            self._capture.log(say.level, say.text, self.core.statistics().closed + 1)
+            self._capture.log(log.level, log.text, self.core.statistics().closed + 1)
 
-    def _say(self, level: str, text: str) -> None:
+    def _log_text(self, level: str, text: str) -> None:
         self._log.log(logging.getLevelNamesMapping()[level.upper()], text)
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
@@ -362,11 +362,11 @@ class HubProcess:
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
-            self.core.actions.append(Log("warning", "lost the supervisor: holds until it is back"))
+            self.core.actions.append(Log("warning", "lost the supervisor: waits until it is back"))
             self.core.orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:
-        """Take notice of the end of the capture; only then is the journal done with."""
+        """Finish the capture, then close the journal, and remove it after a run without failure."""
         assert self.core.ended is not None
         if self._capture is not None:
             self._capture.finish()
@@ -383,17 +383,17 @@ class HubProcess:
                 remove_journal(self._journal.folder, VHUB)
 
     def _leave(self) -> None:
-        """The run has not ended: leave capture and journal as a kill would, for a vHub that goes on with them."""
+        """Leave capture and journal as a kill would, for a vHub that resumes the run."""
         if self._capture is not None:
             self._capture.leave()
-            self._log.warning("leaves its capture %s without an end: the run can go on with it", self._capture.path)
+            self._log.warning("leaves its capture %s unfinished: a restarted vHub can resume it", self._capture.path)
         if self._journal is not None:
             with suppress(JournalError):
                 self._journal.close()
 
 
 def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki: Path | None = None) -> int:
-    """Run the vHub until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
+    """Run the vHub until its run ends; return the exit code. Raises Refused when it cannot connect.
 
     `pki` is the folder with its certificate and, where clients have passwords, with these.
     """
@@ -430,22 +430,23 @@ app = new_app()
 @app.command()
 def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
-    listen: Annotated[str, typer.Option(help="Where clients find it; port 0 lets the system choose.")] = LOOPBACK,
-    insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False,
-    capture: Annotated[Path | None, typer.Option(help="What to write; by default captures/WORLD-TIME.mcap.")] = None,
+    listen: Annotated[str, typer.Option(help="Address for clients; port 0: any free port.")] = LOOPBACK,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Listen on addresses that other machines reach.")
+    ] = False,
+    capture: Annotated[Path | None, typer.Option(help="File to write; by default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
-    run_folder: Annotated[Path | None, typer.Option(help="Where its journal goes; by default RUN.vhub.")] = None,
+    run_folder: Annotated[Path | None, typer.Option(help="Folder of its journal; by default RUN.vhub.")] = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
-    """Take part in a run as its virtual hub.
+    """Run the virtual hub of a run.
 
-    Started again with the same run folder, and listening where clients know it, it goes on from its journal and its
-    capture.
+    Restarted with the same run folder and the same address, it resumes from its journal and its capture.
 
-    It exits with 0 when the run ended and the capture is finished, with 1 when the supervisor was lost for longer than
-    the deployment's `deadlines.orphan`, or something else ended it, and with 3 when the supervisor would not have it.
+    Exit codes: 0 when the run ended and the capture is finished, 1 when the supervisor was lost for longer than the
+    deployment's `deadlines.orphan` or another failure ended it, 3 when the supervisor refused it.
     """
     die_with_parent()
     if no_capture and capture is not None:

@@ -1,11 +1,11 @@
-"""Sessions of clients: which process has a client's name, and what was sent to it and is kept until it answers.
+"""Sessions of clients: which process has a client's name, and the messages that are kept until it answers.
 
-A lockstep client gets `Go(k)` and answers `Done(k)`, stop and wait; a free-running one gets numbered `Down`s. What is
-sent to a client is numbered and kept, so that it can resume after an absence. Sessions are about processes; what the
-world must remember of a client is in `state`.
+A lockstep client receives `Go(k)` and answers `Done(k)`, stop and wait; a free-running one receives numbered `Down`s.
+Messages to a client are numbered and kept, so that it can resume after an absence. A session belongs to a process; the
+client's part of the simulated world is in `state`.
 
-A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: because
-the vHub was away, or because news of the end overtook the hello. Where that can be, a reservation excludes nobody: all
+A hello reserves a name, a Join takes it. A hello may arrive after the end of its process, if the vHub was down
+meanwhile or the disconnect overtook the hello. Where that is possible, a reservation is not exclusive: all processes
 are welcomed, and the first that joins has the name.
 """
 
@@ -41,11 +41,11 @@ from foosim.vhub.state.members import may_lockstep, may_restart
 
 T = TypeVar("T")
 BOOTS_KEPT: Final = 32
-"""Of how many processes of one name it is kept that they were here: what comes late comes within seconds."""
+"""How many earlier processes of one name are remembered: late messages arrive within seconds."""
 
 
 class Claim(NamedTuple):
-    """A hello that was welcomed, and the numbers that its process was told."""
+    """A hello that was welcomed, and the numbers that its welcome gave."""
 
     hello: ClientHello
     sequence: int
@@ -58,56 +58,56 @@ class Session:
 
     name: str
     boot: str
-    """Empty while the client that the state knows has not come to this vHub yet."""
+    """Empty while a client of the restored state has not connected to this vHub yet."""
     is_present: bool = False
-    """Whether it has joined since its last hello: only then anything is sent to it."""
+    """Whether it has joined since its last hello. Nothing is sent to it before."""
     received: int = 0
-    """The downlink up to which it had received all at its hello."""
+    """The number up to which it had received all downlinks at its hello."""
     is_behind: bool = True
-    """Whether what it had not received then is still to be sent."""
+    """Whether the downlinks that it lacked at its hello are still to be sent."""
     is_gone: bool = False
-    """Whether its process has disconnected, and neither it nor another one has come since."""
+    """Whether its process has disconnected, and no process of the name has connected since."""
     why_gone: str = CLOSED
-    """The cause, as far as it is known."""
+    """The cause, if there is one."""
     returns: int = 0
-    """How often its process had lost the vHub when it said hello."""
+    """How often its process had lost the vHub, by its last hello."""
     before: dict[str, None] = field(default_factory=dict)
-    """Boots of the last processes that are gone for good: their late messages are dropped."""
+    """Boots of the last processes that have ended: their late messages are dropped."""
     is_missed: bool = False
-    """Whether its hello has shown that the process before it was lost while the vHub was away."""
+    """Whether its hello showed that the process before it was lost while the vHub was down."""
     claims: dict[str, Claim] = field(default_factory=dict)
-    """The last processes that were welcomed to the name and are not known to be gone, by boot."""
+    """The last processes that were welcomed to the name and may still run, by boot."""
     away_ns: int = -1
-    """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
-    here."""
+    """The earliest time at which an absent client is given up, or a restarted one that has not joined; -1 while it is
+    present."""
     back_ns: int = 0
-    """How long it has for that."""
+    """The time that it is given for that."""
     next_sequence: int = 1
-    """The number of its next packet: nothing behind a gap is taken."""
+    """The number of its next packet: packets after a gap are dropped."""
     heard: int = 0
-    """The sequence number that was acknowledged to it."""
+    """The last sequence number that was acknowledged to it."""
     heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
-    """By when it has to answer; 0 while no answer is due."""
+    """When its answer is overdue; 0 while none is due."""
     allowed_ns: int = 0
     deadline: str = ""
-    """Which one of the deployment's that is."""
+    """The name of the deadline in the deployment."""
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
-    """As they came."""
+    """Size of the messages as received."""
 
     def is_late(self, hello: ClientHello) -> bool:
-        """Whether a hello was said by a process that has gone since: one that comes back counts one return more."""
+        """Whether the process of a hello has ended since: a process that reconnects has a higher number of returns."""
         is_of_gone = self.is_gone and hello.boot == self.boot and hello.returns <= self.returns
         return is_of_gone or hello.boot in self.before
 
     def come(self, boot: str, received: int, sequence: int, joins_first: bool = False) -> None:
-        """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
+        """Give the session to a process that continues after these numbers; away until it joins with `joins_first`."""
         if boot != self.boot:
             if self.boot and self.is_gone:
                 _remember(self.before, self.boot, None)
@@ -120,36 +120,36 @@ class Session:
         self.next_sequence = max(self.next_sequence, sequence + 1)
 
     def may_fail(self, boot: str) -> bool:
-        """Whether a process has the name, or may get it still."""
+        """Whether a process has the name or may still get it: its failure then concerns the run."""
         return boot == self.boot or (boot in self.claims and not self.is_present)
 
     def is_held_against(self, boot: str) -> bool:
-        """Whether another process has the name that is not known to be gone."""
+        """Whether another process has the name and has not disconnected."""
         return self.boot not in ("", boot) and not self.is_gone
 
     @property
     def lost_ns(self) -> int:
-        """When a client that is away is lost: its process may be gone, or only stand still, so the later time counts
-        of those for coming back and for its answer."""
+        """When an absent client is lost. Its process may have ended or only be suspended, so this is the later of the
+        deadlines for its return and for its answer."""
         return max(self.away_ns, self.deadline_ns)
 
     def answered(self) -> None:
-        """No answer is waited for."""
+        """Stop waiting for an answer."""
         self.deadline_ns = 0
 
     def leave(self, back_ns: int, now_ns: int) -> None:
-        """The client is away, and has so long to come back."""
+        """Mark the client as away; it is given `back_ns` to return."""
         self.back_ns, self.away_ns = back_ns, now_ns + back_ns
 
     def rest(self, for_ns: int, now_ns: int) -> None:
-        """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
+        """Extend the deadlines by a standstill of `for_ns`, at most to those that would begin now."""
         if self.away_ns >= 0:
             self.away_ns = min(self.away_ns + for_ns, now_ns + self.back_ns)
         if self.deadline_ns:
             self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
     def take(self, packets: Sequence[Sent]) -> int:
-        """Take what the client sends, each number once and in order; return how many were taken before."""
+        """Take packets of the client, each number once and in order; return how many were repeats."""
         repeated = 0
         for packet in sorted(packets, key=lambda sent: sent.sequence):
             if packet.sequence == self.next_sequence:
@@ -161,12 +161,12 @@ class Session:
 
     @property
     def unanswered(self) -> str:
-        """What is said when the deadline has passed."""
-        told = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
-        return f"{told} (deadlines.{self.deadline})"
+        """The message for a deadline that has passed."""
+        overdue = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
+        return f"{overdue} (deadlines.{self.deadline})"
 
     def closed(self, now_ns: int) -> str:
-        """Return what is known of its process, whose connection has ended: whether it owed an answer until then."""
+        """Return the message for a closed connection: whether the process owed an answer at that time."""
         owed_ns = now_ns - (self.deadline_ns - self.allowed_ns) if self.deadline_ns else 0
         return closed(owed_ns, f"it had not answered tick {self.go_tick}")
 
@@ -179,7 +179,7 @@ class Session:
 
 
 class Sessions:
-    """The sessions of all clients. What is to be sent is appended to `actions`."""
+    """The sessions of all clients. Messages to send are appended to `actions`."""
 
     def __init__(self, hub_boot: str, actions: list[Action]) -> None:
         self.by_name: dict[str, Session] = {}
@@ -187,20 +187,20 @@ class Sessions:
         """Joins that wait for a tick, by client."""
         self.downlinks = Downlinks()
         self._waiting_bytes = 0
-        """Of what all of them sent between closings."""
+        """Size of the packets of all clients between two closings."""
         self._left_behind: dict[str, list[Sent]] = {}
-        """What clients had sent before they went."""
-        self._goes_on = False
-        """Whether this vHub goes on with a run: it does not know who has ended while it was away."""
+        """Packets of clients that have disconnected."""
+        self._is_resumed = False
+        """Whether this vHub resumes a run: it has missed disconnects while it was down."""
         self._hub_boot = hub_boot
         self._actions = actions
 
     def hello(
-        self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState, said: int | None = None
+        self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState, sent: int | None = None
     ) -> None:
         """Admit a client, or refuse it with the reason. A repeated hello gets the same answer.
 
-        `said` is the last downlink that was sent to its name, None when that is the last one of all.
+        `sent` is the number of the last downlink that was sent to the name, None when that is the newest one.
         """
         reason = self._reason_against(hello, deployment)
         if reason:
@@ -209,7 +209,7 @@ class Sessions:
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        claim = self._claim(session, hello, state, said)
+        claim = self._claim(session, hello, state, sent)
         _remember(session.claims, hello.boot, claim)
         if not session.is_held_against(hello.boot):
             self._take(session, claim, deployment)
@@ -226,32 +226,32 @@ class Sessions:
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 
-    def take_over(self, join: Join, deployment: Deployment, state: HubState, said: int | None) -> bool:
-        """Give the name to a process that was welcomed while another one had it; False where it is too late for that.
+    def take_over(self, join: Join, deployment: Deployment, state: HubState, sent: int | None) -> bool:
+        """Give the name to a process that was welcomed while another one had it; return False where it is too late.
 
-        It is where another one has joined and is present, or has sent something since this one was told its numbers.
+        That is where another process has joined and is present, or has sent packets since this one was welcomed.
         """
         session = self.by_name[join.name]
         claim = session.claims[join.boot]
         is_taken = session.is_present and not session.is_gone
-        if is_taken or claim.sequence != self._claim(session, claim.hello, state, said).sequence:
+        if is_taken or claim.sequence != self._claim(session, claim.hello, state, sent).sequence:
             self._refuse(ClientRefusal(join.name, join.boot, _already_here(join.name), joins=True))
             return False
         self._take(session, claim, deployment)
         return True
 
     def is_for_another(self, join: Join) -> bool:
-        """Whether a Join answers another vHub's welcome: it comes late, perhaps of a process that is gone."""
+        """Whether a Join answers the welcome of another vHub process: it is late, and its sender may have ended."""
         return join.hub not in ("", self._hub_boot)
 
-    def _claim(self, session: Session, hello: ClientHello, state: HubState, said: int | None) -> Claim:
-        """Return with which numbers a process goes on."""
+    def _claim(self, session: Session, hello: ClientHello, state: HubState, sent: int | None) -> Claim:
+        """Return the numbers from which a process continues."""
         member = state.members.get(hello.name)
         sequence = 0 if member is None else member.sequence
-        downlink = 0 if member is None else member.downlink if said is None else said
+        downlink = 0 if member is None else member.downlink if sent is None else sent
         if hello.returns:
             return Claim(hello, sequence, min(hello.received, downlink))
-        # another process: the numbers of what the one before has sent are taken
+        # a new process: numbers that its predecessor has used are taken
         waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
         waiting += [] if session.done is None else session.done.packets
         return Claim(hello, max([sequence, *(packet.sequence for packet in waiting)]), downlink)
@@ -262,8 +262,8 @@ class Sessions:
         if session.boot != hello.boot:
             self._left_behind.setdefault(hello.name, []).extend(session.inbox)
         session.returns = hello.returns
-        # A process that is started anew takes its time, and one that says that it is back may be gone since.
-        is_unsure = self._goes_on and not session.is_present
+        # A restarted process needs time to start, and one that reports its return may have ended since.
+        is_unsure = self._is_resumed and not session.is_present
         joins_first = is_unsure if hello.returns else may_restart(deployment, hello.name)
         session.come(hello.boot, claim.downlink, claim.sequence, joins_first)
 
@@ -286,9 +286,9 @@ class Sessions:
         return ""
 
     def is_in_doubt(self, session: Session, deployment: Deployment) -> bool:
-        """Whether the process that has the name may be gone, its hello having come late: it has not joined, and
-        another process may have been started in its place."""
-        return not session.is_present and (self._goes_on or may_restart(deployment, session.name))
+        """Whether the process that has the name may have ended before its hello arrived: it has not joined, and another
+        process may have been started in its place."""
+        return not session.is_present and (self._is_resumed or may_restart(deployment, session.name))
 
     def missing(self, deployment: Deployment, state: HubState) -> list[str]:
         """Return the declared lockstep clients that have not joined yet, in name order."""
@@ -297,42 +297,42 @@ class Sessions:
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
     def expect(self, names: Iterable[str], back_ns: int, now_ns: int) -> None:
-        """These clients come back, by then, to this vHub, which is another one."""
-        self._goes_on = True
+        """Wait `back_ns` for clients of the restored state to connect to this new vHub process."""
+        self._is_resumed = True
         for name in sorted(names):
             self.by_name[name] = Session(name, "")
             self.by_name[name].leave(back_ns, now_ns)
 
     def late(self, now_ns: int) -> list[str]:
-        """Return the clients that were away for too long, in name order."""
+        """Return the clients whose absence is over its deadline, in name order."""
         away = [(name, session) for name, session in sorted(self.by_name.items()) if session.away_ns >= 0]
         return [name for name, session in away if session.lost_ns <= now_ns]
 
     @property
     def late_ns(self) -> int | None:
-        """When the next client has been away for too long."""
+        """The time at which the next absent client is lost."""
         return min((session.lost_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
-        """Note a join; it takes effect when the hub closes a tick that suits it."""
+        """Queue a join; it takes effect at the next tick that fits its period and offset."""
         subscriptions = {(wanted.source, wanted.channel) for wanted in join.subscriptions}
         arrivals = {(wanted.source, wanted.channel) for wanted in join.arrivals}
         what = sorted(subscriptions), join.offset, sorted(arrivals)
         self.joins[join.name] = Joining(join.name, join.period, *what)
 
     def take_joins(self, tick: int) -> list[Joining]:
-        """Take the joins that take effect at `tick`, in name order."""
+        """Remove and return the joins that take effect at `tick`, in name order."""
         due = [name for name, joining in sorted(self.joins.items()) if joining.suits(tick)]
         return [self.joins.pop(name) for name in due]
 
     def leave(self, name: str) -> None:
-        """Remove a client's session; what it sent stays."""
+        """Remove a client's session; its packets stay."""
         session = self.by_name.pop(name)
         self.joins.pop(name, None)
         self._left_behind.setdefault(name, []).extend(session.inbox)
 
     def admits(self, session: Session, packets: int, size: int) -> bool:
-        """Count what a free-running client says, so many packets in so many bytes; False when that is too much."""
+        """Count packets of a free-running client and their `size` in bytes; return False above the limits."""
         whole = self._waiting_bytes + size
         of_it = session.inbox_bytes + size
         if len(session.inbox) + packets > limits.INBOX_MESSAGES_MAX or of_it > limits.CLIENT_INBOX_BYTES_MAX:
@@ -343,9 +343,9 @@ class Sessions:
         return True
 
     def take_sent(self) -> dict[str, list[Sent]]:
-        """Take what clients have sent since the last call, by client.
+        """Remove and return the packets since the last call, by client.
 
-        Where a join waits for its tick, what came with it waits too: there the client is known.
+        Packets of a client whose join waits for its tick wait too: the state has the client from that tick on.
         """
         taken, self._left_behind = self._left_behind, {}
         for name, session in self.by_name.items():
@@ -361,7 +361,7 @@ class Sessions:
         return taken
 
     def send_go(self, session: Session, go: Go) -> None:
-        """Send a lockstep client its tick; one that is away gets it when it has returned."""
+        """Send a lockstep client its Go; one that is away receives it after its return."""
         session.go = encode(go)
         session.go_tick = go.tick
         session.done = None
@@ -369,9 +369,9 @@ class Sessions:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
 
     def send_owed(self, name: str, now_ns: int) -> None:
-        """Send the packets of the Go whose Done is owed as a Down, and keep it: they count as delivered.
+        """Send the packets of an unanswered Go as a Down, and keep it: they count as delivered.
 
-        It is not known whether any process, or the one that joins next, has received that Go.
+        Neither the lost process nor the next one has necessarily received that Go.
         """
         go = decode(Go, self.by_name[name].go)
         payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False))
@@ -379,11 +379,11 @@ class Sessions:
         self._actions.append(Publish(channels.DOWN, name, payload))
 
     def resend(self, name: str, number: int) -> None:
-        """Send a client's downlinks from a number on, which the vHub before may have written and not sent."""
-        self._actions += [Publish(channels.DOWN, name, said) for said in self.downlinks.behind(name, number - 1)]
+        """Send a client's downlinks from a number on: those that are journalled and may not have been sent."""
+        self._actions += [Publish(channels.DOWN, name, payload) for payload in self.downlinks.behind(name, number - 1)]
 
     def send_down(self, name: str, down: Down, now_ns: int) -> None:
-        """Send a client what is released to it outside of lockstep, or the end of the run; and keep it."""
+        """Send a client released packets outside of lockstep, or the end of the run, and keep the message."""
         payload = encode(down)
         self.downlinks.keep(name, down.number, payload, now_ns)
         session = self.by_name.get(name)
@@ -392,7 +392,7 @@ class Sessions:
             self._actions.append(Publish(channels.DOWN, name, payload))
 
     def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
-        """A client has joined (again): send what it has not received; `waits` is whether a tick waits for its Done."""
+        """Send a client that has joined what it has not received; `waits`: whether a tick waits for its Done."""
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
@@ -402,7 +402,7 @@ class Sessions:
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
 
     def acknowledge(self, state: HubState, now_ns: int) -> None:
-        """Acknowledge to free-running clients what is recorded of their packets, ten times a second at most."""
+        """Acknowledge recorded packets to free-running clients, at most once in a heartbeat's period."""
         for name, session in self.by_name.items():
             member = state.members.get(name)
             if member is None or member.period or not session.is_present or member.sequence <= session.heard:
@@ -412,7 +412,7 @@ class Sessions:
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence))))
 
     def rest(self, for_ns: int, now_ns: int) -> None:
-        """For so long no client could do anything."""
+        """Extend the deadlines of all clients by a standstill of `for_ns`."""
         for session in self.by_name.values():
             session.rest(for_ns, now_ns)
 
@@ -422,7 +422,7 @@ class Sessions:
         return [session for session in waited if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
-        """When the next Go is repeated."""
+        """The time of the next repeated Go."""
         return min(self.by_name[name].again_ns for name in waited)
 
     def repeat(self, waited: Sequence[str], now_ns: int) -> None:
@@ -441,7 +441,7 @@ def _already_here(name: str) -> str:
 
 
 def _remember(by_boot: dict[str, T], boot: str, what: T) -> None:
-    """Note something of a process, as the newest of the `BOOTS_KEPT` that are kept."""
+    """Store `what` under a boot, as the newest of at most `BOOTS_KEPT`."""
     by_boot.pop(boot, None)
     by_boot[boot] = what
     while len(by_boot) > BOOTS_KEPT:

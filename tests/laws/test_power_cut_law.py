@@ -182,7 +182,7 @@ def _goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     """A vHub that goes on from a journal closes nothing until it may."""
-    before = HubCore._go_on
+    before = HubCore._resume
 
     def go_on(self: HubCore, past: Past, now_ns: int) -> None:
         before(self, past, now_ns)
@@ -191,7 +191,7 @@ def _does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
             self.handshake.granted_from = 0
             self._enter()
 
-    monkeypatch.setattr(HubCore, "_go_on", go_on)
+    monkeypatch.setattr(HubCore, "_resume", go_on)
 
 
 @pytest.mark.parametrize("plant", [_goes_on, _does_not_wait])

@@ -90,7 +90,7 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
     for other in others:
         code, _, err = house.end(other)
         assert code == 1 and "lost the supervisor, and it has not come back" in err, err
-    assert f"leaves its capture {capture} without an end: the run can go on with it" in err
+    assert f"leaves its capture {capture} unfinished: a restarted vHub can resume it" in err
     assert not open_capture(capture).about.finished
     copy = Path(shutil.copy(capture, house.folder / "copy.mcap"))
     recovered = recover_capture(copy, house.folder / "hub" / "journals")
