@@ -1,4 +1,4 @@
-"""Paces what is released to free-running clients: in realtime at anchor + due, in fast at once and in tick order.
+"""Paces the packets to free-running clients: in realtime at anchor + due, in fast at once and in tick order.
 
 The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the vHub's own clock: the best estimate
 of the wall time of simulated time 0 that late commits do not distort. How late packets leave is counted.
@@ -32,19 +32,19 @@ class Release:
 
 
 class Releases:
-    """What waits to be released, by wall time. `factor` is simulated over wall time; 0 in fast."""
+    """Packets that wait for their release, by wall time. `factor` is simulated over wall time; 0 in fast."""
 
     def __init__(self, tick_ns: int) -> None:
         self.factor = 0.0
         self.paused = False
         self.lateness = Lags()
-        """By how much later than they were due packets left; of this process, and without those of the run's end."""
+        """Lateness of packets, due to sent; of this process, without those of the run's end."""
         self._tick_ns = tick_ns
         self._anchors: deque[tuple[int, int]] = deque()
         self._waiting: list[Release] = []
 
     def set_tempo(self, factor: float, paused: bool) -> None:
-        """Take a new pace: the anchor is learnt anew, and what waited by the old one leaves at once."""
+        """Apply a new pace: packets that wait leave at once, and the anchor is measured anew."""
         if factor != self.factor or paused != self.paused:
             self._anchors.clear()
             self._waiting = [replace(release, at_ns=0, due_ns=None) for release in self._waiting]
@@ -52,7 +52,7 @@ class Releases:
         self.paused = paused
 
     def committed(self, tick: int, now_ns: int) -> None:
-        """Learn from the arrival of a commit."""
+        """Move the anchor by the arrival of a commit."""
         if not self.factor:
             return
         self._anchors.append((now_ns, now_ns - int(tick * self._tick_ns / self.factor)))
@@ -60,7 +60,7 @@ class Releases:
             self._anchors.popleft()
 
     def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
-        """Take what a closed tick releases to a client: never before what it was released earlier."""
+        """Queue the packets of a closed tick for a client, never before earlier ones."""
         at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
         due_ns = None
         if self.factor and self._anchors:
@@ -71,7 +71,7 @@ class Releases:
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:
-        """Take what is due by now, in order; at the end of the run `everything`."""
+        """Remove and return what is due by now, in order; at the end of the run `everything`."""
         due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
         self._waiting = self._waiting[len(due) :]
         for release in due:
@@ -85,7 +85,7 @@ class Releases:
 
     @property
     def waiting_tick(self) -> int | None:
-        """The oldest tick of which something waits."""
+        """The oldest tick with packets that wait."""
         return min((release.tick for release in self._waiting), default=None)
 
     @property

@@ -1,4 +1,4 @@
-"""The vHub's account of itself in heartbeats and in its farewell, as JSON: totals, refusals, a line per link."""
+"""The vHub's statistics in heartbeats and in its farewell, as JSON: totals, refusals, a line per link."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LINKS_TOLD_EVERY: Final = 5
 
 @dataclass(slots=True)
 class ShellStatus:
-    """What the shell adds to the report: path and state of the capture, progress of the disk, the radio address."""
+    """The shell's part of the report: path and state of the capture, progress of the disk, the radio address."""
 
     capture: str = ""
     recording: dict[str, Any] = field(default_factory=dict)
@@ -31,7 +31,7 @@ class ShellStatus:
 
 @dataclass(frozen=True, slots=True)
 class HubStatistics:
-    """The hub's account so far."""
+    """The vHub's statistics up to now."""
 
     closed: int
     offered: int
@@ -44,7 +44,7 @@ class HubStatistics:
 
 
 def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStatistics:
-    """Return the account so far as a frozen value."""
+    """Return the statistics up to now."""
     if state is None:
         return HubStatistics(-1, 0, 0, 0, 0, 0, malformed, repeated)
     p = state.packets
@@ -52,15 +52,15 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
 
 
 class LinksTold:
-    """The lines about links, which several heartbeats share: of hundreds of links they cost as much as a few ticks."""
+    """The lines of links, which several heartbeats share: for hundreds of links they cost as much as a few ticks."""
 
     def __init__(self) -> None:
         self._lines = msgspec.Raw(b"[]")
         self._heartbeats = 0
 
     def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
-        """Return the lines as JSON for one more heartbeat, made anew when it is their turn: of the links with the most
-        traffic, and of those that somebody watches."""
+        """Return the lines as JSON for one more heartbeat, renewed when they are due: the links with the most traffic
+        and those that are watched."""
         if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
             self._lines = msgspec.Raw(encode_json(_links(state, watched)))
         self._heartbeats += 1
@@ -68,7 +68,7 @@ class LinksTold:
 
 
 def report_before(refused: Mapping[str, Any]) -> bytes:
-    """Return the account of a vHub that takes no part yet."""
+    """Return the report of a vHub that has not joined a run yet."""
     return encode_json({"refused": refused})
 
 
@@ -81,7 +81,7 @@ def report(
     lateness: Lags,
     shell: ShellStatus,
 ) -> bytes:
-    """Return the account so far, the addresses of the radio plane and the capture, and the state of the recording.
+    """Return the statistics, the addresses of the radio plane and the capture, and the state of the recording.
 
     `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
     delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
@@ -116,7 +116,7 @@ def report(
 
 
 def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[Any]]:
-    """Return the links that are told, by name."""
+    """Return the lines of the reported links, by name."""
     fabric, now_ns = state.fabric, state.closed * state.tick_ns
     ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
     for name in state.members:

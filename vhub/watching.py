@@ -1,4 +1,4 @@
-"""Keeps the last drops of links and the last readings of channels that a viewer looks at.
+"""Keeps the last drops of links and the last readings of channels that viewers watch.
 
 Nothing is kept of what nobody looks at, and none of it is in the state, the journal or the capture: viewers do not
 change a run.
@@ -25,14 +25,14 @@ DROPS_KEPT: Final = 8
 READINGS_KEPT: Final = 128
 """Of each channel of a robot."""
 REPORT_BYTES_MAX: Final = 96 * 1024
-"""Of drops, of readings, and of events that were asked of the network, in a report: the newest are told."""
+"""Limit of drops, of readings, and of requested network events in a report, which has the newest."""
 _NUMBER_BYTES: Final = 8
 
 Pair = tuple[str, str]
 
 
 class Watching:
-    """What is looked at, and what is kept of it."""
+    """The watched links and channels, with their last drops and readings."""
 
     def __init__(self) -> None:
         self.links: dict[Pair, deque[Flight]] = {}
@@ -41,13 +41,13 @@ class Watching:
         """By robot and channel, the last readings as JSON: the tick and its numbers."""
 
     def take(self, watched: Watched, payload: bytes, now_ns: int) -> None:
-        """From now on keep of these links and readings; what there is of others goes."""
+        """Watch these links and readings; drop what was kept for others."""
         self.links = {pair: self.links.get(pair, deque(maxlen=DROPS_KEPT)) for pair in sorted(watched.links)}
         kept = self.readings
         self.readings = {pair: kept.get(pair, deque(maxlen=READINGS_KEPT)) for pair in sorted(watched.readings)}
 
     def sensed(self, tick: int, packets: Iterable[RobotPacket]) -> None:
-        """Keep what robots sent of the readings that are looked at."""
+        """Keep the robots' packets of watched readings."""
         for packet in packets:
             kept = self.readings.get((packet.robot, packet.channel))
             count, rest = divmod(len(packet.payload), _NUMBER_BYTES)
@@ -55,7 +55,7 @@ class Watching:
                 kept.append(encode_json([tick, struct.unpack(f"<{count}d", packet.payload)]))
 
     def judged(self, flights: Iterable[Flight]) -> None:
-        """Keep the packets that were dropped on the links that are looked at."""
+        """Keep the packets that were dropped on watched links."""
         for flight in flights:
             if flight.cause and flight.cause != IN_FLIGHT:
                 kept = self.links.get((flight.source, flight.destination))
@@ -63,7 +63,7 @@ class Watching:
                     kept.append(flight)
 
     def report(self, state: HubState) -> dict[str, Any]:
-        """Return what is told of it, empty while nobody looks.
+        """Return the report, empty while nothing is watched.
 
         `drops` has for each link, `FROM>TO`, its last packets that were dropped, as rows of a capture without their
         payloads, oldest first; `readings` for each `ROBOT/CHANNEL` its last readings, [tick, [numbers]]; `asked` the

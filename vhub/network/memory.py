@@ -1,6 +1,6 @@
-"""What the stages remember between packets: plain values, part of the hub's state, and so of its journal.
+"""The state of stages between packets: plain values, part of the vHub's state, and so of its journal.
 
-Of each link, of each sender's radio (or port of a wire), and of each air, the channel that radios share.
+There is one for each link, for each sender's radio (or port of a wire), and for each air, a channel shared by radios.
 """
 
 from __future__ import annotations
@@ -11,31 +11,31 @@ from foosim.world.robot_packets import Delivered
 
 
 class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """What a link's stages remember, and its account."""
+    """The state of a link's stages, and its counts."""
 
     last_due_ns: int = -1
     chain: int = 0
-    """The state of its packet-wise model of bursts: 0 good, 1 a burst, and further ones where it has four."""
+    """The state of its Markov chain of bursts: 0 good, 1 a burst, and further ones of a four-state chain."""
     offered: int = 0
     delivered: int = 0
     dropped: int = 0
     delay_ns: int = 0
-    """Sum of (due - sent) of what was delivered, for people."""
+    """Sum of (due - sent) over delivered packets, for statistics."""
     copies: int = 0
-    """Copies that the link made; they are in none of the other counts."""
+    """Duplicates that the link made; no other count includes them."""
     causes: dict[str, int] = {}
-    """How many were dropped by each cause."""
+    """Dropped packets by cause."""
     model: bytes = b""
-    """What a link model of one's own remembers, as msgpack."""
+    """The memory of a custom link model, as msgpack."""
     under_way: list[tuple[int, int, tuple[int, ...]]] = []
-    """Where the link has a capacity: (sequence, copy, who took its place) of what is on its way.
+    """On links with a capacity: (sequence, copy, replaced by) of the packets in flight.
 
     The last is empty, or sequence and copy of another packet and how many were under way when that came.
     """
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A broadcast as the queue and the medium saw it; its receivers share it."""
+    """The result of queue and medium for a broadcast, which its receivers share."""
 
     sequence: int
     copy: int
@@ -50,16 +50,16 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     rate_bps: int = 0
     outcome: str = ""
     is_ready: bool = False
-    """Whether the medium has dealt with it; the queue does before."""
+    """Whether the medium's result is there; the queue comes before it."""
     decided_by: tuple[int, ...] = ()
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A sender's radio, or port of a wire: its queue, when it is free, what its duty cycle counts."""
+    """A sender's radio, or port of a wire: its queue, when it is free, and its airtime in the duty cycle's window."""
 
     free_ns: int = 0
     waiting: list[tuple[int, int]] = []
-    """(departure, bytes) of what has not left yet, in order."""
+    """(departure, bytes) of queued packets, in order."""
     first_above_ns: int = 0
     drop_next_ns: int = 0
     drop_count: int = 0
@@ -67,9 +67,9 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
     sent: list[tuple[int, int, int]] = []
-    """Where a duty cycle limits it: (start, end, airtime) of what it sent; of many, neighbours are taken together."""
+    """With a duty cycle: (start, end, airtime) of its transmissions; neighbours are merged when there are many."""
     sent_ns: int = 0
-    """The airtime of these together."""
+    """The sum of these airtimes."""
     opportunity: int = 0
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
@@ -83,7 +83,7 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """Something on air: from whom, when, from where (m, world frame), with which power (0.01 dBm)."""
+    """A transmission: its sender, times, position (m, world frame) and power (0.01 dBm)."""
 
     source: str
     sequence: int
@@ -91,30 +91,30 @@ class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     start_ns: int
     end_ns: int
     until_ns: int
-    """Until when those who hear it wait: acknowledgements and retries with it."""
+    """Until when stations in range defer: with its acknowledgements and retries."""
     position: tuple[float, float, float]
     power_cdbm: int
     spreading_factor: int = 0
     ready_ns: int = 0
-    """When its packet was the first of its radio's queue."""
+    """When its packet became the first of its radio's queue."""
     turn_ns: int = -1
-    """When its station's turn begins: until then it is put off by who comes in between; -1 where turns are for good."""
+    """When its station's turn begins: earlier transmissions may defer it until then; -1 where turns are final."""
     radio: str = ""
     hears: list[str] = []
-    """Where it can be put off: its sender's radio, and whom the sender hears of those that can be, too."""
+    """Where it can be deferred: its sender's radio, and the stations in range whose turns can be deferred, too."""
 
 
 class AirState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A channel that radios share: what is on air, in the order of sending."""
+    """A channel that radios share: its transmissions, in the order of sending."""
 
     on_air: list[Transmission] = []
 
 
 class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A packet on its way, as it is written down: what a `packet.Flight` is.
+    """A packet in flight, as the snapshot has it: the columns of `packet.Flight`.
 
-    Times are simulated nanoseconds. Levels are hundredths of dB or dBm, so that they compare as integers. What no stage
-    of the link has looked at is 0 or empty.
+    Times are simulated nanoseconds. Levels are hundredths of dB or dBm, so that they compare as integers. Columns
+    that no stage of the link has set are 0 or empty.
     """
 
     source: str
@@ -125,28 +125,28 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     stamp_ns: int
     payload: bytes
     published: bool = False
-    """Whether it goes to all who subscribe; else its sender named the receiver."""
+    """Whether it goes to all subscribers of its channel; else its sender named the receiver."""
     copy: int = 0
-    """1 for a copy that the link made."""
+    """1 for a duplicate that the link made."""
     due_ns: int = 0
     arrival_tick: int = -1
-    """-1 until it is on its way; a packet that is dropped at sending never is."""
+    """-1 until it is in flight, and for a packet that is dropped at sending."""
     cause: str = ""
     rule: str = ""
     words: tuple[int, ...] = ()
     """The draws of the packet, when a stage asked for them: eight 64-bit words."""
     slots: int = 0
-    """Which of them its link uses: bit n for slot n."""
+    """The words that its link uses: bit n for slot n."""
     released_wall_ns: int = 0
     radio: str = ""
     phase_ns: int = 0
-    """By how much later than its tick it came to its radio."""
+    """By how much later than its tick it reached its radio."""
     queue_bytes: int = 0
-    """What waited before it when it came."""
+    """Bytes before it in the queue at its arrival there."""
     queue_ns: int = 0
     access_ns: int = 0
     airtime_ns: int = 0
-    """On air or wire, the last time; what attempts before it took is in `access_ns`."""
+    """On air or wire, of the last attempt; earlier attempts are in `access_ns`."""
     propagation_ns: int = 0
     jitter_ns: int = 0
     distance_mm: int = 0
@@ -154,50 +154,50 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Names of the bodies in the way."""
     walls_cdb: int = 0
     path_loss_cdb: int = 0
-    """With walls, shadowing and fading."""
+    """Including walls, shadowing and fading."""
     shadowing_cdb: int = 0
     fading_cdb: int = 0
     received_cdbm: int = 0
     snr_cdb: int = 0
     interference: int = 0
-    """Power of others on air meanwhile, in units of 1e-21 W."""
+    """Power of concurrent transmissions, in units of 1e-21 W."""
     rate_bps: int = 0
     error_threshold: int = 0
-    """It was lost when its draw for errors was below this: the packet error rate in units of 2^-64."""
+    """The packet error rate in units of 2^-64: it is lost when its draw for errors is below."""
     contenders: int = 0
     retries: int = 0
     is_bad: bool = False
-    """Whether the link was in a bad time."""
+    """Whether the link was in a bad period."""
     bits_flipped: int = 0
     mangled: bytes = b""
-    """The payload as it arrives, where bits are flipped; what was offered stays."""
+    """The payload as it arrives, where bits are flipped; `payload` is the offered one."""
     air_start_ns: int = 0
     air_end_ns: int = 0
-    """When it was on air the last time; others who are on air between may spoil it."""
+    """Start and end of its last attempt on air; overlapping transmissions may destroy it."""
     is_doubled: bool = False
-    """Whether the link makes a copy of it."""
+    """Whether the link duplicates it."""
     is_settled: bool = False
-    """Whether it was acknowledged: nothing that is sent later spoils it."""
+    """Whether it was acknowledged: later transmissions cannot destroy it."""
     by_factor: tuple[int, ...] = ()
-    """Of LoRa: the interference by spreading factor, from 7 on."""
+    """LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
-    """For how long clogs put off its due time."""
+    """The delay of its due time by clogs."""
     put_off_ns: int = 0
-    """For how long others did who had their turn on the air before it, after it was sent."""
+    """The delay by stations that had their turn before it, after it was sent."""
     model_ns: int = 0
-    """What a link model of one's own adds to its delay."""
+    """The delay that a custom link model adds."""
     outcome: str = ""
-    """What the medium found out and the channel says, at sending; empty when it came through."""
+    """The result of medium and channel at sending; empty when it got through."""
     decided_by: tuple[int, ...] = ()
-    """The numbers by which a stage dropped it that it has nowhere else; `to_rows.DECIDING` has their names."""
+    """Further numbers that decided its drop; `rows_of_closing.DECIDING` has their names."""
 
 
 Counts = dict[int, int]
-"""How often each age was seen, in ticks."""
+"""Number of occurrences by age in ticks."""
 
 
 class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A channel that a client hears, or has heard: when its newest packet was sent, and ages at use.
+    """A channel that a client receives, or has received: when its newest packet was sent, and ages at use.
 
     Those up to the last row, and those since.
     """
@@ -205,9 +205,9 @@ class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     source: str
     channel: str
     sent_ns: int
-    """-1 while nothing has come."""
+    """-1 before the first packet."""
     is_heard: bool
-    """Whether it still hears it."""
+    """Whether it still subscribes to it."""
     whole: Counts
     recent: Counts
 
@@ -233,12 +233,12 @@ class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
     arrivals: list[tuple[str, str]] = []
 
     def suits(self, tick: int) -> bool:
-        """Whether it can join at a tick."""
+        """Whether a tick fits its period and offset."""
         return self.period == 0 or bool(self.arrivals) or tick % self.period == self.offset
 
 
 class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that takes part, as it is written down: what a `members.Member` is."""
+    """A client that takes part, as the snapshot has it: the fields of `members.Member`."""
 
     period: int
     subscriptions: tuple[tuple[str, str], ...]
@@ -252,7 +252,7 @@ class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_f
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole state as it is written, field by field as `HubState.snapshot` makes it."""
+    """The whole state, field by field as `HubState.snapshot` encodes it."""
 
     closed: int
     packets: tuple[int, int, int, int, int]

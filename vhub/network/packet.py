@@ -1,7 +1,7 @@
-"""A packet on its way through the pipeline, what became of it, and what led there.
+"""A packet in the pipeline, its fate, and the inputs of its fate.
 
-A flight is made when a packet is offered to one receiver; stages read it and write its due time, or name the one cause
-of its drop, and what they found on the way: the inputs of its fate.
+A flight is made when a packet is offered to one receiver. The stages set its due time, or the one cause of its drop,
+and the values that led to it.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ IN_FLIGHT: Final = "in_flight"
 
 
 class Flight:
-    """One offered packet: from `source` to one receiver. `memory.FlightState` says what its attributes are."""
+    """One offered packet: from `source` to one receiver. `memory.FlightState` describes its attributes."""
 
     __slots__ = FlightState.__struct_fields__
 
-    def __init__(  # noqa: PLR0913, PLR0917  # all that a packet is
+    def __init__(  # noqa: PLR0913, PLR0917  # the columns of an offered packet
         self,
         source: str,
         destination: str,
@@ -60,12 +60,12 @@ class Flight:
 
 
 def state_of(flight: Flight) -> FlightState:
-    """Return a flight as it is written down."""
+    """Return a flight's columns, for the snapshot."""
     return convert(flight, FlightState, from_attributes=True)
 
 
 def flight_of(state: FlightState) -> Flight:
-    """Return the flight that was written down."""
+    """Return the flight of a snapshot's columns."""
     s = state
     flight = Flight(
         s.source, s.destination, s.channel, s.sequence, s.sent_ns, s.stamp_ns, s.payload, s.published, s.copy
@@ -81,12 +81,12 @@ def content_of(flight: Flight) -> bytes:
 
 
 def size_of(flight: Flight) -> int:
-    """Return how many bytes a packet takes in a message at most."""
+    """Return the greatest size of a packet in a message, in bytes."""
     return PACKET_HEAD_BYTES_MAX + len(flight.payload)
 
 
 def size_of_payload(size: int) -> int:
-    """Return how many bytes a packet with so long a payload takes in a message at most."""
+    """Return the greatest size in a message of a packet with a payload of `size` bytes."""
     return PACKET_HEAD_BYTES_MAX + size
 
 
@@ -96,23 +96,23 @@ def level_cdbm(power: int) -> int:
 
 
 def received(flights: Iterable[Flight]) -> list[Received]:
-    """Return flights as a client gets them."""
+    """Return flights as messages contain them."""
     return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
 
 
 order_of: Final = attrgetter("due_ns", "source", "sequence", "copy", "destination")
-"""Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
+"""The order of arrivals at one tick; the receiver distinguishes the copies of a broadcast."""
 
 
 class Packets:
-    """The account over all links: offered = delivered + dropped + in flight, at every tick."""
+    """The counts over all links: offered = delivered + dropped + in flight, at every tick."""
 
     def __init__(
         self, offered: int = 0, delivered: int = 0, dropped: int = 0, refused: int = 0, copies: int = 0
     ) -> None:
         self.offered, self.delivered, self.dropped, self.refused = offered, delivered, dropped, refused
         self.copies = copies
-        """Made by links, on purpose; they are in none of the other counts."""
+        """Duplicates made by links; no other count includes them."""
 
     @property
     def in_flight(self) -> int:

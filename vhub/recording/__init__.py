@@ -1,1 +1,1 @@
-"""How closings become a capture."""
+"""Records closings in a capture."""

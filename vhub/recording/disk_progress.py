@@ -18,7 +18,7 @@ COUNT_NS: Final = 1_000_000_000
 
 
 class DiskProgress:
-    """The disk of one file, which is there."""
+    """The disk of one existing file."""
 
     def __init__(self, path: Path, devices: Path = DEVICES) -> None:
         device = path.stat().st_dev
@@ -27,7 +27,7 @@ class DiskProgress:
         self._count_ns = 0
 
     def look(self, is_syncing: bool, now_ns: int) -> int:
-        """Return a number that changes as long as a call that brings the file to the disk (`is_syncing`) goes on."""
+        """Return a number that changes while a sync of the file (`is_syncing`) makes progress."""
         if not is_syncing:
             return 0
         try:

@@ -1,4 +1,4 @@
-"""Looks after the room that the vHub has to write: of its capture, and of its journal, without which no run goes on.
+"""Watches the disk space of the vHub's capture, and of its journal, without which no run continues.
 
 It says once what gets little, and when the run has to end: while what is left to be written still fits.
 """
@@ -13,7 +13,7 @@ from foosim.vhub.recording.disk_progress import DiskProgress
 from foosim.vhub.recording.writer import CaptureState, CaptureWriter
 
 LOOK_NS: Final = 1_000_000_000
-"""How often the disk of the journal is looked at."""
+"""How often the journal's disk is checked."""
 _STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
 CLOSING: Final = "closing"
 NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
@@ -24,7 +24,7 @@ class RoomWatch:
 
     def __init__(self, capture: CaptureWriter | None, journals: Path, reserve: int) -> None:
         self.ends: tuple[str, str] | None = None
-        """What the run is lost by, and why, when it has to end."""
+        """What has failed, and why, when the run must end."""
         self._capture = capture
         self._journals = journals
         self._reserve = reserve
@@ -34,7 +34,7 @@ class RoomWatch:
         self._disk = None if capture is None else DiskProgress(capture.path)
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
-        """Return what is new for people, as (level, text)."""
+        """Return new log lines as (level, text)."""
         said = []
         while self._capture is not None and self._capture.states:
             said += self._tell(self._capture.states.popleft(), self._capture.stops_world)
@@ -44,7 +44,7 @@ class RoomWatch:
         return said
 
     def _tell(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
-        """Note a state that the capture came to."""
+        """Handle a new state of the capture."""
         before, self._level = self._level, state.level
         if state.level is Level.LOW:
             then = "the run ends" if stops_world else "the run goes on without its capture"
@@ -59,7 +59,7 @@ class RoomWatch:
         try:
             room = room_on_disk(self._journals, self._reserve)
         except OSError:
-            return []  # the next record will tell
+            return []  # the next record shows it
         level, before = room.level, self._journal_level
         self._journal_level = max(level, before)
         if level <= before or before >= Level.FULL:
@@ -70,14 +70,14 @@ class RoomWatch:
         return []
 
     def disk_progress(self, now_ns: int) -> int:
-        """Return a number that changes as long as the disk goes on with the capture that is brought to it."""
+        """Return a number that changes while a sync of the capture makes progress."""
         if self._capture is None or self._disk is None:
             return 0
         return self._disk.look(self._capture.is_syncing, now_ns)
 
     @property
     def recording(self) -> dict[str, Any]:
-        """How the capture does, for the status and the result of the run."""
+        """The state of the recording, for the status and the result of the run."""
         if self._capture is None:
             return NOT_RECORDED
         state, counts = self._capture.state, self._capture.statistics()

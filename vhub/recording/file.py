@@ -1,4 +1,4 @@
-"""The file of a capture: closings, epochs and lines become rows in it, one after the other, in the caller's thread.
+"""The file of a capture: writes closings, epochs and log lines as rows, in the caller's thread.
 
 A new file is never written over an old one. A file that its writer left unfinished is gone on with behind its last
 whole chunk: what it has already is not written again, so a whole journal may be fed to it.
@@ -50,7 +50,7 @@ from foosim.world.frame import Frame
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of the log, on its way to the capture."""
+    """A log line that waits for the capture."""
 
     level: str
     text: str
@@ -62,7 +62,7 @@ Item = Closing | Epoch | Line
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What a capture says of its run beside the rows. `metadata` joins what the deployment tells.
+    """The capture's description of its run, beside the rows. `metadata` is added to that of the deployment.
 
     `versions` are those that the run depended on, None: this process's.
     """
@@ -96,9 +96,9 @@ class CaptureFile:
         self._split = Split(path, capture, self._plan.tick_ns) if capture.is_split else None
         self.is_syncing = False
         self._swap = threading.Lock()
-        """Held while another file takes the place of the one that is written, or this one is brought to the disk."""
+        """Held while the file is replaced by the next one, and while it is synced."""
         self._known: Frame | None = None
-        """The frame of the last closing, written or not."""
+        """The frame of the last closing, written or pending."""
         self._file = -1
         try:
             found = None if journal_tick is None else self._go_on_with_left(journal_tick)
@@ -120,7 +120,7 @@ class CaptureFile:
     # --- writing -----------------------------------------------------------------------------------------------------
 
     def write(self, item: Item) -> bool:
-        """Write the rows of a closing, an epoch or a line; False, and none, when the file has them already."""
+        """Write the rows of a closing, an epoch or a log line; return False without writing when the file has them."""
         if isinstance(item, Line):
             self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
         elif isinstance(item, Epoch):
@@ -137,11 +137,11 @@ class CaptureFile:
         return True
 
     def copy(self, message: Message) -> None:
-        """Add a message that another file of the run has; `done` is the caller's."""
+        """Add a message of another file of the run; `done` is the caller's."""
         self._add(message)
 
     def _has(self, tick: int) -> bool:
-        """Whether the file has what a closing gives; with the last frame, what is in flight comes once more."""
+        """Whether the file has the rows of a closing; the last frame comes again with the packets in flight."""
         done, known = self.done, self._known
         return tick < done.tick or (tick == done.tick and (done.in_flight or known is None or known.tick < tick))
 
@@ -159,14 +159,14 @@ class CaptureFile:
             self._split.wrote(tick)
 
     def _add(self, message: Message) -> None:
-        """Add a message to the chunk; what it brings holds from here on, for files that come."""
+        """Add a message to the chunk, and keep it where the next file must begin with it."""
         stamps = message.log_ns, message.publish_ns, message.sequence
         self.mcap.add_message(self._channels[message.topic], *stamps, message.data)
         if self._split is not None:
             self._split.in_force.take(message)
 
     def _pass(self, frame: Frame) -> None:
-        """Take notice of a frame that the file has."""
+        """Record that the file has a frame."""
         known = self._known
         if known is None or known.layout.digest != frame.layout.digest:
             self._view.turn_to(frame)
@@ -187,12 +187,12 @@ class CaptureFile:
         self._add(Message(topic, at_ns, at_ns, tick & 0xFFFF_FFFF, data))
 
     def end_chunk(self) -> None:
-        """Write what is collected; who is killed from now on does not lose it."""
+        """Write the collected chunk to the file: a kill does not lose it from now on."""
         self.mcap.end_chunk()
         self._saved = replace(self.done)
 
     def room(self) -> Room:
-        """Return how much can still be written, on the disk and of what the capture may be, whichever is less."""
+        """Return the bytes that can still be written: the lesser of the disk's space and the capture's limit."""
         last = self.mcap.summary_bytes
         on_disk = room_on_disk(self._file, self._reserve)
         rooms = [replace(on_disk, left=on_disk.left - last)]
@@ -203,14 +203,14 @@ class CaptureFile:
         return min(rooms, key=lambda room: room.left / room.reserve)
 
     def give_up(self) -> None:
-        """Drop what is collected and cut off what a disk took of it: the file is whole, without an end."""
+        """Drop the collected chunk and truncate a part of it in the file, which is then valid but unfinished."""
         self.mcap.drop_chunk()
         self.done = replace(self._saved)
         os.ftruncate(self._file, self.mcap.offset)
         os.lseek(self._file, self.mcap.offset, os.SEEK_SET)
 
     def finish(self, metadata: Mapping[str, str]) -> None:
-        """Write the last frame, how it ended, and the summary; the file is on the disk then.
+        """Write the last frame, the result, and the summary, and sync the file.
 
         When the disk refuses the end, the file stays whole, without one.
         """
@@ -232,7 +232,7 @@ class CaptureFile:
             raise
 
     def sync(self) -> None:
-        """Bring to the disk what was written."""
+        """Sync the file."""
         with self._swap:
             self.is_syncing = True
             try:
@@ -241,16 +241,16 @@ class CaptureFile:
                 self.is_syncing = False
 
     def close(self) -> None:
-        """Let go of the file, as it is."""
+        """Close the file as it is."""
         os.close(self._file)
 
     @property
     def total_bytes(self) -> int:
-        """How many bytes the capture has, in all its files."""
+        """Size of the capture in bytes, over all its files."""
         return self.mcap.offset + (0 if self._split is None else self._split.earlier_bytes)
 
     def disk_error(self, error: OSError) -> CaptureError:
-        """Return what to tell people of a disk that refuses."""
+        """Return the message for a failed write."""
         path = self.path if self._split is None else self._split.path
         return CaptureError(f"{path}: cannot be written, {error.strerror}")
 
@@ -270,7 +270,7 @@ class CaptureFile:
         return McapWriter(lambda content: write_all(file, content), PROFILE, book, earlier)
 
     def _describe(self, mcap: McapWriter, own: Mapping[str, str]) -> dict[str, int]:
-        """Write what a run depended on beside its inputs, and what is this file's `own`; its digests last.
+        """Write what the run depends on beside its inputs, then the file's `own` metadata; its digests last.
 
         Return the channels of its topics.
         """
@@ -307,13 +307,13 @@ class CaptureFile:
     # --- the next file -----------------------------------------------------------------------------------------------
 
     def begins_next(self, item: Item) -> bool:
-        """Whether the next file begins with an item: `go_on`, and write it then."""
+        """Whether an item begins the next file: call `begin_next`, then write it."""
         if self._split is None or not isinstance(item, Closing) or item.frame.tick <= self.done.tick:
             return False
         return self._split.is_due(item.frame.tick, self.mcap.offset)
 
-    def go_on(self, closing: Closing) -> None:
-        """End this file, and begin the next one, which a closing is to be written to; old files may go.
+    def begin_next(self, closing: Closing) -> None:
+        """End this file, and begin the next one, for a closing; old files may be removed.
 
         Raises OSError, and all is as it was, when the disk refuses.
         """
@@ -335,13 +335,13 @@ class CaptureFile:
         with self._swap:
             os.close(self._file)
             self._file = file
-        gone = split.go_on(closing.frame.tick, self.mcap.offset, mcap.offset)
+        gone = split.begin_next(closing.frame.tick, self.mcap.offset, mcap.offset)
         self.mcap = mcap
         for old in gone:
             old.unlink(missing_ok=True)
 
     def _repeat(self, mcap: McapWriter, frame: Frame) -> None:
-        """Write the first chunk of a file that begins with a frame: what holds there, and a line of the log.
+        """Write the first chunk of a file that begins with a frame: the active state, and a log line.
 
         There is always something in it: who comes from the file before passes the first chunk by.
         """
@@ -359,7 +359,7 @@ class CaptureFile:
     # --- files that were left unfinished -----------------------------------------------------------------------------
 
     def _go_on_with_left(self, journal_tick: int) -> Scanned | None:
-        """Open the last file that was left, and cut it behind what is whole; None when it has to be begun anew.
+        """Open the last unfinished file, and truncate it after its last valid chunk; None when it must be begun anew.
 
         A file without a tick, which is not the only one, is dropped: it comes again behind the one before.
         """

@@ -1,4 +1,4 @@
-"""A new, valid capture of one that an unclean end left: its whole chunks, and what the vHub's journal has.
+"""Makes a new, valid capture from an unfinished one: its valid chunks, and the records of the vHub's journal.
 
 The vHub writes its journal before its capture, so the journal has what the capture lacks: the ticks, frames, packets
 and fates behind the last chunk, and what was in flight. What only a clock or a person knew is not in it: fields that
@@ -41,7 +41,7 @@ UNCLEAN: Final = "unclean end"
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What a recovery found and made: `path` from `source`. `tick` is the last tick, -1 when there is none.
+    """The result of a recovery: `path` from `source`. `tick` is the last tick, -1 when there is none.
 
     `torn_bytes` stand in `source` behind its last whole chunk; `added_ticks` came from the journal; `problem` says what
     `source` lacks that no journal told.
@@ -56,7 +56,7 @@ class Recovered:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all that was recorded is there again: the journal had what the file lacked."""
+        """Whether nothing recorded is missing: the journal had the rows that the file lacked."""
         return not self.problem
 
     def __str__(self) -> str:
@@ -67,12 +67,12 @@ class Recovered:
 
 
 def recovered_path(path: Path) -> Path:
-    """Return where a capture is recovered to when nothing else is said: `run.recovered.mcap` for `run.mcap`."""
+    """Return the default path of a recovered capture: `run.recovered.mcap` for `run.mcap`."""
     return path.with_name(f"{path.stem}.recovered{path.suffix}")
 
 
 def recover_capture(path: Path, journals: Path | None = None, out: Path | None = None) -> Recovered | None:
-    """Make a valid capture of an unfinished one, in a new file; None when it has its end already.
+    """Make a valid capture of an unfinished one, in a new file; None when it is finished.
 
     Of a capture that is split all files become one, whichever is named. `journals` is the folder of the vHub's journal,
     which stays, as the capture does. Raises CaptureError when the file is no capture, when `out` (None:
@@ -92,7 +92,7 @@ def recover_capture(path: Path, journals: Path | None = None, out: Path | None =
 
 
 def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
-    """Write the new file; it gets its name when it is on the disk."""
+    """Write the new file; it is renamed to its path after its sync."""
     check_new(out)
     part = out.with_name(f".{out.name}.part")
     with suppress(OSError):
@@ -137,7 +137,7 @@ _ONE_FILE: Final = {"split_bytes": None, "split_ns": None}
 
 
 def _copy(path: Path, file: CaptureFile) -> tuple[int, str]:
-    """Copy what is whole; return how many bytes behind it are cut, and what is damaged, empty where nothing is."""
+    """Copy the valid chunks; return the number of bytes cut after them, and the damage, empty where there is none."""
     scan, last, damage = Scan(path), dict[str, bytes](), ""
     try:
         for message in scan.messages():
@@ -152,7 +152,7 @@ def _copy(path: Path, file: CaptureFile) -> tuple[int, str]:
 
 
 class _Completion:
-    """What a journal has for a capture. `first_tick` is where it starts, `problem` what is wrong with it."""
+    """A journal's part of a capture. `first_tick` is its first tick, `problem` why it cannot be used."""
 
     def __init__(self, deployment: Deployment, run: str, records: Iterable[bytes]) -> None:
         self.problem = ""
@@ -171,7 +171,7 @@ class _Completion:
             self.problem = f"its journal cannot be used: {error}" if is_there else "there is no journal of it"
 
     def write(self, file: CaptureFile) -> None:
-        """Write what the file lacks, and what was in flight at the end."""
+        """Write the rows that the file lacks, and the packets in flight at the end."""
         if not self.problem and self.first_tick > file.done.tick + 1:
             self.problem = f"its journal starts at tick {self.first_tick} only"
         if self.problem:

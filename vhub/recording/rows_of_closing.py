@@ -1,7 +1,6 @@
-"""How a closing becomes the rows of a capture, and how those of packets become messages in its file.
+"""The rows of a closing, and the messages of its packets in the capture's file.
 
-All rows are pure functions of closings, so what the writer missed can be made again from a fold of the journal
-(`records.fold`).
+All rows are pure functions of closings, so missing ones can be made again by a fold of the journal (`records.fold`).
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ Entry = tuple[str, int, int, int, Row]
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What decides how a closing becomes rows: a function of the deployment."""
+    """The deployment's settings for rows."""
 
     tick_ns: int
     frames_every: int
@@ -77,7 +76,7 @@ def plan_of(deployment: Deployment) -> Plan:
 
 
 def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    """Return the rows of one closing but for those of packets (`packet_entry`), which are written behind them.
+    """Return the rows of one closing, except those of packets (`packet_entry`), which are written after them.
 
     `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
     known already: then its packets alone are new.
@@ -98,7 +97,7 @@ def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]
 
 
 def _age_entry(age: Age, tick_ns: int) -> Entry:
-    """Return the row of ages at use, at the last tick that it tells of."""
+    """Return the row of ages at use, at the last tick that it covers."""
     ages = sorted(age.counts)
     p50, p99 = quantile(age.counts, 0.5), quantile(age.counts, 0.99)
     counts = [age.counts[ticks] for ticks in ages]
@@ -136,7 +135,7 @@ DECIDING: Final[dict[str, tuple[str, ...]]] = {
     EVICTED: ("evicted_by", "evicted_by_copy", "under_way"),
     RECEIVER_FULL: ("room_left", "room_share"),
 }
-"""The fields of a row for what a flight was dropped by, `decided_by`, by cause."""
+"""By cause of a drop, the fields of a row for the numbers of `Flight.decided_by`."""
 _FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
 _LOSS: Final = int(Slot.LOSS)
 _JITTER: Final = int(Slot.JITTER)
@@ -190,7 +189,7 @@ def packet_row(flight: Flight) -> PacketRow:
 
 
 def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
-    """Return the row of a packet with what it was dropped by, where there is more to say than its cause."""
+    """Return the row with the numbers that decided the packet's drop, where its cause has some."""
     cause, by_factor = flight.cause, flight.by_factor
     found: dict[str, Any] = dict(zip(DECIDING.get(cause, ()), flight.decided_by, strict=False))
     if by_factor:
@@ -201,7 +200,7 @@ def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
 
 
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
-    """Return what the stages of a radio found, in the order of a row."""
+    """Return the results of a radio's stages, in the order of a row."""
     threshold, walls = flight.error_threshold, flight.walls
     interference = flight.interference if flight.interference < DEAF else 0
     return (
@@ -222,7 +221,7 @@ def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
 
 
 def _collision_of(flight: Flight) -> str:
-    """Return what a packet collided with: the medium says so itself, of the rest the channel does."""
+    """Return the kind of a packet's collision: that of the medium, or of the channel."""
     if flight.outcome == COLLISION:
         return "contention"
     return "half_duplex" if flight.interference >= DEAF else "interference"
@@ -252,7 +251,7 @@ def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
 
 
 def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
-    """Return the row of a loss or return, at the tick behind which it was."""
+    """Return the row of a loss or return, at the last tick before it."""
     at_ns = entry.tick * plan.tick_ns
     row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
     return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row

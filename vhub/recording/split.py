@@ -1,4 +1,4 @@
-"""When a capture goes on in another file, what that one begins with, and which old files are let go.
+"""Decides when a capture continues in a new file, what that file begins with, and which old files are removed.
 
 A file begins with a captured frame that would be there anyway, so all rows of all files are those of one that is not
 split.
@@ -26,7 +26,7 @@ class _File:
 
 
 class Split:
-    """The files of one capture, of which the last is written."""
+    """The files of one capture; the last is being written."""
 
     def __init__(self, path: Path, capture: Capture, tick_ns: int) -> None:
         self.number = 0
@@ -38,20 +38,20 @@ class Split:
         self._first_tick = -1
         self._described_bytes = 0
         self._earlier: list[_File] = []
-        """Those that are there, in their order."""
+        """The existing files, in order."""
 
     @property
     def path(self) -> Path:
-        """The file that is written."""
+        """The file that is being written."""
         return part_path(self._path, self.number)
 
     @property
     def earlier_bytes(self) -> int:
-        """How many bytes the files before have."""
+        """Size of the files before it, in bytes."""
         return sum(file.bytes for file in self._earlier)
 
     def take_over(self, number: int, described_bytes: int, *, is_empty: bool) -> None:
-        """Go on with the file of this number; `is_empty`: it has no tick. Raises CaptureError for one that is none."""
+        """Resume with the file of this number; `is_empty`: it has no tick. Raises CaptureError for an invalid file."""
         self.number, self._described_bytes = number, described_bytes
         for known, path in parts_at(self._path).items():
             if known > number:
@@ -67,16 +67,16 @@ class Split:
                 self._first_tick = -1 if is_empty else first_tick
 
     def begin(self, number: int, described_bytes: int) -> None:
-        """Note that a file is begun, which is so long before its first row."""
+        """Record that a file is begun, with its length before the first row."""
         self.number, self._described_bytes, self._first_tick = number, described_bytes, -1
 
     def wrote(self, tick: int) -> None:
-        """Note that a closing is written."""
+        """Record that a closing is written."""
         if self._first_tick < 0:
             self._first_tick = tick
 
     def is_due(self, tick: int, size: int) -> bool:
-        """Whether the file that is written, of so many bytes, ends before a tick.
+        """Whether the present file, with its size in bytes, ends before a tick.
 
         It is never as short as what describes it.
         """
@@ -86,7 +86,7 @@ class Split:
         return is_long or (self._bytes_max is not None and size >= max(self._bytes_max, 2 * self._described_bytes))
 
     def entries(self, closing: Closing | None = None) -> dict[str, str]:
-        """Return what the first file says of itself beside the rest; or the next one, which begins with a closing."""
+        """Return the own metadata of the first file, or of the next one, which begins with a closing."""
         own = {} if self._last_ns is None else {LAST: format_ns(self._last_ns)}
         if closing is None:
             return {**own, PART: "0"}
@@ -95,8 +95,8 @@ class Split:
         digest, chain = closing.digest.hex(), closing.chain.hex()
         return {**own, CUT_TICK: str(closing.frame.tick), CUT_DIGEST: digest, CUT_CHAIN: chain}
 
-    def go_on(self, tick: int, size: int, described_bytes: int) -> list[Path]:
-        """Note that the next file is begun at a tick, the one before having so many bytes; return what is let go.
+    def begin_next(self, tick: int, size: int, described_bytes: int) -> list[Path]:
+        """Record that the next file begins at a tick, and the size of the one before; return the files to remove.
 
         Of the files before stays what has something of the last `capture.last`.
         """

@@ -1,4 +1,4 @@
-"""What a writer that ended uncleanly left of a capture's file: how far it is, and where to go on with it."""
+"""Reads an unfinished capture's file: how far it is, and where a writer resumes it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Progress:
     frame: int = -1
     epoch: int = -1
     in_flight: bool = False
-    """Whether what was in flight at the end of the run is written."""
+    """Whether the packets in flight at the end of the run are written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """One file that was left: what it holds, how far it is, and where it is cut to go on (`book.offset`)."""
+    """An unfinished file: its contents, how far it is, and where it is truncated to resume (`book.offset`)."""
 
     path: Path
     found: Scanned
@@ -41,7 +41,7 @@ class Left:
 
 
 def look(file: int, path: Path) -> Left:
-    """Return what an open file holds. Raises CaptureError for one that has its end and does not go on elsewhere."""
+    """Read an open file. Raises CaptureError for a finished file without a next one."""
     size = os.fstat(file).st_size
     found, done = Scanned(Book(), size), Progress()
     if size:
@@ -52,17 +52,17 @@ def look(file: int, path: Path) -> Left:
     if found.finished:
         if NEXT not in found.metadata.get(END_METADATA, {}):
             raise CaptureError(f"{path}: is finished; a capture is never overwritten")
-        found.book.offset, torn_bytes = found.book.metadata.pop().offset, 0  # it goes on here instead
+        found.book.offset, torn_bytes = found.book.metadata.pop().offset, 0  # resumed here instead of in the next file
     return Left(path, found, done, torn_bytes)
 
 
 def run_of(left: Left) -> str | None:
-    """Return the run that a file is of; None where it does not say."""
+    """Return the run of a file; None where its metadata has none."""
     return left.found.metadata.get(METADATA, {}).get("run")
 
 
 def progress(last: Callable[[str], bytes]) -> Progress:
-    """Return how far a file is, by the last row of each topic, empty where there is none."""
+    """Return how far a file is, by the last row of each topic, which is empty where there is none."""
     in_flight = _row(last(PACKETS)).get("fate") == IN_FLIGHT
     return Progress(
         _number(last(TICK), "tick"), _number(last(FRAME), "tick"), _number(last(EPOCHS), "epoch"), in_flight

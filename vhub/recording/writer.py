@@ -1,4 +1,4 @@
-"""The writer of a capture: a thread that turns closings into rows behind the journal, and never loses one silently.
+"""The writer of a capture: a thread that writes the rows of journalled closings, and never loses one silently.
 
 `keep` hands a closing over and returns; when the writer lags by more than the queue holds, `keep` waits, which slows
 the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second by a thread of
@@ -28,17 +28,17 @@ from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Captured
 
 GATHER_S: Final = 0.02
-"""How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""
+"""How long the writer collects closings: it wakes once for several, and takes the interpreter's lock less often."""
 BATCH_ROWS: Final = 2_000
-"""How many rows are written between two looks at the clock."""
+"""Rows between two readings of the clock."""
 SYNC_NS: Final = 1_000_000_000
 WAIT_S: Final = 0.1
-"""How often whoever waits for a full queue is told so."""
+"""Interval of the calls of `while_waiting`."""
 
 
 @dataclass(frozen=True, slots=True)
 class CaptureStatistics:
-    """How far a capture is: what is written, what waits, and how often the run had to wait for it.
+    """Progress of a capture: rows written and pending, and how often the run had to wait for it.
 
     `offered` counts what was handed over: ticks, packets, epochs and lines of the log. All of it is in the file
     (`written`), or not (`refused`), or on its way.
@@ -56,14 +56,14 @@ class CaptureStatistics:
 
 @dataclass(frozen=True, slots=True)
 class CaptureState:
-    """How a capture does. At FULL it is to be ended while the rest still fits; at OUT it has its end, and refuses."""
+    """State of a capture. At FULL it must end while the rest still fits; at OUT it is finished, and refuses rows."""
 
     level: Level = Level.FINE
     text: str = ""
 
 
 class CaptureWriter:
-    """Writes one capture. `metadata` (texts: run, fingerprint, ...) joins what the deployment tells.
+    """Writes one capture. `metadata` (texts: run, fingerprint, ...) is added to that of the deployment.
 
     Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
     a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
@@ -86,33 +86,33 @@ class CaptureWriter:
         self._flush_ns = deployment.capture.flush_ns
         self.state = CaptureState()
         self.states: deque[CaptureState] = deque()
-        """Each state that it came to, in order, for one reader, who takes them out: the thread may be two further when
-        it is looked at."""
+        """The states in order, for one reader, which removes them: the thread may change state more than once between
+        two readings."""
         self.stops_world = deployment.capture.on_full == "stop_world"
         self._offered = self._written = self._refused = self._pending = self._passed = 0
-        """Rows by what became of them; pending ones are in the chunk that is being collected, passed
-        ones were in the file that is gone on with."""
+        """Rows by their end; pending ones are in the chunk that is being collected, passed ones were in the resumed
+        file."""
         self._error: BaseException | None = None
         self._queue: deque[Item] = deque()
         self._queued_rows = self._waits = 0
         self._is_over = False
-        """Whether nothing comes any more."""
+        """Whether the queue accepts no more items."""
         self._ending: Mapping[str, str] | None = None
-        """How it ended, where the file gets an end."""
+        """The result of the run, where the file is to be finished."""
         self._idle = False
-        """Whether the thread waits to be told of the next row."""
+        """Whether the thread waits for a notification of the next row."""
         self._changed = threading.Condition()
-        """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
+        """Guards the queue, the error and the ends; notified when they change."""
         described = Described(deployment, deployment_name, deployment_text, metadata)
         self._file = CaptureFile(path, described, journal_tick)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
-        """How far the file was that is gone on with."""
+        """How far the resumed file was."""
         self.has_ended = False
-        """Whether nothing is written any more."""
+        """Whether the thread has ended."""
         self.on_end: Callable[[], None] = lambda: None
-        """Called then, in the thread that wrote."""
+        """Called at the end of the thread, in it."""
         self.while_waiting: Callable[[], None] = lambda: None
-        """Called again and again while `keep` or `log` waits, in the thread that does."""
+        """Called repeatedly while `keep` or `log` waits, in the caller's thread."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
         self._syncer = _Syncer(self._file)
         self._thread.start()
@@ -120,21 +120,21 @@ class CaptureWriter:
     # --- what the owner calls ----------------------------------------------------------------------------------------
 
     def keep(self, item: Closing | Epoch) -> None:
-        """Hand over what one closing gave, or an epoch that begins; wait while the queue is full."""
+        """Queue a closing, or an epoch that begins; wait while the queue is full."""
         self._put(item)
 
     def log(self, level: str, text: str, tick: int) -> None:
-        """Hand over a line of the run's log; `level` is info, warning or error."""
+        """Queue a log line of the run; `level` is info, warning or error."""
         self._put(Line(level, text, tick))
 
     def finish(self, metadata: Mapping[str, str] | None = None) -> None:
-        """Write what waits, the last frame and the summary; a second call does nothing. `metadata`: how it ended."""
+        """Write the queue, the last frame and the summary; a second call does nothing. `metadata`: the result."""
         self.begin_finish(metadata)
         self._end()
         self._raise_error()
 
     def begin_finish(self, metadata: Mapping[str, str] | None = None) -> None:
-        """Begin what `finish` does, and return at once."""
+        """Begin to finish, as `finish` does, and return at once."""
         with self._changed:
             if not self._is_over:
                 self._ending = {} if metadata is None else dict(metadata)
@@ -143,16 +143,16 @@ class CaptureWriter:
 
     @property
     def is_closing(self) -> bool:
-        """Whether nothing comes any more, and what came is still being written."""
+        """Whether the queue is closed and its items are still being written."""
         return self._is_over and not self.has_ended
 
     @property
     def is_syncing(self) -> bool:
-        """Whether a call of the system brings the file to the disk at this moment."""
+        """Whether a sync of the file is under way."""
         return self._file.is_syncing
 
     def leave(self) -> None:
-        """Write what waits and let go of the file without an end: whoever has its journal can go on with it.
+        """Write the queue and close the file unfinished: a vHub with its journal can resume it.
 
         A second call does nothing. It raises nothing, since it comes behind what is wrong.
         """
@@ -166,7 +166,7 @@ class CaptureWriter:
 
     @property
     def synced_tick(self) -> int:
-        """The last tick whose rows no power failure takes away; the journal is done with those before."""
+        """The last tick whose rows are synced; the journal may drop records up to it."""
         return self._syncer.tick
 
     def statistics(self) -> CaptureStatistics:
@@ -187,7 +187,7 @@ class CaptureWriter:
         self._raise_error()
 
     def _takes(self, item: Item, rows: int) -> bool:
-        """Queue an item, which may take a wait; return False when it took too long."""
+        """Queue an item, waiting for space; return False after the timeout."""
         with self._changed:
             if self._is_full(rows) and self._error is None:
                 self._changed.wait(WAIT_S)
@@ -202,7 +202,7 @@ class CaptureWriter:
             return True
 
     def _is_full(self, rows: int) -> bool:
-        """A single closing larger than the queue goes in alone."""
+        """Whether an item fits; a single closing larger than the queue is accepted alone."""
         return self._queued_rows > 0 and self._queued_rows + rows > limits.CAPTURE_QUEUE_ROWS_MAX
 
     def _raise_error(self) -> None:
@@ -214,7 +214,7 @@ class CaptureWriter:
     def _run(self) -> None:
         try:
             self._write_all()
-        except BaseException as error:  # noqa: BLE001  # raised again by what the owner calls next
+        except BaseException as error:  # noqa: BLE001  # raised again by the owner's next call
             with self._changed:
                 self._error = error
                 self._changed.notify_all()
@@ -225,7 +225,7 @@ class CaptureWriter:
             self.on_end()
 
     def _write_all(self) -> None:
-        interval_ns = self._flush_ns * 3 // 4  # sooner than asked, by what gathering and a batch take
+        interval_ns = self._flush_ns * 3 // 4  # earlier, by the time of collecting and of a batch
         flush_at_ns = sync_at_ns = time.monotonic_ns()
         ending = False
         while not ending:
@@ -246,7 +246,7 @@ class CaptureWriter:
             self._finish(self._ending)
 
     def _flush(self) -> None:
-        """Write what is collected, and look how much room is left."""
+        """Write the collected chunk, and check the space that is left."""
         if self.state.level is Level.OUT:
             return
         try:
@@ -269,7 +269,7 @@ class CaptureWriter:
         self._syncer.written(self._file.done.tick)
 
     def _give_up(self, text: str) -> None:
-        """End the file in order, as far as the disk takes it; what comes from now on is refused."""
+        """Finish the file, as far as the disk allows; later items are refused."""
         self._file.give_up()
         self._refused += self._pending
         self._pending = 0
@@ -298,7 +298,7 @@ class CaptureWriter:
             self._give_up(str(self._file.disk_error(error)))
 
     def _take(self, until_ns: int | None) -> tuple[list[Item], bool]:
-        """Take a batch of what has gathered, after a wait for anything, or until something is to be flushed.
+        """Remove and return a batch, after a wait for items or until a flush is due.
 
         Also return whether nothing comes after it.
         """
@@ -325,7 +325,7 @@ class CaptureWriter:
 
     def _write_item(self, item: Item) -> None:
         if isinstance(item, Closing) and self._file.begins_next(item):
-            self._go_on(item)
+            self._begin_next(item)
         if self.state.level is Level.OUT:
             self._refused += _rows_in(item)
         elif self._file.write(item):
@@ -333,25 +333,25 @@ class CaptureWriter:
         else:
             self._passed += _rows_in(item)
 
-    def _go_on(self, closing: Closing) -> None:
-        """Begin the next file with a closing, when all before it is written."""
+    def _begin_next(self, closing: Closing) -> None:
+        """Begin the next file with a closing, when all earlier items are written."""
         self._flush()
         try:
             if self.state.level is not Level.OUT:
-                self._file.go_on(closing)
+                self._file.begin_next(closing)
                 self._syncer.tick = self._file.done.tick
         except OSError as error:
             self._give_up(str(self._file.disk_error(error)))
 
 
 class _Syncer:
-    """Brings a file to the disk in a thread of its own, so that a slow disk holds up no flush."""
+    """Syncs a file in a thread of its own, so that a slow disk delays no flush."""
 
     def __init__(self, file: CaptureFile) -> None:
         self.tick = -1
-        """The last tick that is on the disk."""
+        """The last synced tick."""
         self.lags = False
-        """Whether something was written since it was asked last."""
+        """Whether rows were written since the last request."""
         self.error: OSError | None = None
         self._file = file
         self._written = -1
@@ -360,17 +360,17 @@ class _Syncer:
         self._thread.start()
 
     def written(self, tick: int) -> None:
-        """Note that everything up to a tick is written."""
+        """Record that everything up to a tick is written."""
         self._written = tick
         self.lags = True
 
     def ask(self) -> None:
-        """Have what is written brought to the disk; return at once."""
+        """Request a sync; return at once."""
         self.lags = False
         self._asked.put(self._written)
 
     def end(self) -> None:
-        """Wait for what was asked, and end; a second call does nothing."""
+        """Wait for requested syncs, and end the thread; a second call does nothing."""
         self._asked.put(None)
         self._thread.join()
 

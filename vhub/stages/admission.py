@@ -1,4 +1,4 @@
-"""Admission: what is too long for the link, or comes from a body that is out of service, is not sent.
+"""Admission: drops packets that are too long for the link, and those of a sender that is out of service.
 
 By radio or by wire: who is on board of a body that is out of service has no power. Links are made anew when a body goes
 out of service (`Fabric.turn_to`), so that the others need not ask.
@@ -18,7 +18,7 @@ NO_ROUTE: Final = "no_route"
 
 
 class Admit(Stage):
-    """Knows the longest payload, and whether the sender's body works in the newest frame."""
+    """Compares payloads with the longest one, and checks the sender's body in the newest frame."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._longest = setup.settings.payload_max

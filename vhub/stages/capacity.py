@@ -1,4 +1,4 @@
-"""Capacity: how many packets are on their way on a link at once; one more takes the place of a random one.
+"""Capacity: bounds the packets in flight on a link; a further one replaces a random one.
 
 That is how TigerBeetle's simulator bounds a path (src/testing/packet_simulator.zig). Who is evicted is drawn by the
 packet that comes, known at once, and said at arrival.
@@ -15,11 +15,11 @@ from foosim.vhub.stages.stage import Stage
 
 EVICTED: Final = "evicted"
 CAPACITY_BLOCK: Final = 3
-"""The block of a packet's draws of which the first word says whose place it takes."""
+"""The block of a packet's draws whose first word selects the packet that is replaced."""
 
 
 class Capacity(Stage):
-    """Knows what is on its way on a link."""
+    """Keeps the packets in flight on a link."""
 
     def __init__(self, setup: LinkSetup, most: int) -> None:
         self._setup, self._most = setup, most
@@ -48,5 +48,5 @@ class Capacity(Stage):
 
 
 def leave(memory: LinkState, flight: Flight) -> None:
-    """A packet has arrived, or was dropped at arrival: it is not on its way any more."""
+    """Remove a packet that has arrived, or was dropped at arrival."""
     memory.under_way = [one for one in memory.under_way if one[0] != flight.sequence or one[1] != flight.copy]

@@ -18,7 +18,7 @@ from foosim.vhub.stages.stage import Stage
 
 
 class Channel(Stage):
-    """Judges one link's signals."""
+    """Decides the signals of one link."""
 
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None
@@ -46,7 +46,7 @@ class Channel(Stage):
         return self._judge(flight) if flight.interference and not flight.is_settled else ""
 
     def _judge(self, flight: Flight) -> str:
-        """Return why the signal is lost, with all that is known of others by now."""
+        """Return why the signal is lost, given the transmissions so far; empty when it is received."""
         if flight.interference >= DEAF:
             return COLLISION
         if self._factor:

@@ -1,4 +1,4 @@
-"""Mangling: bit errors that nothing corrects, and copies.
+"""Corruption: bit errors that no code corrects, and duplicated packets.
 
 The number of flipped bits is binomial, at least 1 in a packet with errors; their places come from further blocks of
 the packet's own draws, so that a replay flips the same bits.
@@ -17,7 +17,7 @@ from foosim.vhub.stages.stage import Stage
 
 CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
-"""From here on the blocks of a packet's draws say which bits are flipped."""
+"""The blocks of a packet's draws from here on select the flipped bits."""
 SIZES_KEPT: Final = 1024
 MEAN_SMALL: Final = 400.0
 DEVIATIONS: Final = 12.0
@@ -25,7 +25,7 @@ DEVIATIONS: Final = 12.0
 
 
 class Mangle(Stage):
-    """Flips bits of a packet, or loses it for them; says whether it comes twice."""
+    """Flips bits of a packet, or drops it for them; decides whether it is duplicated."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._setup = setup
@@ -76,7 +76,7 @@ class Mangle(Stage):
         flight.mangled, flight.bits_flipped = bytes(payload), count
 
     def _count(self, word: int, bits: int) -> int:
-        """Return how many of the bits are flipped, given that the draw says that some are: the binomial law."""
+        """Return the number of flipped bits, given that it is not 0: the binomial law."""
         rate = self._error_rate
         odds = rate / (1.0 - rate)
         count = self._least(bits)

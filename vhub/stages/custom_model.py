@@ -1,4 +1,4 @@
-"""A link model of one's own: what a package decides of a packet that the stages before let through.
+"""Custom link model: a user's code decides packets that have passed the stages before.
 
 It is given the world of the newest frame, the packet's own draws and what it has left as memory; what it says is
 checked. A model that breaks its word, or raises, is a failure of the run: the packet is lost (`model_failed`), and the
@@ -24,16 +24,16 @@ from foosim.vhub.stages.stage import Stage
 MODEL: Final = "model"
 MODEL_FAILED: Final = "model_failed"
 MODEL_BLOCK: Final = 2
-"""The block of a packet's draws that a link model has; never another's."""
+"""The block of a packet's draws for its link model, which no other stage uses."""
 EXTRA_NS_MAX: Final = 60_000_000_000
 SHOWN_MAX: Final = 300
-"""Characters of what a model raises that are told."""
+"""Characters of a model's exception that are reported."""
 DEPTH_MAX: Final = 16
 """Of lists and dicts in a memory."""
 
 
 class Own(Stage):
-    """Asks the model of one link."""
+    """Calls the model of one link."""
 
     def __init__(self, setup: LinkSetup, model: LinkModel) -> None:
         self._setup, self._model = setup, model
@@ -54,7 +54,7 @@ class Own(Stage):
             judged = self._model.judge(self._passage(flight), msgpack.decode(memory.model) if memory.model else None)
             problem = problem_of(judged)
             kept = b"" if problem else _kept(judged.memory)
-        except Exception as error:  # noqa: BLE001  # of somebody else's code
+        except Exception as error:  # noqa: BLE001  # raised by a user's code
             problem = f"{type(error).__name__}: {show(str(error), SHOWN_MAX)}"
         if problem:
             self._tell(flight, problem)
@@ -89,7 +89,7 @@ class Own(Stage):
         return End(endpoint, world.antenna(endpoint, self._mount), world.velocity(endpoint))
 
     def _tell(self, flight: Flight, problem: str) -> None:
-        """Have the run end, for the first failure: a run whose network is not what was asked for is none."""
+        """End the run at the first failure: its network would not be the requested one."""
         model, faults = self._setup.settings.model, self._setup.faults
         if model is not None and not faults:
             packet = f"{flight.source}:{flight.sequence}:{flight.destination}" + (":1" if flight.copy else "")
@@ -98,7 +98,7 @@ class Own(Stage):
 
 
 def problem_of(said: object) -> str:
-    """Return what is wrong with what a model says; empty for nothing."""
+    """Return what is wrong with a model's answer; empty for a valid one."""
     if not isinstance(said, Judged):
         return f"it returns {type(said).__name__}, not Judged"
     answer: tuple[Any, ...] = said  # a tuple holds whatever it was made with
@@ -111,7 +111,7 @@ def problem_of(said: object) -> str:
 
 
 def _unplain(value: Any, depth: int) -> str:
-    """Return what in a memory is no plain value: only such come back from a journal as they were."""
+    """Return the first part of a memory that is no plain value: a journal restores only these unchanged."""
     if isinstance(value, int):
         return "" if -(2**63) <= value < 2**64 else "memory has a whole number of more than 64 bits"
     if value is None or isinstance(value, str):

@@ -38,7 +38,7 @@ class Delay(Stage):
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Delay | None:
-        """Return the stage, or None where nothing takes time, or ever has: such a link is fifo by itself."""
+        """Return the stage, or None where no delay applies or has applied: such a link is in order anyway."""
         settings = setup.settings
         timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
@@ -71,12 +71,12 @@ class Delay(Stage):
         return ""
 
     def plan(self, flight: Flight) -> None:
-        """Have a packet come later where its turn on the air is put off."""
+        """Delay a packet whose turn on the air is deferred."""
         if self._air is not None and self._budget is not None:
             self._air.plan(flight, self._budget.propagation, self.put_off)
 
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
-        """Have a packet come so much later; `last_ns` are the due times of those before it that were put off, by link.
+        """Delay a packet; `last_ns` are the due times of the deferred ones before it, by link.
 
         It is called in the order of sending, also of those behind them that are not.
         """
@@ -96,7 +96,7 @@ class Delay(Stage):
             flight.held_ns = due_ns - free_ns
 
     def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
-        """Give packets on their way, in the order of sending, the due times that the present clogs leave them.
+        """Set the due times of packets in flight, in the order of sending, by the present clogs.
 
         Each comes with whether those behind it overtake it. What is due already, and waits for its receiver, stays.
         """
@@ -113,11 +113,11 @@ class Delay(Stage):
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
 
     def is_late(self, flight: Flight) -> bool:
-        """Whether those behind a packet that was sent by these settings overtake it."""
+        """Whether later packets may overtake a packet that was sent with these settings."""
         return self._extra_ns > 0 and flight.words[Slot.REORDER] < self._reordered
 
     def _held_ns(self, due_ns: int) -> int:
-        """Return when what would be due now is, for clogs."""
+        """Return the due time under clogs of a packet that would be due now."""
         for start_ns, end_ns in self._holds:
             if start_ns <= due_ns < end_ns:
                 due_ns = end_ns
@@ -128,7 +128,7 @@ class Delay(Stage):
 
 
 class Behind(Delay):
-    """Nothing takes time any more: what is sent comes behind what was sent when something did, and else at once."""
+    """The stage of a link without delays that had some: packets arrive after earlier ones, otherwise at once."""
 
     def at_sending(self, flight: Flight) -> str:
         memory, due_ns = self._memory, flight.sent_ns

@@ -1,4 +1,4 @@
-"""Duty cycle: how much of the time a radio may send, by law; a window of time that slides.
+"""Duty cycle: the share of time that a radio may send, by regulation, over a sliding window.
 
 In no window of the given length, wherever it begins, is the radio on air for more than its share; of what is on air at
 the window's edge the part within counts. Source: ETSI EN 300 220-1, where the duty cycle is the time on air in an
@@ -18,23 +18,23 @@ from foosim.vhub.stages.stage import Stage
 
 DUTY_CYCLE: Final = "duty_cycle"
 RUNS_MAX: Final = 1_024
-"""As many transmissions are remembered one by one; of more, neighbours are taken together."""
+"""Number of transmissions that are remembered singly; of more, neighbours are merged."""
 GRAINS: Final = 256
-"""What is taken together is no longer than this part of a window: so much later at most it stops counting."""
+"""A merged transmission is at most this part of a window long: it leaves the window at most so much later."""
 
 
 def allowed_ns(share: float, window_ns: int) -> int:
-    """Return the airtime that a window leaves."""
+    """Return the airtime that is left in a window."""
     return int(share * window_ns)
 
 
 def packets_an_hour(share: float, window_ns: int, airtime_ns: int) -> int:
-    """Return how many packets an hour a radio can send on and on: as many whole ones as each window has room for."""
+    """Return the packets per hour that a radio can sustain: as many whole ones as fit into each window."""
     return allowed_ns(share, window_ns) // airtime_ns * 3_600_000_000_000 // window_ns
 
 
 class Duty(Stage):
-    """Drops a packet for which the window that ends with it has too little left; the medium notes what is sent.
+    """Drops a packet that exceeds the airtime of the window that ends with it; the medium adds what is sent.
 
     Transmissions of a radio come one after the other, so no window has more on air than the one that ends with one.
     """
@@ -69,7 +69,7 @@ class Duty(Stage):
         return ""
 
     def airtime_ns(self, size: int, published: bool) -> int:
-        """Return for how long a payload of so many bytes is on air."""
+        """Return the airtime of a payload of `size` bytes."""
         settings = self._shared if self._broadcasts and published else self._settings
         if settings.medium == "lora":
             bandwidth_hz = int(settings.bandwidth_hz)
@@ -79,7 +79,7 @@ class Duty(Stage):
 
 
 def note_sent(sender: RadioState, start_ns: int, end_ns: int, window_ns: int) -> None:
-    """Remember a transmission of a radio, behind all before it."""
+    """Append a transmission of a radio."""
     runs = sender.sent
     runs.append((start_ns, end_ns, end_ns - start_ns))
     sender.sent_ns += end_ns - start_ns
@@ -96,7 +96,7 @@ def note_sent(sender: RadioState, start_ns: int, end_ns: int, window_ns: int) ->
 
 
 def _forget(sender: RadioState, before_ns: int) -> None:
-    """Forget what was over before a time."""
+    """Drop transmissions that ended before a time."""
     runs, over = sender.sent, 0
     while over < len(runs) and runs[over][1] <= before_ns:
         sender.sent_ns -= runs[over][2]
@@ -105,7 +105,7 @@ def _forget(sender: RadioState, before_ns: int) -> None:
 
 
 def _sent_since(sender: RadioState, since_ns: int) -> int:
-    """Return the airtime since a time; of several transmissions that were taken together the most that can be so."""
+    """Return the airtime since a time; for merged transmissions the greatest possible."""
     found_ns = sender.sent_ns
     for start_ns, end_ns, airtime_ns in sender.sent:
         if start_ns >= since_ns:

@@ -1,4 +1,4 @@
-"""The medium: when a packet gets its turn, how long it takes, and what happens on the way, medium by medium.
+"""The medium: access time, airtime and outcome of a transmission, by kind of medium.
 
 A wire serialises. On Wi-Fi a station freezes its backoff while those that it hears send, contends with them, and
 repeats what is not acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
@@ -47,11 +47,11 @@ COLLISION: Final = "collision"
 SNR: Final = "snr"
 LRWPAN_MODE: Final = "oqpsk_250"
 ACCESS_BLOCK: Final = 16
-"""From here on the blocks of a packet's draws are those of its attempts."""
+"""The first block of a packet's draws for its attempts."""
 BASE_STATION_DBM: Final = 30.0
-"""Who sends with at least this power over LTE is a base station, and sends down."""
+"""A sender with at least this power over LTE is a base station: its packets are downlinks."""
 OPPORTUNITY_BYTES: Final = 1500
-"""What leaves at one line of a trace of capacity."""
+"""Bytes that one line of a capacity trace lets through."""
 
 
 class Wire(Stage):
@@ -79,7 +79,7 @@ class Wire(Stage):
         return ""
 
     def _opportunity_ns(self, ready_ns: int, size: int) -> int:
-        """Return when the last byte leaves; what an opportunity has left is the next packet's."""
+        """Return when the last byte leaves; the next packet uses the rest of the opportunity."""
         sender, _trace = self._sender, self._trace
         left = sender.opportunity_bytes
         at_ns = max(ready_ns, self._time_ns(sender.opportunity - 1) if left else 0)
@@ -96,7 +96,7 @@ class Wire(Stage):
         return at_ns
 
     def _skip(self, ready_ns: int) -> int:
-        """Return how many opportunities can be passed over at once: whole rounds of the trace, or one."""
+        """Return how many opportunities are skipped at once: whole rounds of the trace, or one."""
         rounds = (ready_ns - self._time_ns(self._sender.opportunity)) // (self._trace[-1] * 1_000_000)
         return max(1, rounds * len(self._trace)) if self._loops and rounds > 1 else 1
 
@@ -108,7 +108,7 @@ class Wire(Stage):
 
 
 class OnAir(Stage):
-    """What all radios share: a broadcast is sent once for all its receivers; who is on air is known to the air."""
+    """Common part of radios: a broadcast is sent once for all receivers; the air has the transmissions."""
 
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None and setup.air is not None
@@ -136,14 +136,14 @@ class OnAir(Stage):
         return COLLISION if flight.outcome == COLLISION else ""
 
     def _note(self, flight: Flight, shared: Sending) -> None:
-        """Remember what a broadcast's first receiver found out, for the others."""
+        """Store the result of a broadcast's first receiver for the others."""
         shared.access_ns, shared.airtime_ns = flight.access_ns, flight.airtime_ns
         shared.start_ns, shared.end_ns = flight.air_start_ns, flight.air_end_ns
         shared.contenders, shared.rate_bps, shared.outcome = flight.contenders, flight.rate_bps, flight.outcome
         shared.is_ready = True
 
     def _share(self, flight: Flight, shared: Sending) -> None:
-        """Take a broadcast's times from its first receiver."""
+        """Copy a broadcast's times from its first receiver."""
         flight.access_ns, flight.airtime_ns = shared.access_ns, shared.airtime_ns
         flight.air_start_ns, flight.air_end_ns = shared.start_ns, shared.end_ns
         flight.contenders, flight.rate_bps, flight.outcome = shared.contenders, shared.rate_bps, shared.outcome
@@ -178,23 +178,23 @@ class OnAir(Stage):
             self.expect(known, ready_ns, start_ns)
         air.register(known)
 
-    # --- what media differ in ----------------------------------------------------------------------------------------
+    # --- by kind of medium -------------------------------------------------------------------------------------------
 
     is_acknowledged = False
 
     def after_backoff(self, start_ns: int, access: Access) -> int:
-        """Return when the sender's turn begins, from when it could if it had not to back off."""
+        """Return when the sender's turn begins, given the time at which it would begin without back-off."""
         return start_ns
 
     def expect(self, known: Transmission, ready_ns: int, turn_ns: int) -> None:
-        """Note of a turn that has not begun what has to be known where others may put it off."""
+        """Record what a later transmission needs to defer a turn that has not begun."""
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
-        """Return when the sender gets its turn, and how many contend."""
+        """Return when the sender's turn begins, and the number of contenders, itself included."""
         return ready_ns, 1
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        """Return what becomes of a packet on the medium, and how long it is on air once; write its bit rate.
+        """Return the outcome of a packet on the medium and the airtime of one attempt; set its bit rate.
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
@@ -204,7 +204,7 @@ class OnAir(Stage):
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:
-        """Return the draws of a packet's attempts, by block: a broadcast's are its sender's, whoever hears it."""
+        """Return the draws of a packet's attempts, by block: those of a broadcast are the same for all receivers."""
         key = self._setup.sending_key if broadcast else self._setup.key
         return lambda block: draw_words(key, flight.sequence, flight.copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
 
@@ -291,7 +291,7 @@ class WiFi(OnAir):
         known.radio, known.hears = self._setup.radio, self._contest.hears
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        """At the fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
+        """The fixed rate if set; else the lowest for a broadcast, the highest with few errors for a unicast."""
         size, ack_ns, threshold = len(flight.payload), 0, 0
         if broadcast:
             frame = self._frames.broadcast(size)
@@ -364,7 +364,7 @@ _MEDIA: Final = {"radio": OnAir, "wifi": WiFi, "ieee802154": LrWpan, "lora": LoR
 
 
 def make_medium(setup: LinkSetup) -> Wire | OnAir | None:
-    """Return the stage of a link's medium; None where nothing takes time."""
+    """Return the stage of a link's medium; None where sending takes no time."""
     settings = setup.settings
     if setup.is_radio:
         return _MEDIA[settings.medium](setup)

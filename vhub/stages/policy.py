@@ -18,7 +18,7 @@ EXPIRED: Final = "expired"
 
 
 class Policy(Stage):
-    """Knows when the link is cut, whether anything may pass, and what is too late."""
+    """Drops packets while the link is cut or filtered, and those that are too old."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._cuts, self._at_arrival = setup.cuts, setup.in_flight_dropped

@@ -1,4 +1,4 @@
-"""The queue before a radio or a wire: bounded in packets, bytes and time; CoDel where it is asked for.
+"""The queue before a radio or a wire: bounded in packets, bytes and time; with CoDel where configured.
 
 A queue is served in order at a rate that is known when a packet comes, so its wait is known then, too: the time until
 the sender is free. CoDel's law (RFC 8289) is applied to that wait at the moment at which the packet would leave.
@@ -21,7 +21,7 @@ CODEL: Final = "queue_codel"
 
 
 class Limits:
-    """What may wait: a radio's limits for what it sends once for all, a link's for the rest."""
+    """Limits of a queue: the radio's for broadcasts, the link's for other packets."""
 
     def __init__(self, settings: Radio) -> None:
         queue = settings.queue
@@ -32,7 +32,7 @@ class Limits:
 
 
 class Queue(Stage):
-    """Decides whether a packet may wait, and how long."""
+    """Decides whether a packet is queued, and for how long."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._sender = setup.sender
@@ -72,7 +72,7 @@ class Queue(Stage):
         return cause
 
     def _numbers(self, limits: Limits, cause: str, packets: int, leaves_ns: int) -> tuple[int, ...]:
-        """Return by what a packet is dropped: how many wait; of CoDel also since when too long, and its count."""
+        """Return the numbers of a drop: packets that wait; for CoDel also the time above target and its count."""
         if cause != CODEL:
             return (packets,)
         since_ns = self._sender.first_above_ns - limits.interval_ns

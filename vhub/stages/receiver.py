@@ -1,4 +1,4 @@
-"""Receiver: who is down, or gone, or has got too much already, when a packet arrives does not take it."""
+"""Receiver: drops packets at arrival if the receiver is down, has left, or is over its limit."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from foosim.vhub.stages.stage import Stage
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
-"""What reaches a receiver at one tick is one message: what does not fit into it is lost, before anybody refuses it."""
+"""The packets of a receiver at one tick are one message: those that exceed its size are dropped."""
 
 
 class Receiver(Stage):
-    """Is told of bodies that are out of service in the newest frame, of clients that have left, of full messages."""
+    """Drops packets for the reasons that the state finds at arrival: body out of service, client left, message full."""
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Receiver:

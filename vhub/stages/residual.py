@@ -1,4 +1,4 @@
-"""Residual loss: what is lost for reasons that geometry does not explain, singly or in bursts.
+"""Residual loss: losses that the geometry does not explain, singly or in bursts.
 
 Bursts are a state: of time (all flows on a link see the same outages) or of the packets one after the other. Sources:
 Gilbert (1960) and Elliott (1963); Salsano, Ludovici and Ordine, "Definition of a general and intuitive loss model for
@@ -21,7 +21,7 @@ _LOSS: Final = int(Slot.LOSS)
 RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
 CHAIN_BLOCK: Final = 1
-"""The block of a packet's draws of which the first word moves a chain on."""
+"""The block of a packet's draws whose first word moves the Markov chain."""
 GOOD: Final = 0
 BAD: Final = 1
 """The states of two; of four they are the good one and a burst, so that an event may change one model to the other."""
@@ -31,7 +31,7 @@ SINGLE: Final = 3
 
 
 class Residual(Stage):
-    """Independent losses, those of outages, and those of a state that a subclass knows."""
+    """Independent losses, those of outages, and those of a state of a subclass."""
 
     def __init__(self, setup: LinkSetup, good_loss: float = 0.0, bad_loss: float = 0.0) -> None:
         loss = setup.settings.loss

@@ -1,1 +1,1 @@
-"""What the vHub knows, as values with snapshot and restore, and how it goes on from its journal."""
+"""The vHub's state as values with snapshot and restore, and how it is restored from its journal."""

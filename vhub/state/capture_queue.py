@@ -1,7 +1,7 @@
-"""Hands closings to the capture, each once everything that it released to clients has left.
+"""The queue of closings for the capture: each is recorded once all packets that it released to clients were sent.
 
-Only then its packets have their times of leaving. Closings go in the order of their ticks, so one that waits holds back
-those behind it.
+Only then its packets have their times of release. Closings are recorded in the order of their ticks, so one that waits
+delays those behind it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class RecordEpoch:
 
 
 class CaptureQueue:
-    """The closings that the capture has not been handed yet, oldest first."""
+    """The closings that are not recorded yet, oldest first."""
 
     def __init__(self) -> None:
         self._closings: deque[Closing] = deque()
@@ -41,7 +41,7 @@ class CaptureQueue:
         self._closings.append(closing)
 
     def take(self, waiting_tick: int | None) -> list[RecordClosing]:
-        """Take the closings before `waiting_tick`, the oldest tick with packets that wait; all where it is None."""
+        """Remove and return the closings before `waiting_tick`, the oldest tick with unsent packets; None: all."""
         taken = []
         while self._closings and (waiting_tick is None or self._closings[0].frame.tick < waiting_tick):
             taken.append(RecordClosing(self._closings.popleft()))
@@ -51,10 +51,11 @@ class CaptureQueue:
 def last_closings(
     state: HubState, commits: Commits, end_tick: int, half_closed: Closing | None, now_ns: int
 ) -> list[Closing]:
-    """Return what a run ends with: the tick that is half closed, with its fates, and all frames that are committed
-    behind it, up to that of `end_tick`; the last has what is in flight.
+    """Return the last closings of a run: the tick that is half closed, with its fates, and all committed frames after
+    it, up to `end_tick`; the last one has the packets in flight.
 
-    Nodes run ahead of closings as far as deliveries let them, so there may be many. What is not closed is not judged.
+    Nodes run ahead of closings as far as deliveries allow, so there may be many. Ticks that are
+    not closed have no fates.
     """
     closings = [] if half_closed is None else [half_closed]
     behind = state.closed + len(closings)

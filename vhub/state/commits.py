@@ -16,11 +16,11 @@ from foosim.world.initial_state import AddedEntity, added_to
 from foosim.world.layout import Layout
 
 Committed = tuple[bytes, Commit, Frame]
-"""A commit as it came, read, and its frame."""
+"""A commit as received, decoded, and its frame."""
 
 
 class Commits:
-    """Committed frames by tick. `layout` is that of the newest, None while the world is not known."""
+    """Committed frames by tick. `layout` is that of the newest, None before the world's first frame."""
 
     def __init__(self) -> None:
         self.layout: Layout | None = None
@@ -30,7 +30,7 @@ class Commits:
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
     def start(self, layout: Layout | None, tick: int, chain: bytes, last: Committed | None = None) -> None:
-        """Begin with the frame of a tick, and what was before: the layout, the chain, and the last frame if any."""
+        """Begin with the frame of a tick, given the layout, the chain, and the frame before it if any."""
         self.layout, self.next_tick = layout, tick
         self._chains[tick - 1] = chain
         if last is not None:
@@ -41,7 +41,7 @@ class Commits:
         return self._chains[tick]
 
     def take(self, commit: Commit, payload: bytes) -> list[int]:
-        """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
+        """Add a commit; return the ticks whose frames it completes: none for a repeat or an early one.
 
         Raises `Malformed` for a frame with another digest than the commit says.
         """
@@ -58,7 +58,7 @@ class Commits:
         return taken
 
     def get(self, tick: int) -> Committed | None:
-        """Return the commit of a tick; None while it is not there, or is forgotten."""
+        """Return the commit of a tick; None before it has arrived and after `forget`."""
         return self._frames.get(tick)
 
     def __contains__(self, tick: int) -> bool:
@@ -72,7 +72,7 @@ class Commits:
         return b"" if last is None else last[0], chain, added
 
     def forget(self, tick: int) -> None:
-        """Nobody asks for this tick any more."""
+        """Drop the commit of a tick that is not needed any longer."""
         self._frames.pop(tick, None)
         self._chains.pop(tick, None)
 

@@ -37,7 +37,7 @@ OUTBOX_SHIFT = 16
 
 
 class HubState:
-    """Links, members, what is in flight. All of it plain values; nothing here knows time but as ticks."""
+    """Links, members, packets in flight: plain values, without a clock but the tick."""
 
     def __init__(self, deployment: Deployment, first_tick: int = 0) -> None:
         """`first_tick` is that of the frame that the run begins with."""
@@ -50,22 +50,22 @@ class HubState:
         self.members: dict[str, Member] = {}
         self.fabric = Fabric(deployment)
         self.deliveries: dict[int, list[Delivered]] = {first_tick - 1: [], first_tick: []}
-        """What reaches robots at the last closed tick and at the next one."""
+        """Deliveries to robots of the last closed tick and of the next one."""
         self.final = first_tick
-        """The last tick whose deliveries are final. Behind the next one they are without packets."""
+        """The last tick whose deliveries are final. Those after the next tick are empty."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
         self.at_door: dict[str, int] = {}
-        """Refusals since the last closing by cause, of what never got as far as the state: counted by the next one."""
+        """Refusals of packets between closings, by cause: counted by the next closing."""
         self.refused_at_door: list[tuple[str, int]] = []
-        """Those that the last closing counted: an input of it, which the journal keeps."""
+        """The refusals that the last closing counted: an input of it, which the journal has."""
         self.ages = Ages(self.tick_ns)
         self.aged: list[Age] = []
-        """What the last closing tells of them."""
+        """The rows of ages at use by the last closing."""
         self._flights: dict[int, list[Flight]] = {}
-        """What is in flight, by the tick at which it arrives."""
+        """Packets in flight, by the tick of their arrival."""
         self._sendings = SendOrder()
-        """What clients have sent at the last closed tick."""
+        """Packets that clients have sent at the last closed tick."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
@@ -75,7 +75,7 @@ class HubState:
     # --- joining -----------------------------------------------------------------------------------------------------
 
     def join(self, joining: Joining, tick: int) -> None:
-        """Take a client in, from `tick` on; one that comes back keeps its numbers."""
+        """Add a client, from `tick` on; one that returns keeps its numbers."""
         known = self.members.get(joining.name)
         member = self.members[joining.name] = Member.of(joining, tick)
         if known is not None:
@@ -84,7 +84,7 @@ class HubState:
         self._here.renew(self.members)
 
     def leave(self, name: str) -> None:
-        """Let a client go: nothing is offered to it any more."""
+        """Deactivate a client: no packet is offered to it."""
         if name in self.members:
             self.members[name].subscriptions = ()
             self.members[name].active = False
@@ -99,7 +99,7 @@ class HubState:
     def close_world(
         self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight], edits: Sequence[Edit] = ()
     ) -> dict[str, list[Flight]]:
-        """Phase one of closing the frame's tick; `packets` in (robot, index) order, `edits` led to the frame.
+        """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` those of the frame.
 
         Append the packets whose fate is final to `fates` and return what is released, by client.
         """
@@ -128,13 +128,13 @@ class HubState:
         return released
 
     def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
-        """Return packets in the order in which they come to their radios."""
+        """Return packets in the order in which they reach their radios."""
         if not self.fabric.network.defaults.phase_ns:
             return packets
         return sorted(packets, key=lambda packet: (self.fabric.phase_ns(packet.robot), packet.robot, packet.index))
 
     def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
-        """Phase two: judge what clients sent, in (phase, source, sequence) order.
+        """Phase two: judge the packets of clients, in (phase, source, sequence) order.
 
         Return the deliveries of the next tick.
         """
@@ -143,7 +143,7 @@ class HubState:
         return deliveries
 
     def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
-        """Phase two as far as robots are concerned: return the deliveries of the next tick; `close_rest` follows."""
+        """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows."""
         tick = frame.tick
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
@@ -188,17 +188,17 @@ class HubState:
         return Deliveries(tick + 1, deliveries, following)
 
     def close_rest(self) -> list[Flight]:
-        """Judge what `close_robots` has left; return the packets whose fate is final by phase two."""
+        """Judge the packets that `close_robots` has deferred; return all whose fate phase two has made final."""
         self._send_waiting(self.closed)
         return self._sendings.fates()
 
     def _send_waiting(self, tick: int) -> None:
-        """Judge what was sent at a tick and waits for its turn."""
+        """Judge the packets of a tick that are deferred."""
         for flights, dropped in self._sendings.take_waiting():
             self._send(flights, tick, dropped)
 
     def _is_apart(self, flight: Flight) -> bool:
-        """Whether a packet's fate has to do with that of no packet on another link; what goes to clients counts so."""
+        """Whether a packet's fate is independent of other links; packets to clients count as such."""
         if flight.destination not in self._robots:
             return True
         link = self.fabric.link(flight.source, flight.destination, flight.channel)
@@ -206,7 +206,7 @@ class HubState:
 
     @property
     def hears_clients(self) -> bool:
-        """Whether the closing of the next tick takes joins, leaves and what clients sent.
+        """Whether the closing of the next tick has joins, leaves and packets of clients as inputs.
 
         Not where the deliveries behind that tick are final already. No lockstep client is due then, and while a
         free-running one is here it does not happen: it is for those who come and go that this waits.
@@ -214,7 +214,7 @@ class HubState:
         return self.closed + 1 >= self.final
 
     def _following(self, tick: int) -> int:
-        """Return for how many ticks behind the next one it is certain that nothing reaches robots.
+        """Return for how many ticks after the next one no packet can reach a robot.
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
         filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
@@ -239,8 +239,7 @@ class HubState:
         return limits.RELEASE_AHEAD
 
     def _is_clogged(self, tick: int) -> bool:
-        """Whether a clog holds something back from a robot, or from who acts at its arrival: a heal may let it go at
-        any tick."""
+        """Whether a clog, which may end at any tick, delays a packet to a robot or to a client that acts at arrival."""
         if not self.fabric.timeline.has_holds:
             return False
         flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
@@ -248,7 +247,7 @@ class HubState:
         return any(flight.destination in self._robots or self._here.calls(flight) for flight in held)
 
     def _admit(self, source: str, sent: Sent) -> bool:
-        """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
+        """Refuse packets before they are offered: repeats, and those without a receiver in this run."""
         member = self.members.get(source)
         if member is None:
             return self.refuse("unknown_source")
@@ -260,22 +259,22 @@ class HubState:
         return True
 
     def _sequence_of(self, source: str) -> int:
-        """Return the greatest number that was admitted of a client."""
+        """Return the greatest sequence number that was admitted from a client."""
         member = self.members.get(source)
         return 0 if member is None else member.sequence
 
     def refuse(self, cause: str, count: int = 1) -> bool:
-        """Count packets that are refused; they are in no link's account."""
+        """Count refused packets; no link counts them."""
         self.packets.refused += count
         self.refusals[cause] = self.refusals.get(cause, 0) + count
         return False
 
     def refuse_at_door(self, cause: str, count: int = 1) -> None:
-        """Note packets that are refused between closings; the next closing counts them."""
+        """Add packets that are refused between closings; the next closing counts them."""
         self.at_door[cause] = self.at_door.get(cause, 0) + count
 
     def _addressed(self, source: str, destination: str, channel: str) -> tuple[str, ...]:
-        """Return to whom a packet goes: to its destination, or to the clients that hear the source's channel by name.
+        """Return a packet's receivers: its destination, or the clients that subscribe to the channel, by name.
 
         Each receiver is one offered packet; without a receiver nothing is offered.
         """
@@ -308,7 +307,7 @@ class HubState:
             self._send(twins, tick, fates)
 
     def _disrupt(self, tick: int, events: Sequence[str]) -> None:
-        """Take what was asked of the network; clogs that come or go by it move what is on its way."""
+        """Apply requested network events; a clog that begins or ends moves the due times of packets in flight."""
         timeline, now_ns = self.fabric.timeline, tick * self.tick_ns
         flights = self.in_flight()
         pairs = sorted({(flight.source, flight.destination) for flight in flights})
@@ -330,12 +329,12 @@ class HubState:
             due_ns = [flight.due_ns for flight in those]
             link.retime(those, now_ns)
             for flight, before_ns in zip(those, due_ns, strict=True):
-                # What reaches robots at this tick is said already.
+                # The deliveries to robots of this tick are published already.
                 earliest = tick + (flight.destination in self._robots)
                 self._let_fly(flight, flight.arrival_tick if flight.due_ns == before_ns else earliest)
 
     def _let_fly(self, flight: Flight, earliest: int) -> None:
-        """Have a packet arrive when it is due, at that tick at the earliest."""
+        """Schedule a packet's arrival at its due time, at that tick at the earliest."""
         member = self.members.get(flight.destination)
         arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
         if member is not None:
@@ -348,7 +347,7 @@ class HubState:
             flights.append(flight)
 
     def _arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival, and count it: copies are in no account."""
+        """Judge a packet at arrival, and count it, unless it is a copy."""
         self._transit.arrived(flight)
         link = self.fabric.link(flight.source, flight.destination, flight.channel)
         is_delivered = link.arrive(flight, hindered)
@@ -358,7 +357,7 @@ class HubState:
         return is_delivered
 
     def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
-        """Take out what arrives at `tick` at robots (or at clients), in (due, source, sequence, copy) order."""
+        """Remove and return the arrivals of `tick` at robots, or at clients, in (due, source, sequence, copy) order."""
         flights = self._flights.pop(tick, None)
         if not flights:
             return []
@@ -385,7 +384,7 @@ class HubState:
             return released
         room, world = ReceiveBudget(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
         judged: list[Flight] = []
-        if turns:  # what makes them act is judged first: with it comes what else is there
+        if turns:  # packets that make clients act are judged first: the others of the tick are delivered with them
             arriving.sort(key=self._here.calls, reverse=True)
         for flight in arriving:
             member = self.members.get(flight.destination)
@@ -430,7 +429,7 @@ class HubState:
         return deliveries
 
     def in_flight(self) -> list[Flight]:
-        """Return what is on its way, in order of arrival."""
+        """Return the packets in flight, in order of arrival."""
         return [flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=order_of)]
 
     # --- the state as bytes ------------------------------------------------------------------------------------------
@@ -457,7 +456,7 @@ class HubState:
 
     @classmethod
     def restore(cls, deployment: Deployment, snapshot: bytes) -> HubState:
-        """Return the state that `snapshot` holds; raises Malformed when it holds none."""
+        """Return the state of a snapshot; raises Malformed for invalid bytes."""
         content = decode_any(Snapshot, snapshot)
         state = cls(deployment)
         state.closed = content.closed

@@ -25,7 +25,7 @@ class InFlightLimit:
         self._by_source: dict[str, int] = {}
 
     def takes(self, flight: Flight) -> bool:
-        """Whether a packet fits; it counts as in flight then."""
+        """Whether a packet fits; if so it is counted."""
         source, by_source = flight.source, self._by_source
         size = _size_of(flight)
         whole, own = self._bytes + size, by_source.get(source, 0) + size
@@ -41,7 +41,7 @@ class InFlightLimit:
         self._by_source[flight.source] = self._by_source.get(flight.source, 0) + size
 
     def arrived(self, flight: Flight) -> None:
-        """A packet has reached its end."""
+        """Stop counting a packet that has its fate."""
         size = _size_of(flight)
         self._bytes -= size
         self._by_source[flight.source] -= size

@@ -1,4 +1,4 @@
-"""A client that takes part, as the vHub's state has it: ticks and numbers, without its session."""
+"""A client in the vHub's state: ticks and numbers, without its session."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from foosim.vhub.network.packet import Flight
 
 
 def may_lockstep(deployment: Deployment, name: str) -> bool:
-    """Whether the run waits for this client: no other can hold it up."""
+    """Whether the client may be in lockstep: only these delay the run."""
     declared = deployment.players.get(name) or deployment.clients.get(name)
     return declared is not None and declared.lockstep
 
 
 def may_restart(deployment: Deployment, name: str) -> bool:
-    """Whether a client's process is started again when it has ended."""
+    """Whether a client's process is restarted after its end."""
     return name in deployment.players and deployment.players[name].restart
 
 
@@ -39,7 +39,7 @@ class Member:
         self.offset = state.offset
         self.arrivals = state.arrivals
         self.called_tick = state.called_tick
-        """Of one that acts at arrival: the last tick at which it was called, -1 before the first."""
+        """For a client that acts at arrival: the last tick at which it was called, -1 before the first."""
 
     @classmethod
     def of(cls, joining: Joining, tick: int) -> Member:
@@ -49,44 +49,43 @@ class Member:
         return cls(MemberState(joining.period, subscriptions, tick, offset=joining.offset, arrivals=arrivals))
 
     def state(self) -> MemberState:
-        """Return it as it is written down."""
+        """Return its part of a snapshot."""
         return convert(self, MemberState, from_attributes=True)
 
     def is_due(self, tick: int) -> bool:
-        """Whether it is asked at a tick: of one that acts at arrival known once the tick's packets are there."""
+        """Whether it is due at a tick. For a client that acts at arrival, the tick's packets must be there."""
         if self.arrivals:
             return self.active and tick == self.called_tick
         return self.active and self.period > 0 and tick % self.period == self.offset
 
     def may_be_due(self, tick: int) -> bool:
-        """Whether it is asked at a later tick, for all that is known without what arrives."""
+        """Whether it is due at a later tick, regardless of arrivals."""
         return self.is_over(tick) if self.arrivals else self.is_due(tick)
 
     def is_over(self, tick: int) -> bool:
-        """Whether a period has passed since one that acts at arrival was called, or joined."""
+        """Whether a client that acts at arrival has waited for a period since its last call, or its join."""
         return self.active and tick >= max(self.called_tick, self.joined_tick) + self.period
 
     def release_tick(self, tick: int) -> int:
-        """Return the first tick, from `tick` on, at which something can be released to the client, as far as its period
-        says."""
+        """Return the first tick, from `tick` on, at which its period allows a release to the client."""
         return tick if self.period == 0 or self.arrivals else tick + (self.offset - tick) % self.period
 
 
 class Here:
-    """What follows from who takes part, found anew when somebody comes or goes."""
+    """Values derived from the members, computed anew after each join or leave."""
 
     def __init__(self, deployment: Deployment) -> None:
         clients = [*deployment.players, *deployment.clients]
         self._lockstep = tuple(name for name in clients if may_lockstep(deployment, name))
         self.is_complete = not self._lockstep
-        """Whether all that are declared to be in lockstep take part: one that does not may join at any tick."""
+        """Whether all declared lockstep clients take part: one that does not may join at any tick."""
         self.on_arrival: dict[str, Member] = {}
-        """Those who act when something arrives, in name order."""
+        """Clients that act at arrival, in name order."""
         self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
-        """Who hears each (endpoint, channel), in name order."""
+        """Subscribers of each (endpoint, channel), in name order."""
 
     def renew(self, members: Mapping[str, Member]) -> None:
-        """Somebody came or went."""
+        """Compute the values anew."""
         here = {name: member for name, member in sorted(members.items()) if member.active}
         self.is_complete = all(name in here for name in self._lockstep)
         self.on_arrival = {name: member for name, member in here.items() if member.arrivals}
@@ -97,6 +96,6 @@ class Here:
         self.receivers = {pair: tuple(names) for pair, names in heard.items()}
 
     def calls(self, flight: Flight) -> bool:
-        """Whether a packet's receiver acts when it arrives."""
+        """Whether a packet's receiver acts at its arrival."""
         member = self.on_arrival.get(flight.destination)
         return member is not None and (flight.source, flight.channel) in member.arrivals

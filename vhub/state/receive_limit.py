@@ -12,7 +12,7 @@ from foosim.vhub.network.packet import Flight, size_of
 
 
 class ReceiveBudget:
-    """The budget of one tick, asked for its flights in their order. `bytes_max` is that of each receiver.
+    """The budget of one tick, applied to its flights in order. `bytes_max` is the limit of each receiver.
 
     `is_shared`: one message goes to all receivers, so they share a budget.
     """
@@ -20,9 +20,9 @@ class ReceiveBudget:
     def __init__(self, flights: Sequence[Flight], bytes_max: int, *, is_shared: bool) -> None:
         self._is_shared = is_shared
         self._left: dict[tuple[str, str], int] = {}
-        """Of receivers that are over budget: what each source has left of its share, in bytes."""
+        """For receivers over budget: the rest of each source's share, in bytes."""
         self._shares: dict[str, int] = {}
-        """Of these, by receiver: the share of each source, in bytes."""
+        """For these, by receiver: the share of each source, in bytes."""
         whole = 0
         for flight in flights:
             whole += size_of(flight)
@@ -30,7 +30,7 @@ class ReceiveBudget:
             self._share(flights, bytes_max)
 
     def _share(self, flights: Sequence[Flight], bytes_max: int) -> None:
-        """Divide the budget of each receiver for which too much arrives among its sources."""
+        """Divide the budget of each receiver with too many bytes among its sources."""
         wanted: dict[str, dict[str, int]] = {}
         for flight in flights:
             of_receiver = wanted.setdefault("" if self._is_shared else flight.destination, {})
@@ -41,7 +41,7 @@ class ReceiveBudget:
                 self._left.update({(receiver, source): share for source in of_receiver})
 
     def takes(self, flight: Flight) -> bool:
-        """Whether a flight fits; one that does not gets the numbers that decided it."""
+        """Whether a flight fits; one that does not is given the numbers that decided it."""
         if not self._left:
             return True
         key = "" if self._is_shared else flight.destination, flight.source

@@ -30,7 +30,7 @@ from foosim.world.sampling import Sampling
 
 
 class AbsencesRecord(msgspec.Struct, frozen=True, array_like=True, tag="absences", forbid_unknown_fields=True):
-    """Which players are away, and what is over of it, for the run's account: no closing depends on it.
+    """The players that are away and the absences that have ended, for the run's recoveries: no closing depends on it.
 
     `away` has name, process, reason and tick, `over` what, name, reason and tick, as in `absences`.
     """
@@ -43,7 +43,7 @@ NONE_AWAY: Final = AbsencesRecord([], [])
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
-    """Where a journal file starts: the run, the state after the last closed tick, the layout's added entities.
+    """The first record of a journal file: the run, the state after the last closed tick, the layout's added entities.
 
     Commit and epoch are the last ones as they came, empty before the first.
     """
@@ -54,16 +54,16 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     commit: bytes = b""
     epoch: bytes = b""
     capture: str = ""
-    """Where the capture is; empty when there is none."""
+    """The capture's path; empty when there is none."""
     chain: bytes = CHAIN_START
     """Over the frames up to that of the last closed tick."""
     machine: str = ""
-    """The start of the machine on which it was written: what came last of one before may not have reached the disk."""
+    """The boot of the machine that wrote it: the last records of an earlier boot may not have reached the disk."""
     absences: AbsencesRecord = NONE_AWAY
 
 
 def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
-    """Return the head of a vHub that has closed nothing yet, and is about to create `capture`."""
+    """Return the head of a vHub before its first closing, which is about to create `capture`."""
     tick = 0 if build.origin is None else build.origin.tick
     added = [(entity.name, entity.model) for entity in build.added]
     state = HubState(deployment, tick).snapshot()
@@ -71,7 +71,7 @@ def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):
-    """Who joins and leaves at `tick`, written before its Go is said: what closes the tick then, whoever does it."""
+    """The joins and leaves of `tick`, journalled before its Go is sent: any vHub closes the tick with them."""
 
     tick: int
     joins: list[Joining]
@@ -79,7 +79,7 @@ class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", f
 
 
 class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbid_unknown_fields=True):
-    """One closed tick: the commit and samples as they came, what was admitted, who joined and left, and the result.
+    """One closed tick: commit and samples as received, admitted packets, joins and leaves, and the result.
 
     `refused` counts by cause what was refused at the door since the tick before. `owing` left while the tick waited for
     their Dones: its Go was said to them, and they are gone when what clients sent is judged.
@@ -101,25 +101,25 @@ HubRecord = HeadRecord | TickRecord | InputsRecord | AbsencesRecord | Epoch
 
 @dataclass(slots=True)
 class Closing:
-    """Everything that came of closing one tick, for the capture. The last one of a run has a frame and no fates."""
+    """The results of closing one tick, for the capture. The last one of a run has a frame and no fates."""
 
     frame: Frame
     digest: bytes
     edits: Sequence[Edit]
     delivered: Sequence[Delivered]
-    """What reached robots at the tick that led to this frame."""
+    """Deliveries to robots at the tick that led to this frame."""
     joins: list[Joining] = field(default_factory=list)
     leaves: list[str] = field(default_factory=list)
     fates: list[Flight] = field(default_factory=list)
     wall_ns: int = 0
     recovered: Sequence[Recovered] = ()
-    """Losses and returns that were over with this frame."""
+    """Losses and returns that ended with this frame."""
     chain: bytes = b""
     """Over the frames up to this one, without the one that the run began with."""
     owing: list[str] = field(default_factory=list)
     """Clients that left while the tick waited for their Dones."""
     ages: Sequence[Age] = ()
-    """Ages at use since they were told last, where this closing tells them."""
+    """Ages at use since the last rows of them, where this closing has rows."""
 
 
 def closing_of(
@@ -145,7 +145,7 @@ def tick_record(
     state: HubState,
     deliveries: bytes,
 ) -> bytes:
-    """Return the record of a closing: what has to be written before its deliveries are spoken."""
+    """Return the record of a closing, which is journalled before its deliveries are sent."""
     sampled = [raw for raw, message in samples if message.digest == closing.digest]
     clients = sorted(admitted.items()), closing.joins, closing.leaves
     given = state.refused_at_door, deliveries, closing.owing
@@ -174,14 +174,14 @@ def world_packets(
 
 
 def missing_robots(samples: Iterable[Samples], digest: bytes, frame: Frame) -> list[str]:
-    """Return the robots whose samples at a frame have not come."""
+    """Return the robots whose samples at a frame are missing."""
     covered = {robot for message in samples if message.digest == digest for robot in message.robots}
     return [robot.name for robot in frame.layout.robots if robot.name not in covered]
 
 
 @dataclass(frozen=True, slots=True)
 class Folded:
-    """One closing that a fold computed again: the state behind it, its record, what was released to each client."""
+    """One closing that a fold computed again: the state after it, its record, the packets released to each client."""
 
     state: HubState
     closing: Closing
@@ -190,7 +190,7 @@ class Folded:
 
 
 class Fold:
-    """Computes again what the records of a journal, the first of which is a head, are about.
+    """Computes the closings of a journal again from its records, the first of which is a head.
 
     Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those behind
     it. Raises Malformed when the records are not those of one run of this version.
@@ -209,7 +209,7 @@ class Fold:
         self.chain = head.chain
         self.machine, self.absences = head.machine, head.absences
         self.inputs: InputsRecord | None = None
-        """Who joins and leaves at the tick behind the last closed one, where that was written."""
+        """The joins and leaves of the tick after the last closed one, where they are journalled."""
 
     def __iter__(self) -> Iterator[Folded]:
         for raw in self._records:
@@ -265,6 +265,6 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[Hub
 
 
 def count_downlinks(state: HubState, tick: int, released: dict[str, list[Flight]]) -> None:
-    """Number the messages to clients of one tick: a Go for each that is due, a Down for what is released else."""
+    """Number the messages to clients of one tick: a Go for each that is due, a Down for other releases."""
     for name in sorted({*state.due_members(tick), *released}):
         state.members[name].downlink += 1

@@ -1,4 +1,4 @@
-"""What a restarted vHub takes from the journal of the one before it.
+"""Restores a restarted vHub from the journal of the process before it.
 
 A fold of the journal gives the state after the last closed tick. On the way it gives what others may still ask for
 (deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
@@ -45,7 +45,7 @@ class Captured:
 
 @dataclass(slots=True)
 class Past:
-    """The vHub after its last record, and what it had sent."""
+    """The vHub after its last record, and the messages that it had sent."""
 
     state: HubState
     layout: Layout
@@ -66,12 +66,12 @@ class Past:
     owing: list[str] = field(default_factory=list)
     """Clients that left at the last tick, owing its Done."""
     known: Frame | None = None
-    """The last frame that the capture has."""
+    """The last frame in the capture."""
     kept: list[RecordClosing | RecordEpoch] = field(default_factory=list)
-    """What the capture lacks, in order."""
+    """Closings and epochs that the capture lacks, in order."""
 
     def actions(self) -> list[Action | RecordClosing | RecordEpoch]:
-        """Return what is to be done before anything else: complete the capture, log the position."""
+        """Return the first actions: complete the capture, log the position."""
         actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
         if self.epoch is not None:
             actions.append(Log("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
@@ -122,7 +122,7 @@ def recall(
 def _untold(
     found: Iterable[object], closings: Mapping[int, Closing], epoch: int
 ) -> Iterator[RecordClosing | RecordEpoch]:
-    """Yield closings by tick, and the epochs behind one, in the order of the journal: one holds from its tick on."""
+    """Yield closings by tick, each followed by the epochs that begin after it, in the order of the journal."""
     for record in found:
         if isinstance(record, Epoch) and record.epoch > epoch:
             yield RecordEpoch(record)
@@ -131,7 +131,7 @@ def _untold(
 
 
 def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:
-    """Return the index of the last head from which a fold passes all that is wanted; the first one where none does."""
+    """Return the index of the last head before all wanted ticks; that of the first head where there is none."""
     closed = max((record.tick for record in found if isinstance(record, TickRecord)), default=-1)
     wanted = closed - kept_ticks if captured is None else min(closed - kept_ticks, captured.tick)
     start, tick = 0, -1
@@ -152,14 +152,14 @@ def _frame(fold: Fold) -> Frame | None:
 
 
 def _deliveries_of(state: HubState) -> tuple[int, bytes]:
-    """Return the deliveries that are behind a state, as they were published where they were."""
+    """Return the deliveries after a state, as published where they were published."""
     tick = state.closed + 1
     following = 0 if state.was_final else state.final - tick
     return tick, encode(Deliveries(tick, state.deliveries[tick], following))
 
 
 def _remember(past: Past, tick: int, payload: bytes) -> None:
-    """Note the deliveries of a tick, and that those behind it are final where they are."""
+    """Add the deliveries of a tick, and those after it where they are final."""
     past.sent[tick] = past.sent.get(tick, payload)
     for following in range(tick + 1, past.state.final + 1):
         past.sent.setdefault(following, encode(Deliveries(following, [])))
@@ -169,7 +169,7 @@ def _remember(past: Past, tick: int, payload: bytes) -> None:
 
 
 def _number(past: Past, folded: Folded) -> None:
-    """Note what a tick released outside of lockstep, numbered as it was; a Go whose Done is owed is a Down as well."""
+    """Add the downlinks of a tick outside of lockstep, with their numbers; an unanswered Go is a Down as well."""
     tick, members, owing = folded.record.tick, folded.state.members, folded.record.owing
     for name in sorted({*folded.released, *owing}):
         member = members[name]
@@ -192,6 +192,6 @@ def last_tick_of(records: Sequence[bytes]) -> int:
 
 
 def was_captured(records: Sequence[bytes]) -> str | None:
-    """Return the path of the capture that a journal is of, empty when there is none; None when there is no journal."""
+    """Return the capture's path by the journal, empty without a capture; None when there is no journal."""
     heads = (record for raw in records[:1] if isinstance(record := decode_any(HubRecord, raw), HeadRecord))
     return next((head.capture for head in heads), None)
