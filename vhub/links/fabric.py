@@ -46,7 +46,7 @@ _OWN_QUEUE: Final = ">"
 
 
 Settled = tuple[int, int, int, list[Stage], list[Stage], list[Stage], int, int, bool]
-"""By version of the time line, from when, until when: stages, at sending, at arrival, draws, phase, being apart."""
+"""By version of the time line, from when, until when: stages, at sending, at arrival, draws, phase, `is_apart`."""
 
 
 class Link:
@@ -68,14 +68,14 @@ class Link:
         self._slots = self._phase_ns = 0
         self._times = Times()
         self._other: Settled | None = None
-        """What holds in another time: packets arrive by the settings of when they were sent."""
+        """The stages of other times: a packet arrives by the settings of its time of sending."""
 
     @property
     def rule(self) -> str:
         return self.profile.rule
 
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
-        """Return the link's settings at a time, and from when and until when they hold."""
+        """Return the link's settings at a time, and the start and end of their validity."""
         settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
         for change in self._timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
@@ -88,7 +88,7 @@ class Link:
         return settings, since_ns, until_ns
 
     def setup_at(self, time_ns: int) -> LinkSetup:
-        """Return what the link's stages are made from at a time."""
+        """Return the context of the link's stages at a time."""
         return self._setup(self.settings_at(time_ns)[0])
 
     def _setup(self, settings: Radio) -> LinkSetup:
@@ -96,7 +96,7 @@ class Link:
         return self._fabric.setup(source, destination, profile, settings, self._key, self.state, self._times)
 
     def _settle(self, time_ns: int) -> None:
-        """Have the stages of a time: made anew where settings have changed, or what is known of them."""
+        """Select the stages of a time; they are made anew after a change of settings."""
         version, other = self._timeline.version, self._other
         if self._version == version and self._since_ns <= time_ns < self._until_ns:
             return
@@ -120,19 +120,19 @@ class Link:
         return *times, *stages, self._slots, self._phase_ns, self._is_apart
 
     def is_apart(self, time_ns: int) -> bool:
-        """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
+        """Whether packets of a time share no radio, queue, air or custom model with other links."""
         self._settle(time_ns)
         return self._is_apart
 
     def restore(self, flight: Flight) -> None:
-        """Take up a packet on its way of a state that was written down: its turn may not have begun."""
+        """Add a packet in flight of a restored state: its turn may not have begun."""
         self._settle(flight.sent_ns)
         for stage in self._stages:
             if isinstance(stage, Delay):
                 stage.plan(flight)
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
-        """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        """After a change of clogs, set the due times of packets in flight, in the order of sending."""
         judged = [(flight, self._is_late(flight)) for flight in flights]
         self._settle(now_ns)
         for stage in self._stages:
@@ -140,12 +140,12 @@ class Link:
                 stage.retime(judged, now_ns)
 
     def _is_late(self, flight: Flight) -> bool:
-        """Whether those behind a packet overtake it, by the settings of when it was sent."""
+        """Whether later packets may overtake a packet, by the settings of its time of sending."""
         self._settle(flight.sent_ns)
         return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in self._stages)
 
     def send(self, flight: Flight) -> bool:
-        """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
+        """Judge a packet at sending: True when it is in flight with its due time, False when it is dropped."""
         sent_ns, is_offered = flight.sent_ns, flight.copy == 0
         if not self._since_ns <= sent_ns < self._until_ns or self._version != self._timeline.version:
             self._settle(sent_ns)
@@ -171,13 +171,13 @@ class Link:
             self.state.causes[cause] = self.state.causes.get(cause, 0) + 1
 
     def turn_away(self, flight: Flight, cause: str) -> None:
-        """Drop a packet that would be on its way: there is no room for it."""
+        """Drop a packet that exceeds the limit of packets in flight."""
         self._drop(flight, cause)
         if self.state.under_way:
             leave(self.state, flight)
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
+        """Judge a packet at arrival, by the settings of its time of sending, whatever was sent on the link since.
 
         True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
         it does.
@@ -199,7 +199,7 @@ class Link:
 
 
 def slots_of(settings: Radio, *, is_radio: bool) -> int:
-    """Return which draws settings use: bit n for slot n."""
+    """Return the draws that settings use: bit n for slot n."""
     bursts = settings.burst, settings.gilbert_elliott, settings.markov4, settings.outages
     used = {
         Slot.LOSS: settings.loss > 0.0 or any(model is not None for model in bursts),
@@ -216,7 +216,7 @@ class Fabric:
     """The network of a run."""
 
     def __init__(self, deployment: Deployment, network: Network | None = None) -> None:
-        """`network` stands in for the deployment's."""
+        """`network` replaces that of the deployment."""
         self.deployment = deployment
         self.network = deployment.network if network is None else network
         self.seed = deployment.seed if self.network.seed is None else self.network.seed
@@ -224,13 +224,13 @@ class Fabric:
         self.world = World(deployment, self.network)
         self.profiles = Profiles(self.network, deployment.carriers())
         self.states: dict[LinkKey, LinkState] = {}
-        """What the links remember that packets were sent on."""
+        """The states of links that have had packets."""
         self.radios: dict[RadioKey, RadioState] = {}
         self.airs: dict[str, Air] = {}
         self.asked: list[tuple[int, str]] = []
-        """Events that were asked for while the run went on: the tick, and the event as JSON."""
+        """Events that were requested during the run: the tick, and the event as JSON."""
         self.faults: list[str] = []
-        """Why a link model of one's own has failed; nothing after it is what was asked for."""
+        """The failure of a custom link model, which ends the run."""
         self._models: dict[str, LinkModel] = {}
         self._links: dict[tuple[str, str, str], Link] = {}
         """By source, destination and what of the channel decides."""
@@ -239,16 +239,16 @@ class Fabric:
         self._phases: dict[str, int] = {}
         self._propagations: dict[str, Propagation] = {}
         for rule in (*self.network.links, *self.network.radios.values()):
-            if rule.jitter is not None:  # the tables are made before the run starts: they would hold up a tick
+            if rule.jitter is not None:  # the tables are made before the run starts: they would delay a tick
                 quantiles_ns(rule.jitter, self._table(rule))
 
     def turn_to(self, frame: Frame) -> None:
-        """Take the newest committed frame. Links are made anew where bodies go out of service in it, or come back."""
+        """Set the newest committed frame. Links are made anew where bodies leave or enter service in it."""
         if self.world.turn_to(frame):
             self.timeline.version += 1
 
     def take(self, tick: int, at_ns: int, text: str) -> None:
-        """Take an event that was asked for, as JSON; it happens at a tick."""
+        """Add a requested event, as JSON, at a tick."""
         self.asked.append((tick, text))
         self.timeline.add(event_of(text, at_ns))
 
@@ -285,7 +285,7 @@ class Fabric:
         airs: Sequence[tuple[str, AirState]],
         asked: Sequence[tuple[int, str]],
     ) -> None:
-        """Take up what was written down of a network in which nothing has been sent yet."""
+        """Restore a snapshot, before any packet is sent."""
         self.states = {(source, destination, name): state for source, destination, name, state in links}
         self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
         self.airs = {name: Air(state, self.radios) for name, state in airs}
@@ -293,7 +293,7 @@ class Fabric:
             self.take(tick, tick * self.deployment.tick_ns, text)
 
     def restore_flight(self, flight: Flight) -> None:
-        """Take up a packet in flight of such a state: it may be on air."""
+        """Add a packet in flight of that snapshot: it may be on air."""
         profile = self.profiles.find(flight.source, flight.destination, flight.channel)
         settings, name = profile.settings, profile.radio or self.network.defaults.preset
         if settings.is_on_air:
@@ -310,7 +310,7 @@ class Fabric:
         memory: LinkState,
         times: Times,
     ) -> LinkSetup:
-        """Return what the stages of a link are made from, for some time."""
+        """Return the context of a link's stages, valid for some time."""
         timeline = self.timeline
         radio = _sender(source, destination, profile)
         sender = self.radios.get(radio)
@@ -390,7 +390,7 @@ class Fabric:
 
 
 def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
-    """Return whose queue a link's packets wait in."""
+    """Return the queue of a link's packets."""
     return (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
 
 

@@ -1,4 +1,4 @@
-"""What a deployment declares to be sent: which links carry packets, and how many a second their queues and airs get.
+"""The declared load of a deployment: the links that carry packets, and the packets per second of queues and airs.
 
 Sensors are sent to the players that hear them, commands to the robots that a player drives, and what clients say to the
 players that hear it, at a rate that is not declared. Pure: `lint` asks.
@@ -23,7 +23,7 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """What one endpoint sends to another on one channel."""
+    """The packets of one endpoint to another on one channel."""
 
     profile: Profile
     source: str
@@ -38,17 +38,17 @@ class Flow:
 
     @property
     def queue(self) -> str:
-        """Whose queue it waits in: the link's own, else the sender's."""
+        """Its queue: the link's own, else the sender's."""
         return f"{self.source}>{self.destination}" if self.profile.is_own_queue else self.source
 
     @property
     def is_once_for_all(self) -> bool:
-        """Whether the radio broadcasts it, so that it is sent once, however many hear it."""
+        """Whether the radio broadcasts it: it is sent once for all receivers."""
         return self.channel != "" and self.profile.settings.is_on_air and self.profile.settings.published == "broadcast"
 
 
 def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
-    """Yield what is declared to be sent; commands are on channel ''."""
+    """Yield the declared load; commands are on channel ''."""
     for player, spec in deployment.players.items():
         for source, channel in deployment.heard_by(player):
             robot = deployment.robots.get(source)
@@ -61,7 +61,7 @@ def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
 
 
 def used_links(flows: Iterable[Flow]) -> dict[Key, set[Pair]]:
-    """Return the directed pairs that carry packets, by the settings that they do it with."""
+    """Return the directed pairs that carry packets, by their settings."""
     found: dict[Key, set[Pair]] = {}
     for flow in flows:
         found.setdefault(flow.key, set()).add((flow.source, flow.destination))
@@ -69,7 +69,7 @@ def used_links(flows: Iterable[Flow]) -> dict[Key, set[Pair]]:
 
 
 def offered_hz(flows: Iterable[Flow]) -> dict[Key, float]:
-    """Return the packets a second of all on one air, else to the busiest queue, by settings."""
+    """Return the packets per second on an air, or without one of the busiest queue, by settings."""
     once = {
         (flow.key, flow.queue, "" if flow.is_once_for_all else flow.destination, flow.channel): flow for flow in flows
     }

@@ -1,4 +1,4 @@
-"""What sensor and player make of a delay: where both act at fixed moments, the phase between them adds to every packet.
+"""The phase between sensor and player: where both act at fixed times, it adds to the delay of every packet.
 
 Pure: `lint` asks, and has the delays.
 """
@@ -15,16 +15,16 @@ from foosim.deployment.network.radios import Radio
 from foosim.deployment.schema import Deployment
 
 SHARE_LEAST: Final = 0.2
-"""Of the mean age that the phase makes, from which on it is told."""
+"""Share of the mean age by the phase from which on it is reported."""
 
 Ends = tuple[str, str, str]
-"""A player, and the endpoint and channel that it hears."""
+"""A player, and the endpoint and channel that it receives."""
 Phase = tuple[int, int, int]
-"""In ticks: how old, of that by the delay, and the offset of the player that would leave the delay alone."""
+"""In ticks: the age, its part by the delay, and the player's offset with which only the delay remains."""
 
 
 def phase_warnings(deployment: Deployment, late_ns: Callable[[Radio], int]) -> dict[tuple[str, str], list[str]]:
-    """Return what is to be said of sensors and players in step, by rule and radio of their links.
+    """Return the warnings about sensors and players in step, by rule and radio of their links.
 
     `late_ns` is the delay, by a link's settings, that all but few of its packets keep.
     """

@@ -1,4 +1,4 @@
-"""What a network means, in the figures that people think in: mean loss, bursts, delay, airtime, throughput, range.
+"""The summary of a network: mean loss, bursts, delay, airtime, throughput, range.
 
 Nothing here decides a fate: the same formulas as in the stages, asked for their means. Ranges are without shadowing and
 fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are.
@@ -44,23 +44,23 @@ from foosim.vhub.stages.residual import chain_of_burst
 SMALL_BYTES: Final = 100
 LARGE_BYTES: Final = 1500
 MANY: Final = 10
-"""Stations of a channel that is full."""
+"""Number of stations for the throughput of a saturated channel."""
 HEIGHT_M: Final = 1.5
 SPACING_NS: Final = 10_000_000
-"""Between packets of which it is asked whether they overtake each other."""
+"""Interval of packets for the share that is overtaken."""
 
 
 @dataclass(frozen=True, slots=True)
 class SharedSettings:
-    """Settings that links have: those of a rule over a radio, of a radio alone, or of neither."""
+    """The settings of links: those of a rule over a radio, of a radio alone, or of neither."""
 
     rule: str
     radio: str
     settings: Radio
     links: int | None = None
-    """Directed pairs that have them; None where endpoints are not known."""
+    """Directed pairs with these settings; None where endpoints are unknown."""
     used: int | None = None
-    """Those that carry packets, by what is declared."""
+    """Those with a declared load."""
     example: tuple[str, str] | None = None
     heights_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
     """Of the ends of the example above the ground, without the mount of the antennas."""
@@ -68,7 +68,7 @@ class SharedSettings:
 
 @dataclass(frozen=True, slots=True)
 class Throughput:
-    """How packets of one size go: airtime of one attempt, bit/s that one station and MANY together get across."""
+    """Packets of one size: airtime of one attempt, throughput in bit/s of one station and of MANY together."""
 
     size: int
     airtime_ns: int
@@ -79,7 +79,7 @@ class Throughput:
 
 @dataclass(frozen=True, slots=True)
 class LinkSummary:
-    """What settings mean. Times are in ns, lengths in m; None is where there is no such thing, inf without an end."""
+    """The summary of settings. Times are in ns, lengths in m; None: not applicable, inf: unlimited."""
 
     rule: str
     radio: str
@@ -88,13 +88,13 @@ class LinkSummary:
     example: tuple[str, str] | None
     medium: str
     loss: float
-    """Of what geometry and others on air do not explain: 0 to 1."""
+    """Residual loss, without geometry and interference: 0 to 1."""
     burst_packets: float | None
     """Mean number of losses in a row."""
     burst_ns: int | None
-    """Mean length of a bad time."""
+    """Mean length of a bad period."""
     delay_mean_ns: int
-    """Beside queue, medium and way: the constant delay, jitter, what bad times and reordering add."""
+    """The delay without queue, medium and propagation: constant delay, jitter, bad periods and reordering."""
     delay_sd_ns: int
     delay_p99_ns: int
     reordered: float | None
@@ -107,9 +107,9 @@ class LinkSummary:
     duty_packets_h: int | None
     """Packets of SMALL_BYTES in an hour that the duty cycle allows, hour after hour."""
     queue_ns: int | None
-    """How long the last packet of a full queue waits."""
+    """Waiting time of the last packet of a full queue."""
     model: str | None
-    """The link model of one's own that decides beside all this; the figures are without it."""
+    """The custom link model, if any; the figures are without it."""
     warnings: tuple[str, ...]
 
     @property
@@ -163,7 +163,7 @@ def uses_alone(network: Network) -> list[SharedSettings]:
 
 
 def summaries(deployment: Deployment) -> list[LinkSummary]:
-    """Return what the network of a deployment means; the deployment has its files."""
+    """Return the summary of a deployment's network; the deployment has its files."""
     uses = uses_of(deployment)
     offered = offered_hz(flows_of(deployment, Profiles(deployment.network, deployment.carriers())))
     files = deployment.asset_files
@@ -187,7 +187,7 @@ def summaries(deployment: Deployment) -> list[LinkSummary]:
 
 
 def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
-    """Return what settings mean; `files` are those that they name, by path."""
+    """Return the summary of settings; `files` are those that they name, by path."""
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
@@ -223,7 +223,7 @@ def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
 
 def residual_of(settings: Impairments) -> tuple[float, float | None, int | None]:
     """Return the mean loss of a link's residual stage; of bursts the mean number of losses in a row, and the mean
-    length of a bad time in ns; None where there is no such thing."""
+    length of a bad period in ns; None without bursts."""
     burst, outages, chain = settings.burst, settings.outages, settings.gilbert_elliott
     if burst is not None and burst.mean_burst is not None:
         chain = chain_of_burst(burst)
@@ -320,7 +320,7 @@ def reordered_of(settings: Impairments, files: Mapping[str, bytes]) -> float | N
 
 
 def _bad_share(burst: Burst) -> float:
-    """Return the share of what passes that passes in a bad time."""
+    """Return the share of the passing packets that pass in a bad period."""
     passing = 1.0 - burst.loss
     return burst.loss / burst.bad_loss * (1.0 - burst.bad_loss) / passing if passing else 0.0
 
@@ -351,7 +351,7 @@ def _wifi_mode(settings: Radio, *, lowest: bool = False) -> str:
 
 
 def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Throughput, ...]:
-    """Return how small and large packets go; nothing where no rate limits them."""
+    """Return the figures of small and large packets; none where no rate limits them."""
     longest = LARGE_BYTES if settings.payload_max is None else min(LARGE_BYTES, settings.payload_max)
     sizes = sorted({min(SMALL_BYTES, longest), longest})
     rate_bps = rate_of(settings, files)

@@ -1,4 +1,4 @@
-"""What a network means, in lines: of `foosim-net lint` without a terminal, and of the start of a run.
+"""The summary of a network as lines of text: for `foosim-net lint` without a terminal, and the start of a run.
 
 Pure: neighbours are `lint` (the figures), `supervisor.net_text` (tables), `main`, which logs them.
 """
@@ -30,7 +30,7 @@ def burst_text(summary: LinkSummary) -> str:
 
 
 def delay_text(summary: LinkSummary) -> str:
-    """Return the delay beside the medium."""
+    """Return the delay without the medium."""
     if summary.delay_sd_ns == 0:
         return time_text(summary.delay_mean_ns)
     times = (time_text(ns) for ns in (summary.delay_mean_ns, summary.delay_sd_ns, summary.delay_p99_ns))
@@ -43,7 +43,7 @@ def _goodput_text(carried: Throughput) -> str:
 
 
 def summary_line(summary: LinkSummary) -> str:
-    """Return what settings mean in one line."""
+    """Return the summary of settings in one line."""
     parts = [summary.medium if summary.medium != "none" else "no medium"]
     if summary.links is not None:
         example = "" if summary.example is None else f" (as {summary.example[0]} to {summary.example[1]})"
@@ -69,7 +69,7 @@ def summary_line(summary: LinkSummary) -> str:
 
 
 def meaning_lines(summaries: Sequence[LinkSummary]) -> Iterator[str]:
-    """Yield a line for each, and its warnings behind it."""
+    """Yield a line for each, followed by its warnings."""
     for summary in summaries:
         yield summary_line(summary)
         yield from (f"  warning: {summary.name}: {warning}" for warning in summary.warnings)

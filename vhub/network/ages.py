@@ -14,10 +14,10 @@ from typing import Final
 from foosim.vhub.network.memory import Age, Counts, HeardState
 
 _EXACT_BITS: Final = 6
-"""Ages below 2^6 ticks are counted each by itself, others to 1/32: so there is a limit to how many counts there are."""
+"""Ages below 2^6 ticks are counted exactly, others to 1/32, which bounds the number of counts."""
 
 LEFT_MAX: Final = 1_000
-"""Of how many channels that a client has heard and hears no more the counts are kept."""
+"""Number of channels without a subscription whose counts are kept for a client."""
 
 
 def quantile(counts: Mapping[int, int], share: float) -> int:
@@ -45,10 +45,10 @@ class Ages:
         self._every = max(1, 1_000_000_000 // tick_ns)
         """Ticks from one row to the next: a second."""
         self._heard: dict[str, dict[tuple[str, str], HeardState]] = {}
-        """By client, and by (endpoint, channel) in order; also what it heard before it came back."""
+        """By client, and by (endpoint, channel) in order; with the channels before its return."""
 
     def joins(self, client: str, subscriptions: Iterable[tuple[str, str]]) -> None:
-        """A client takes part (again), with nothing that it knows."""
+        """Begin the ages of a client that joins: it has received nothing."""
         known = self._heard.get(client, {})
         heard = {pair: known.get(pair, HeardState(*pair, -1, True, {}, {})) for pair in set(subscriptions)}
         left = [(pair, state) for pair, state in known.items() if pair not in heard and (state.whole or state.recent)]
@@ -57,14 +57,14 @@ class Ages:
             state.sent_ns, state.is_heard = -1, pair in heard
 
     def reached(self, client: str, source: str, channel: str, sent_ns: int) -> None:
-        """A packet has reached a client."""
+        """Record the arrival of a packet at a client."""
         pairs = self._heard.get(client)
         heard = None if pairs is None else pairs.get((source, channel))
         if heard is not None and sent_ns > heard.sent_ns and heard.is_heard:
             heard.sent_ns = sent_ns
 
     def used(self, client: str, tick: int) -> None:
-        """A client acts at a tick, with what has reached it."""
+        """Count the ages of a client that acts at a tick."""
         pairs = self._heard.get(client)
         if pairs is None:
             return
@@ -79,7 +79,7 @@ class Ages:
                 recent[age] = recent.get(age, 0) + 1
 
     def take(self, tick: int) -> list[Age]:
-        """Return what was counted since the last row, when another one is due behind the closing of a tick."""
+        """Return the counts since the last row, when another one is due after the closing of a tick."""
         if (tick + 1) % self._every:
             return []
         taken = self.untold(tick)
@@ -90,7 +90,7 @@ class Ages:
         return taken
 
     def untold(self, tick: int) -> list[Age]:
-        """Return what was counted since the last row up to the closing of a tick, by client, source and channel."""
+        """Return the counts since the last row up to the closing of a tick, by client, source and channel."""
         return [
             Age(tick, client, heard.source, heard.channel, dict(heard.recent))
             for client, pairs in sorted(self._heard.items())
@@ -99,7 +99,7 @@ class Ages:
         ]
 
     def of(self, client: str, tick: int) -> list[Age]:
-        """Return the ages of what a client hears, in the whole run up to the closing of a tick, the last one."""
+        """Return the ages of a client's channels, over the whole run up to the closing of its last tick."""
         found = []
         for heard in self._heard.get(client, {}).values():
             counts = dict(heard.whole)
@@ -109,11 +109,11 @@ class Ages:
         return found
 
     def state(self) -> list[tuple[str, list[HeardState]]]:
-        """Return all of it as it is written down."""
+        """Return the snapshot."""
         return [(client, list(map(_written, pairs.values()))) for client, pairs in sorted(self._heard.items())]
 
     def restore(self, state: Iterable[tuple[str, list[HeardState]]]) -> None:
-        """Go on from what was written down."""
+        """Restore a snapshot."""
         for client, heard in state:
             self._heard[client] = {(one.source, one.channel): one for one in heard}
 

@@ -1,4 +1,4 @@
-"""An air: a channel that radios share. Who is on it, who hears whom, and what spoils whose packets.
+"""An air: a channel that radios share, with its transmissions, which station receives which, and their interference.
 
 A transmission is registered when it is judged, with the times at which it is on air. It adds its power to the packets
 that overlap with it at their receivers, those that were sent before it and are still on air too; each packet's sum is
@@ -30,7 +30,7 @@ Key = tuple[str, int, int]
 
 
 class _Heard:
-    """A transmission as its receivers have it: packets that are on air together, and who is on air beside them."""
+    """A transmission at its receivers: its packets, and the transmissions that overlap it."""
 
     __slots__ = ("beside", "end_ns", "flights", "of", "source", "start_ns")
 
@@ -46,14 +46,14 @@ class _Heard:
         return self.of is of and self.source == flight.source and times_ns == (flight.air_start_ns, flight.air_end_ns)
 
     def overlaps(self, known: Transmission) -> bool:
-        """Whether another's is on air beside it; one without a duration never is."""
+        """Whether another transmission overlaps it; one without a duration never does."""
         if known.start_ns == known.end_ns or known.source == self.source:
             return False
         return known.start_ns < self.end_ns and known.end_ns > self.start_ns
 
 
 class Air:
-    """One air in one world: its state, and the packets that are on it, each with how its radio's signals spread."""
+    """One air in one world: its state, and its packets, each with the propagation of its radio's signals."""
 
     def __init__(self, state: AirState, senders: Mapping[tuple[str, str], RadioState]) -> None:
         """`senders` has the radios of all endpoints, by endpoint and radio."""
@@ -62,20 +62,20 @@ class Air:
         self._heard: list[_Heard] = []
         self._advanced_ns = -1
         self._open: dict[Key, Turn] = {}
-        """What has not begun, as far as it is known."""
+        """The turns that have not begun."""
         self._next_ns = NEVER_NS
-        """Nothing of it begins before."""
+        """No turn begins before this time."""
         for known in state.on_air:
             if known.turn_ns >= 0:
                 self._add_open(known)
 
     def restore(self, flight: Flight, of: Propagation) -> None:
-        """Take a packet in flight of a state that was written down."""
+        """Add a packet in flight of a restored state."""
         if flight.air_end_ns > flight.sent_ns and not flight.is_settled and self._turn_of(flight) is None:
             self._group(flight, of).flights.append(flight)
 
     def advance(self, now_ns: int) -> None:
-        """Forget what is over; what has begun stays as it is."""
+        """Drop transmissions that have ended."""
         if now_ns == self._advanced_ns:
             return
         self._advanced_ns = now_ns
@@ -84,7 +84,7 @@ class Air:
         self._heard = [heard for heard in self._heard if heard.end_ns > now_ns]
 
     def turn(self, source: str, ready_ns: int, of: Propagation) -> tuple[int, int]:
-        """Return when a station gets its turn that is ready to send, and how many contend with it, itself included.
+        """Return when the turn of a station that is ready to send begins, and the number of contenders with it.
 
         It waits for all that it hears; who has something queued or on air when it is ready contends.
         """
@@ -103,7 +103,7 @@ class Air:
         return start_ns, 1 + len(heard)
 
     def contest(self, source: str, ready_ns: int, of: Propagation) -> Contest:
-        """Return what a station of 802.11 meets that is ready to send.
+        """Return the contention that a station of 802.11 meets when it is ready to send.
 
         Who has something queued or on air then contends; and, where packets of the station itself wait before this
         one, who has about as many waiting by now: stations get as many turns as others in the long run.
@@ -138,22 +138,22 @@ class Air:
         return Contest(ready_ns, 1 + len(contending), free_ns, turns, [turn.known.source for turn in turns])
 
     def _with_as_many(self, waiting: int, hears: Mapping[str, bool]) -> set[str]:
-        """Return who is heard and has at least three quarters as many packets waiting or on air."""
+        """Return the stations in range with at least three quarters as many packets queued or on air."""
         counts = Counter([known.source for known in self.state.on_air])
         return {other for other, is_heard in hears.items() if is_heard and 4 * counts[other] >= 3 * waiting}
 
     def take_turn(self, contest: Contest, turn_ns: int, busy_ns: int, slot_ns: int) -> None:
-        """Put off what comes behind a turn that takes so long."""
+        """Defer the turns after one of this duration."""
         contest.put_off(turn_ns, busy_ns, slot_ns, self._open)
 
     def plan(self, flight: Flight, of: Propagation, put_off: PutOff) -> None:
-        """Take a packet that is on its way; where its turn has not begun, what puts that off makes the packet late."""
+        """Add a packet in flight; if its turn has not begun, a deferral of the turn delays the packet."""
         turn = self._turn_of(flight)
         if turn is not None:
             turn.packets.append((flight, of, put_off))
 
     def settle(self, until_ns: int) -> None:
-        """Nobody comes before a time any more: turns up to it have begun, and spoil others and are spoilt."""
+        """Begin the turns up to a time, before which nothing is sent any more, with their interference."""
         if self._next_ns > until_ns:
             return
         self._next_ns = NEVER_NS
@@ -174,7 +174,7 @@ class Air:
                     self.listen(flight, of)
 
     def register(self, known: Transmission) -> None:
-        """Take a transmission. One without a duration is over at once."""
+        """Add a transmission. One without a duration has ended at once."""
         if known.until_ns > self._advanced_ns:
             self.state.on_air.append(known)
         if known.turn_ns < 0:
@@ -187,21 +187,21 @@ class Air:
         return self._open.get((flight.source, flight.sequence, flight.copy))
 
     def _add_open(self, known: Transmission) -> None:
-        """Take a transmission that has not begun."""
+        """Add a transmission that has not begun."""
         self._open[known.source, known.sequence, known.copy] = Turn(known, self._senders[known.source, known.radio])
         self._next_ns = min(self._next_ns, known.turn_ns)
 
     def _spoil_others(self, known: Transmission) -> None:
-        """Have a transmission spoil what is on air beside it."""
+        """Apply a transmission's interference to those that overlap it."""
         for heard in self._heard:
             if heard.overlaps(known):
                 heard.beside.append(known)
                 for flight in heard.flights:
-                    if not flight.cause:  # the inputs of a fate do not change behind it
+                    if not flight.cause:  # the inputs of a final fate do not change
                         _spoil(flight, known, heard.of)
 
     def listen(self, flight: Flight, of: Propagation) -> None:
-        """Take a packet on air, which those who are on air beside it spoil; where its turn has not begun, not yet."""
+        """Add a packet on air, with the interference of overlapping transmissions, unless its turn has not begun."""
         if self._turn_of(flight) is not None:
             return
         heard = self._group(flight, of)
@@ -210,20 +210,20 @@ class Air:
         heard.flights.append(flight)
 
     def _group(self, flight: Flight, of: Propagation) -> _Heard:
-        """Return the transmission that a packet belongs to: the newest one, where others have heard that."""
+        """Return the transmission of a packet: the newest one, where it exists for other receivers already."""
         if not self._heard or not self._heard[-1].has(flight, of):
             self._heard.append(_Heard(flight, of, [known for known in self.state.on_air if known.turn_ns < 0]))
         return self._heard[-1]
 
 
 def _power_cdbm(known: Transmission, at: str, of: Propagation) -> int:
-    """Return with which power an endpoint hears a transmission."""
+    """Return the power of a transmission at an endpoint."""
     path = of.path(of.place_at(known.source, known.position), of.place(at))
     return NOTHING_CDBM if path.cause else known.power_cdbm + of.gain_cdb - path.loss_cdb
 
 
 def _spoil(flight: Flight, known: Transmission, of: Propagation) -> None:
-    """Add a transmission that is on air beside a packet to what disturbs it."""
+    """Add an overlapping transmission to a packet's interference."""
     if known.source == flight.destination:
         flight.interference = DEAF
         return

@@ -1,4 +1,4 @@
-"""Link models of one's own: what a package brings that decides, beside the vHub's stages, what becomes of packets.
+"""Custom link models: a package's code that decides the fate of packets, beside the vHub's stages.
 
 A deployment names a model and its parameters; it never brings code. The code is an entry point of the group
 `foosim.link_models` in a package that is installed where the vHub runs: a class, or a function, that takes the
@@ -29,7 +29,7 @@ NOT_INSTALLED: Final = "not installed"
 
 
 class Wall(NamedTuple):
-    """A thing between the two ends: its name, how far the line is inside of it (m), what it takes at the radio's
+    """An obstacle between the two ends: its name, the length of the line inside it (m), its attenuation at the radio's
     frequency (dB)."""
 
     name: str
@@ -39,7 +39,7 @@ class Wall(NamedTuple):
 
 class End(NamedTuple):
     """One end of a link in the newest committed frame: its antenna's place (m) and its body's velocity (m/s), both in
-    the world frame. What has no body stands still."""
+    the world frame. An endpoint without a body is at rest."""
 
     name: str
     position_m: Vector
@@ -54,7 +54,7 @@ class Passage(NamedTuple):
     channel: str
     sequence: int
     copy: int
-    """1 for a copy that the link makes."""
+    """1 for a duplicate that the link makes."""
     sent_ns: int
     """In simulated time."""
     size: int
@@ -62,14 +62,14 @@ class Passage(NamedTuple):
     distance_m: float
     """Between the antennas."""
     walls: tuple[Wall, ...]
-    """What stands between them; their own bodies do not."""
+    """Obstacles between them, without their own bodies."""
     words: tuple[int, ...]
-    """Eight 64-bit draws that are the model's own: a function of seed, link, sequence number and copy.
+    """Eight 64-bit draws that are reserved for the model: a function of seed, link, sequence number and copy.
     `foosim.common.keyed_random` makes numbers of them."""
 
 
 class Judged(NamedTuple):
-    """What a model makes of a packet. `memory` is what it is given with the link's next one.
+    """A model's decision. `memory` is passed to it with the link's next packet.
 
     It is a plain value, `None`, true or false, a number, a text, or lists and dicts with texts for keys of these, and
     has at most MEMORY_BYTES_MAX bytes as msgpack. It is kept in the vHub's journal.
@@ -78,19 +78,19 @@ class Judged(NamedTuple):
     is_dropped: bool = False
     """It is lost, with the cause `model`."""
     extra_ns: int = 0
-    """By how much later it comes."""
+    """The delay that is added."""
     memory: Any = None
 
 
 class LinkModel(Protocol):
-    """What an entry point makes of a deployment's parameters. It raises ValueError for those that it does not take."""
+    """A model as made by its entry point from the deployment's parameters. Raises ValueError for invalid ones."""
 
     def judge(self, passage: Passage, memory: Any) -> Judged:
         """Judge one packet, offered on a link behind the one that left this memory; None before the first."""
 
 
 class ModelError(Refused):
-    """A link model that cannot be had: which key of its setting is wrong, and why."""
+    """A link model that cannot be loaded: the key of its setting that is wrong, and why."""
 
     exit_code = 2
 
@@ -112,7 +112,7 @@ def installed() -> dict[str, list[EntryPoint]]:
 
 
 def giver_of(entry: EntryPoint) -> str:
-    """Return the package that gives a model, and its version: `mylink 1.2`."""
+    """Return the package of a model, and its version: `mylink 1.2`."""
     return "" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
 
 
@@ -130,11 +130,11 @@ def make_model(model: OwnModel) -> LinkModel:
     (entry,) = entries
     try:
         make: Any = entry.load()
-    except Exception as error:  # noqa: BLE001  # of somebody else's module
+    except Exception as error:  # noqa: BLE001  # raised by a user's module
         _refuse("name", f"of {giver_of(entry)}, cannot be loaded", error, model)
     try:
         made: Any = make(deepcopy(model.parameters))
-    except Exception as error:  # noqa: BLE001  # of somebody else's code
+    except Exception as error:  # noqa: BLE001  # raised by a user's code
         _refuse("parameters", f"not taken by link model {model.name} of {giver_of(entry)}", error, model)
     if not callable(getattr(made, "judge", None)):
         raise ModelError("name", f"of {giver_of(entry)}, makes {type(made).__name__}, without `judge`", model, None)
@@ -160,7 +160,7 @@ def models_of(network: Network) -> Iterator[tuple[Location, OwnModel]]:
 
 
 def check_link_models(network: Network, text: str, name: str, sets: Sequence[str] = ()) -> None:
-    """Refuse link models that cannot be had here, each at its place in the file.
+    """Refuse link models that cannot be loaded here, each with its place in the file.
 
     `text`, `name` and `sets` are what the network was loaded from. Raises DeploymentError.
     """
@@ -182,7 +182,7 @@ def model_versions(network: Network) -> dict[str, str]:
 
 
 def differing_models(network: Network, versions: Mapping[str, str]) -> Iterator[str]:
-    """Yield what to know about link models that a capture has from other packages than are installed here."""
+    """Yield a warning for each link model of a capture whose package differs from the installed one."""
     for key, here in model_versions(network).items():
         there = versions.get(key)
         if there is not None and there != here:

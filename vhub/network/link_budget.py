@@ -1,4 +1,4 @@
-"""The budget of one radio link: what its receiver gets of a packet's signal, and how that stands to the noise."""
+"""The budget of one radio link: the received power of a packet, and its ratio to noise and interference."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Budget:
         self._block, self._parameter, self._fading_cdb = -1, 0.0, 0
 
     def path(self) -> Path:
-        """Return the way between the ends as they are in the newest frame."""
+        """Return the path between the ends in the newest frame."""
         if self._turns != self._world.turns:
             of, source, destination = self.propagation, self._source, self._destination
             self._path = of.path(of.place(source), of.place(destination))
@@ -36,7 +36,7 @@ class Budget:
         return self._path
 
     def measure(self, flight: Flight) -> str:
-        """Write what the receiver gets; return why it gets nothing, or an empty string."""
+        """Set the received power; return why nothing is received, or an empty string."""
         path, of = self.path(), self.propagation
         distance_mm, loss_cdb = path.distance_mm, path.loss_cdb
         flight.distance_mm, flight.walls, flight.walls_cdb = distance_mm, path.walls, path.walls_cdb
@@ -53,11 +53,11 @@ class Budget:
         return OUT_OF_RANGE if received_cdbm < self._sensitivity_cdbm else ""
 
     def ratio_cdb(self, flight: Flight) -> int:
-        """Return the ratio of a packet's signal to noise and to all that others send meanwhile."""
+        """Return the ratio of a packet's signal to noise and interference (SINR)."""
         return ratio_cdb(flight.received_cdbm, self.propagation.noise_cdbm, flight.interference)
 
     def _fade(self, fading: Fading, time_ns: int, distance_mm: int) -> int:
-        """Return what fading gives, the same throughout a block of time."""
+        """Return the fading, which is constant within a block of time."""
         parameter = fading.k_db
         if fading.kind == "nakagami":
             parameter = nakagami_m(distance_mm / 1000.0) if fading.m is None else fading.m

@@ -1,4 +1,4 @@
-"""What the stages of one link are made from."""
+"""The context from which the stages of one link are made."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from foosim.vhub.network.memory import LinkState, RadioState
 from foosim.vhub.network.packet import Flight
 
 BLOCK_SHIFT = 32
-"""Further draws of a packet: the number of their block stands above that of the copy."""
+"""Further draws of a packet: the number of their block is in the bits above that of the copy."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkSetup:
-    """One directed link: its ends, its settings at a time, and what it remembers and shares."""
+    """One directed link: its ends, its settings at a time, its state and the state that it shares."""
 
     source: str
     destination: str
     settings: Radio
     radio: str
     key: bytes
-    """Of its draws."""
+    """Key of its draws."""
     sending_key: bytes
-    """Of the draws of what its sender's radio sends once for several receivers."""
+    """Key of the draws of its sender's broadcasts."""
     memory: LinkState
     times: Times
     """Its bursts and outages in seconds."""
     sender: RadioState
-    """The radio, or the port of a wire, that its packets leave by."""
+    """The radio, or the port of a wire, that sends its packets."""
     world: World
     is_routed: bool = True
-    """Whether there is a way at all: two that have radios need one in common."""
+    """Whether a path exists: two endpoints with radios need one in common."""
     air: Air | None = None
     budget: Budget | None = None
-    """How a signal reaches the receiver; None on what is no radio."""
+    """Propagation to the receiver; None without radios."""
     cuts: tuple[tuple[int, int], ...] = ()
     holds: tuple[tuple[int, int], ...] = ()
-    """Times in which it is cut, and in which it is clogged."""
+    """Times of its cuts, and of its clogs."""
     in_flight_dropped: bool = True
     table: tuple[int, ...] = ()
-    """The content of the file of a jitter that has one."""
+    """The content of the jitter's file, if it has one."""
     opportunities_ms: tuple[int, ...] = ()
     """The times of a trace of capacity."""
     model: LinkModel | None = None
-    """A link model of one's own."""
+    """A custom link model."""
     faults: list[str] = field(default_factory=list)
-    """Takes why such a model has failed: the run ends for it."""
+    """Called with the failure of such a model, which ends the run."""
     own: Radio | None = None
-    """What the sender's radio says by itself, which holds for what it sends once for all; None where nothing does."""
+    """The settings of the sender's radio, for its broadcasts; None without them."""
 
     def words(self, flight: Flight, block: int) -> tuple[int, ...]:
         """Return a further block of eight draws of a packet; block 0 are those of the named slots."""
@@ -66,7 +66,7 @@ class LinkSetup:
 
     @property
     def shared(self) -> Radio:
-        """The settings for what is sent once for several receivers: no rule of one of them changes those."""
+        """The settings for broadcasts, which no rule of a single receiver changes."""
         return self.settings if self.own is None else self.own
 
     @property

@@ -19,11 +19,11 @@ from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.propagation import Propagation
 
 PutOff = Callable[[Flight, int, dict[int, int]], None]
-"""Has a packet come so many ns later, with the due times of those before it that were put off, by link."""
+"""Delays a packet by a time in ns, given the due times of deferred ones before it, by link."""
 
 
 class Turn:
-    """A turn that has not begun, with its sender's radio and the packets that come by it."""
+    """A turn that has not begun, with its sender's radio and its packets."""
 
     __slots__ = ("known", "packets", "sender")
 
@@ -67,17 +67,17 @@ _ORDER: Final = attrgetter("known.turn_ns", "known.source")
 
 
 class Contest:
-    """What a station meets that becomes ready: how many contend, and whose turns are before it."""
+    """The contention that a station meets when it becomes ready: contenders, and turns before its own."""
 
     def __init__(self, ready_ns: int, contenders: int, free_ns: int, turns: list[Turn], hears: list[str]) -> None:
         self.contenders, self.hears = contenders, hears
-        """With the station itself; and whom it hears of those whose turn has not begun."""
+        """Contenders with the station itself; and the stations in range whose turn has not begun."""
         self._at_ns = max(ready_ns, free_ns)
         self._turns = turns
-        """Those of whom it hears, what has not begun."""
+        """The turns of these stations."""
 
     def turn_ns(self, backoff_ns: int, slot_ns: int) -> int:
-        """Return when the station's counter is at its end, which stands at `backoff_ns` when it is ready."""
+        """Return when the station's counter expires, which has `backoff_ns` left when it is ready."""
         at_ns, turns = self._at_ns, self._turns
         if len(turns) > 1:
             turns.sort(key=_ORDER)
