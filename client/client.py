@@ -1,4 +1,4 @@
-"""The library for programs and people: connect to a run, hear its robots, command them, send and receive packets.
+"""The library for programs and people: connect to a run, read its robots, command them, send and receive packets.
 
     with connect("tcp/127.0.0.1:7450", "hand") as client:
         client.subscribe("red.goal", "encoder")
@@ -66,7 +66,7 @@ class Packet:
     due_ns: int
     payload: bytes
     value: Value | None
-    """What the payload holds: the bytes themselves on `echo` and from other clients, None when it holds no value."""
+    """The decoded payload: the bytes themselves on `echo` and from other clients, None when it has no value."""
 
 
 class Named(Generic[T]):
@@ -150,7 +150,7 @@ class Robot:
 
 
 class Link:
-    """The client's way to the vHub: its core on a session, driven by whoever waits for something."""
+    """The client's connection to the vHub: its core on a session, driven by the thread that waits."""
 
     def __init__(self, core: ClientCore, session: Session) -> None:
         from foosim.runtime.loop import Loop, Wire
@@ -168,19 +168,19 @@ class Link:
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
 
     def be_present(self) -> None:
-        """Show that this client is here, and hear when the vHub is not; once it has let the client in."""
+        """After the welcome, declare presence and watch that of the vHub."""
         self._wire.declare_alive()
         self._wire.watch_alive(VHUB)
 
     def perform(self) -> None:
-        """Log what the core has to say."""
+        """Write the core's log lines."""
         self._loop.perform()
 
     def wait(self, reached: Callable[[], bool], timeout_s: float | None) -> None:
         """Go round until something is reached or the time is over.
 
-        A vHub that is gone is waited for; raises ConnectionFailed when it does not come back, ConnectionRefused when it
-        comes back with another run.
+        Waits for a lost vHub; raises ConnectionFailed when it does not return, ConnectionRefused when it returns with
+        another run.
         """
         if self.closed:
             raise NotJoined("the client is closed")
@@ -240,7 +240,7 @@ class Client:
 
     @property
     def ended(self) -> bool:
-        """Whether the run is known to be over."""
+        """Whether the run has ended."""
         return self._core.ended
 
     def statistics(self) -> ClientStatistics:
@@ -250,7 +250,7 @@ class Client:
     # --- taking part -------------------------------------------------------------------------------------------------
 
     def subscribe(self, source: str, channel: str) -> None:
-        """Ask to hear a robot's channel, or what another client broadcasts on one; before `lockstep` or `listen`.
+        """Subscribe to a robot's channel, or to another client's broadcasts on one; before `lockstep` or `listen`.
 
         Raises UnknownName, PacketError for what is no channel, NotJoined.
         """
@@ -274,7 +274,7 @@ class Client:
         return self._ticks(turns)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
-        """Take part without being waited for, and hear these (endpoint, channel) beside those of `subscribe`.
+        """Take part outside of lockstep, and receive these (endpoint, channel) beside those of `subscribe`.
 
         The vHub takes the client in at a tick soon after; what is sent before that is lost. Raises UnknownName and
         NotJoined.
@@ -290,7 +290,7 @@ class Client:
     def send(self, destination: str, channel: str, payload: bytes) -> None:
         """Send opaque bytes to a robot's (or another client's) channel; to an empty destination: see `broadcast`.
 
-        After `listen` at once, in lockstep with the tick. Nothing says whether a packet arrives. Raises UnknownName
+        After `listen` at once, in lockstep with the tick. Delivery is not confirmed. Raises UnknownName
         for a destination, PacketError for a size, NotJoined, RunEnded and ConnectionFailed.
         """
         packet = Outgoing(destination, channel, bytes(payload))
@@ -388,9 +388,9 @@ class Client:
     def _join(self, turns: Turns) -> None:
         period, offset, arrivals = turns
         self._subscriptions.update(arrivals)
-        wanted = sorted(self._subscriptions)
-        self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in wanted})
-        self._core.join(period, wanted, offset, arrivals)
+        pairs = sorted(self._subscriptions)
+        self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in pairs})
+        self._core.join(period, pairs, offset, arrivals)
         self._period, self._turns = period, turns
         self._link.perform()
 
@@ -411,8 +411,8 @@ class Client:
 
     def _sample(self, robot: str, channel: str) -> Sample | None:
         if self._period is not None and (robot, channel) not in self._subscriptions:
-            heard = [name for owner, name in self._subscriptions if owner == robot]
-            raise UnknownName(f"not subscribed to this channel of {robot}", channel, heard)
+            subscribed = [name for owner, name in self._subscriptions if owner == robot]
+            raise UnknownName(f"not subscribed to this channel of {robot}", channel, subscribed)
         return self._newest.samples.get((robot, channel))
 
     def _take(self, received: Iterable[Received]) -> None:
@@ -446,7 +446,7 @@ def connect(
     `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
     `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key; or, where clients
     have passwords, `password` is the one of the user `name`. Raises BadValue for a name or address that is none,
-    CertificateError for a folder with which nobody would be let in, ConnectionFailed when nobody answers within
+    CertificateError for a folder without valid certificates, ConnectionFailed without an answer within
     `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will not have the
     client.
     """

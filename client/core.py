@@ -74,7 +74,7 @@ class ClientCore:
     """One client's state machine. `actions` are those that the shell performs next."""
 
     def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
-        """`world` is empty when the client takes whatever world it finds."""
+        """`world` is empty when the client accepts any world."""
         self.name = name
         self.boot = boot
         self.actions: list[Action] = []
@@ -186,7 +186,7 @@ class ClientCore:
             self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._patience_ns(self.deployment))
 
     def _patience_ns(self, deployment: Deployment) -> int:
-        """How long a vHub may be gone. Before it was told anything the run has perhaps not begun: then it may start."""
+        """How long to wait for a lost vHub. Before its first message this is the time for a start."""
         deadlines = deployment.deadlines
         has_begun = self._answered or self._received
         return deadlines.vhub_back_ns if has_begun else max(deadlines.vhub_back_ns, deadlines.start_ns)
@@ -214,10 +214,10 @@ class ClientCore:
         """
         assert self.deployment is not None and self.welcome is not None, "join before a welcome"
         assert 0 <= offset_ticks < max(1, period_ticks), (offset_ticks, period_ticks)
-        wanted = sorted(set(subscriptions))
-        for source, channel in wanted:
+        pairs = sorted(set(subscriptions))
+        for source, channel in pairs:
             check_subscription(self.deployment, source, channel)
-        items = [Subscription(source, channel) for source, channel in wanted]
+        items = [Subscription(source, channel) for source, channel in pairs]
         calling = [Subscription(source, channel) for source, channel in sorted(set(arrivals))]
         assert all(item in items for item in calling), (calling, items)
         self._join = Join(self.name, self.boot, period_ticks, items, offset_ticks, calling)
@@ -330,7 +330,7 @@ class ClientCore:
         self._recorded(heard.acknowledged)
 
     def _hears(self) -> None:
-        """Something new has come, so the Join is known. A repeat is no sign of that: it may be of a vHub before."""
+        """A new message confirms the Join. A repeated one does not: it may be of an earlier vHub process."""
         if not self.is_away:
             self._again_after_ns = limits.WANT_EVERY_NS_MAX
             self._again_ns = self._now_ns + self._again_after_ns

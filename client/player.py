@@ -130,7 +130,7 @@ class PlayerLoop:
 
     @property
     def player(self) -> Player | None:
-        """The player that acts; None before the run has let it in."""
+        """The player that acts; None before the welcome."""
         return self._player
 
     def deadline_ns(self) -> int:
@@ -143,13 +143,13 @@ class PlayerLoop:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
         declared = self._declaration = deployment.players[name]
         self._player = self._make(deployment)
-        wanted = deployment.heard_by(name)
-        self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
+        pairs = deployment.heard_by(name)
+        self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in pairs})
         if declared.lockstep:
             period, offset = deployment.turns(declared)
-            self.core.join(period, wanted, offset, deployment.arrivals_of(name))
+            self.core.join(period, pairs, offset, deployment.arrivals_of(name))
         else:
-            self.core.join(0, wanted)
+            self.core.join(0, pairs)
             self._period_ns = int(NS_PER_S / declared.rate_hz)
             self._beat_ns = now_ns + self._period_ns
 
@@ -187,7 +187,7 @@ class PlayerLoop:
             turn = self._player.act(tick, self.newest.samples)
         except (KeyboardInterrupt, Unanswered):
             raise
-        except BaseException as error:  # SystemExit, too: whatever it is, the run cannot go on without the player
+        except BaseException as error:  # SystemExit, too: the run cannot continue without the player
             raise failed(where, error, _module_of(self._declaration)) from error
         if not isinstance(turn, Turn):
             turn = Turn(turn)

@@ -2,7 +2,7 @@
 
 It computes nothing of the world. An epoch assigns robots to nodes, an order has the edits of a tick, and a frame is
 assembled from the parts of the nodes. Each record is journalled before its message is published, and a committed tick
-never changes. The core dispatches messages to its helpers; all share one `RunState`, and no helper knows the core.
+never changes. The core dispatches messages to its helpers; all share one `RunState`, and no helper refers to the core.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class SupervisorCore:
         clock: str = "",
         history: History | None = None,
     ) -> None:
-        """`boot` names this start of the supervisor, `clock` the clock of `now_ns`; with a history it goes on."""
+        """`boot` names this start of the supervisor, `clock` the clock of `now_ns`; `history` resumes a run."""
         state = self.state = RunState(settings, fingerprint, boot, clock)
         self.actions = state.actions
         self.refusals = Refusals(state.actions.append, lambda: state.deployment)
@@ -145,7 +145,7 @@ class SupervisorCore:
             state.finished = self.closing.is_over(now_ns)
 
     def _wake_run(self, now_ns: int) -> None:
-        """Go on without what is lost, ask again for what is lacking."""
+        """Handle losses, and repeat requests for missing messages."""
         state = self.state
         lost = self.progress.lost(now_ns)
         if lost and state.epoch == 0:
@@ -174,7 +174,7 @@ class SupervisorCore:
         return (channels.PART, missing) if missing > 0 else (channels.DELIVERIES, 1)
 
     def deadline_ns(self, now_ns: int) -> int:
-        """When the shell has to call again at the latest."""
+        """The latest time of the shell's next call."""
         state = self.state
         deadline = now_ns + limits.HEARTBEAT_NS
         if state.lacks_inputs:
@@ -197,7 +197,7 @@ class SupervisorCore:
             self._lose({name: closed(now_ns - process.heard_ns)}, now_ns)
 
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
-        """The supervisor's own loop stood still for so long: no deadline of another process ran meanwhile."""
+        """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""
         self.progress.on_standstill(stood_ns, now_ns)
         self.vhub_loss.on_standstill(stood_ns)
         self.closing.on_standstill(stood_ns, now_ns)
@@ -411,7 +411,7 @@ class SupervisorCore:
         self._publish_commit([], ([], ""), now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
-        """Go on without lost nodes, wait for a lost vHub; the loss of another process ends the run."""
+        """Continue without lost nodes, wait for a lost vHub; the loss of another process ends the run."""
         state = self.state
         others = {name: why for name, why in lost.items() if name not in state.deployment.nodes}
         if channels.VHUB in others:
@@ -504,7 +504,7 @@ class SupervisorCore:
         self.state.repeated += not self._resume_hub(standing, now_ns)
 
     def _resume_hub(self, standing: ResumeState, now_ns: int) -> bool:
-        """Let the vHub go on, or end the run where it lacks inputs; False for a repeat, and for another start's."""
+        """Grant the vHub's resume, or end the run where it lacks inputs; False for repeats and for another boot."""
         state, process = self.state, self.state.roster.by_name.get(channels.VHUB)
         if process is None or process.boot != standing.boot or standing.supervisor != state.boot:
             return False

@@ -1,4 +1,4 @@
-"""Failover: a supervisor that was started again goes on with a run whose nodes and vHub live.
+"""Failover: a restarted supervisor resumes a run whose nodes and vHub may still be running.
 
 The state is restored from the journal. The other processes find the supervisor by the address that it had before, are
 recalled, and repeat hello and ready. The vHub reports its resume position with its last commit, which is the later one
@@ -27,9 +27,9 @@ REJOIN_NS: Final = 1_000_000_000
 
 
 def lacks_inputs(state: RunState, standing: ResumeState) -> bool:
-    """Whether a vHub that resumes from a journal lacks inputs of ticks that others know, or may know.
+    """Whether a vHub that resumes from a journal lacks inputs of ticks that other processes have, or may have.
 
-    Its journal lacks them when its machine was lost with the end of it. Nobody else has them.
+    Its journal lacks them when its machine was lost with the end of it. No other process has them.
     """
     if not standing.waits:
         return False
@@ -109,7 +109,7 @@ class Failover:
         return True
 
     def on_standstill(self, stood_ns: int) -> None:
-        """The supervisor stood still for so long: no process could come back to it."""
+        """Extend the deadlines by a standstill of the supervisor: no process could reconnect."""
         self._living_ns += stood_ns
         self._start_ns += stood_ns
         self._hub_ns += stood_ns
@@ -147,11 +147,11 @@ class Failover:
             self._open(self._standing, here, [name for name in expected if name not in here], now_ns)
 
     def _is_ahead(self, standing: ResumeState) -> bool:
-        """Whether the vHub knows of commits that are not in the supervisor's journal."""
+        """Whether the vHub has commits that are not in the supervisor's journal."""
         return bool(standing.commit) and decode(Commit, standing.commit).tick > self._state.frame.tick
 
     def _catch_up(self, standing: ResumeState) -> None:
-        """Go on from the vHub's last commit. Raises Malformed for one that does not fit its frame."""
+        """Continue from the vHub's last commit. Raises Malformed for one that does not fit its frame."""
         state, frame = self._state, self._state.frame_of(standing)
         # A commit that the journal lost has reported the open outages, with their length: they are not reported again.
         close_outages(state.recovered, state.committed_ns, state.committed_ns)

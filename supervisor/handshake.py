@@ -50,7 +50,7 @@ class Handshake:
         self._state.publish(channels.PIECE, fetch.name, piece_of(self._state.deployment, fetch))
 
     def on_ready(self, ready: Ready, now_ns: int) -> Process | None:
-        """Note a layout that a process has built; return the process when the run goes on with it."""
+        """Record a layout that a process has built; return the process when the run continues with it."""
         state = self._state
         process = state.roster.by_name.get(ready.name)
         is_known = process is not None and process.boot == ready.boot and ready.name not in state.roster.stopped

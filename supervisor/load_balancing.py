@@ -15,7 +15,7 @@ from typing import Final
 from foosim.supervisor.state import RunState
 
 EVERY_NS: Final = 1_000_000_000
-"""How often loads are looked at: a heartbeat tells the load of the last second."""
+"""How often loads are compared: a heartbeat has the load of the last second."""
 SETTLE_NS: Final = 5_000_000_000
 """After a move, loads are new."""
 STAY_NS: Final = 60_000_000_000

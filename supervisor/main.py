@@ -133,9 +133,9 @@ class SupervisorProcess:
             return REFUSED
         if self.core.state.cut_off and self._has_capture():
             self.core.state.cut_off = ""
-        told = self.core.result()
-        self._folder.write_result(told)
-        return FAILED if told["failed"] else DONE
+        result = self.core.result()
+        self._folder.write_result(result)
+        return FAILED if result["failed"] else DONE
 
     def _has_capture(self) -> bool:
         """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""

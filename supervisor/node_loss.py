@@ -1,7 +1,7 @@
 """Loss, stop and return of nodes: the epoch that follows, and who owns which robot in it.
 
-A run that loses a node goes on from its last commit with a new epoch (design, section 5). The members that are left
-adopt the robots of the lost node and give them back when it returns. Without any node the world stands still.
+A run that loses a node continues from its last commit with a new epoch. The remaining members
+adopt the robots of the lost node and give them back when it returns. Without any node the run waits.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class NodeLoss:
         self._finish = finish
 
     def lose(self, name: str, reason: str, now_ns: int) -> None:
-        """A node is lost: go on without it, or end the run where the deployment says so."""
+        """Continue without a lost node, or end the run, as the deployment configures."""
         state = self._state
         process = state.roster.by_name.get(name)
         if process is not None:
@@ -146,7 +146,7 @@ class NodeLoss:
         return self._state.deployment.on_node_loss == "freeze"
 
     def _ends_run(self, name: str) -> bool:
-        """Whether the run cannot go on without a node."""
+        """Whether the run ends without a node."""
         deployment = self._state.deployment
         return deployment.nodes[name].required or deployment.on_node_loss == "stop"
 
@@ -154,7 +154,7 @@ class NodeLoss:
         return any(entry.what == "node" and entry.name == name for entry in self._state.recovered)
 
     def _freeze(self, lost: str) -> None:
-        """Where the deployment says so, take the robots of a lost node out of service from the last commit on."""
+        """Where configured, take the robots of a lost node out of service from the last commit on."""
         state = self._state
         if self._freezes:
             frozen: list[Edit] = [Freeze(robot) for robot, owner in sorted(state.owners.items()) if owner == lost]

@@ -79,7 +79,7 @@ class Pacer:
         self.granted = next_tick
 
     def resume(self, next_tick: int, now_ns: int) -> None:
-        """Go on with `next_tick` now."""
+        """Continue with `next_tick` now."""
         self.paused = False
         self.start(now_ns, next_tick)
 

@@ -63,7 +63,7 @@ class ProgressMonitor:
         self._begun_ns = self._progress_ns = now_ns
 
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
-        """The supervisor's own loop stood still for so long: no deadline of another process runs then."""
+        """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""
         for process in self._state.roster.by_name.values():
             process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
         self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
@@ -180,9 +180,9 @@ class ProgressMonitor:
         if silent:
             return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
         if state.is_resuming:
-            return {}  # nobody is waited for yet
+            return {}  # no process is waited for yet
         if state.is_vhub_away:
-            self._progress_ns = now_ns  # nothing goes on without it, and nobody else is to blame
+            self._progress_ns = now_ns  # the run waits for it, and no other process is overdue
             return {}
         names = [name for name in self.waiting_for() if name in state.members or name not in deployment.nodes]
         if all(name in deployment.players or name in deployment.clients for name in names):
@@ -205,8 +205,8 @@ class ProgressMonitor:
     def _waits_for_capture(self, names: list[str]) -> bool:
         """Whether only the vHub is waited for, and reports to wait for its disk."""
         hub = self._state.roster.by_name.get(VHUB)
-        told = None if hub is None else hub.heartbeat
-        return names == [VHUB] and told is not None and told.waiting_for == CAPTURE
+        beat = None if hub is None else hub.heartbeat
+        return names == [VHUB] and beat is not None and beat.waiting_for == CAPTURE
 
     def _late_to_start(self, now_ns: int) -> dict[str, str]:
         """Return the local processes and players that did not start in time; one started by hand has no limit."""
@@ -238,7 +238,7 @@ class ClosingMonitor:
         self._ended_ns = now_ns
 
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
-        """The supervisor stood still for so long and could not hear of any progress."""
+        """Extend the deadline by a standstill of the supervisor, which received no progress meanwhile."""
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
         self._ended_ns = min(now_ns, self._ended_ns + stood_ns)
 

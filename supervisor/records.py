@@ -351,6 +351,6 @@ def _commit(history: History, record: CommitRecord) -> None:
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)
     over = close_outages(history.recovered, history.committed_ns, record.now_ns)
-    for entry, told in zip(over, commit.recovered, strict=False):
-        entry.outage_ns = told.outage_ns  # the vHub's is longer than that between two commits
+    for entry, committed in zip(over, commit.recovered, strict=False):
+        entry.outage_ns = committed.outage_ns  # the vHub's is longer than that between two commits
     history.committed_ns = record.now_ns

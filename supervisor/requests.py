@@ -324,10 +324,10 @@ class Requests:
             why = f"no load is known of {', '.join(silent)}" if silent else "one node takes part: nothing can move"
             raise Refused(why)
         shifts = shifts_at_once(loads, state.owners, state.deployment.owners())
-        told = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
+        shares = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
         if not shifts:
             least = f"no move would win more than a robot's share, or {WORTH:.0%}"
-            return self._accept(request, tick, f"nothing moves at tick {tick}: loads are {told}; {least}")
+            return self._accept(request, tick, f"nothing moves at tick {tick}: loads are {shares}; {least}")
         owners = dict(state.owners)
         moved: dict[tuple[str, str], list[str]] = {}
         for shift in shifts:
@@ -335,7 +335,7 @@ class Requests:
             self._node_loss.moved(shift.robot)
             moved.setdefault((shift.source, shift.target), []).append(shift.robot)
         ways = "; ".join(f"{', '.join(robots)} from {source} to {node}" for (source, node), robots in moved.items())
-        text = f"moved at tick {tick}, for loads were {told}: {ways}"
+        text = f"moved at tick {tick}, for loads were {shares}: {ways}"
         answer = self._accept(request, tick, text[:TEXT_MAX], owners=owners)
         state.account.moves += len(shifts)
         self._open_epoch(owners, now_ns)
@@ -367,7 +367,7 @@ class Requests:
         return self._accept(request, state.frame.tick, text)
 
     def _down(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """End the run in order; at once, as failed, with `lost`: a loss that only the launcher knows of."""
+        """End the run in order; at once, as failed, with `lost`: a loss that only the launcher can detect."""
         lost = arguments.get("lost")
         if isinstance(lost, str) and lost:
             self._finish(f"lost {lost}")

@@ -44,7 +44,7 @@ class Process:
     farewell: bool = False
     gone_ns: int = 0
     in_doubt: bool = False
-    """Its connection has ended, perhaps only because the supervisor stood still."""
+    """Its connection has ended, possibly by a standstill of the supervisor."""
     lost: bool = False
     """The run continues without it; it may rejoin by the handshake."""
 

@@ -165,11 +165,11 @@ class RunState:
     is_vhub_away: bool
     """Whether the run waits for a vHub that was lost (`vhub_loss`)."""
     granted_boot: str
-    """Boot of the vHub that was last allowed to go on."""
+    """Boot of the vHub that was last granted its resume."""
     found_living: bool
     """Whether a process has reported that took part before this supervisor was started."""
     abandoned: str
-    """Why a run that was resumed does not go on."""
+    """Why a resumed run does not continue."""
 
     def __init__(self, settings: RunSettings, fingerprint: bytes, boot: str, clock: str) -> None:
         """`boot` names this start of the supervisor, `clock` the monotonic clock of its times."""
@@ -236,7 +236,7 @@ class RunState:
         self.publish(channels.PREPARE, channels.SUPERVISOR, Prepare(self.added(layout)))
 
     def grant(self, standing: ResumeState) -> None:
-        """Let the vHub go on: its resume position is known."""
+        """Grant the vHub's resume: its position is known."""
         self.granted_boot = standing.boot
         self.publish(channels.RESUME_GRANT, channels.VHUB, ResumeGrant(channels.VHUB, standing.boot, self.epoch))
 

@@ -134,9 +134,9 @@ def _recoveries(state: RunState) -> list[dict[str, object]]:
 def _recording(state: RunState) -> dict[str, Any]:
     """Return the state of the capture as the vHub reported it last, which after its farewell is final."""
     hub = state.roster.by_name.get(VHUB)
-    told = state.roster.hub_account.get("recording") or NOT_RECORDED
-    is_open = state.finished and hub is not None and not hub.farewell and told["state"] in ("on", "low", "closing")
-    return {**told, "state": UNFINISHED} if is_open else told
+    recording = state.roster.hub_account.get("recording") or NOT_RECORDED
+    is_open = state.finished and hub is not None and not hub.farewell and recording["state"] in ("on", "low", "closing")
+    return {**recording, "state": UNFINISHED} if is_open else recording
 
 
 def _score(frame: Frame) -> dict[str, int] | None:
@@ -180,8 +180,8 @@ def _processes(state: RunState, waiting_for: str, refused: Mapping[str, Any]) ->
         for name, process in sorted(state.roster.by_name.items())
     }
     own = {"role": SUPERVISOR, "host": "", "lost": False, "stopped": False, "busy": round(state.busy, 3)}
-    told = {"tick": state.frame.tick, "waiting_for": waiting_for, "refused": refused}
-    return {**processes, SUPERVISOR: {**own, **told}}
+    position = {"tick": state.frame.tick, "waiting_for": waiting_for, "refused": refused}
+    return {**processes, SUPERVISOR: {**own, **position}}
 
 
 def _state(state: RunState) -> str:

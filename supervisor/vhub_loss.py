@@ -1,7 +1,7 @@
-"""Loss of the vHub and of players: the run waits for a lost vHub, and the account has how long the world stood still.
+"""Loss of the vHub and of players: the run waits for a lost vHub, and records the duration of the outage.
 
 Nodes only lack deliveries meanwhile, so no robot moves and no epoch begins. The vHub returns by the handshake, as a
-process that was started again and goes on from its journal, or by a heartbeat, when only its connection or its loop had
+process that was restarted and resumed from its journal, or by a heartbeat, when only its connection or its loop had
 stalled. The vHub itself deals with lost players and reports them in its heartbeats.
 """
 
@@ -82,7 +82,7 @@ class VhubLoss:
             self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
     def on_standstill(self, stood_ns: int) -> None:
-        """The supervisor's loop stood still for so long: no deadline of the vHub runs then."""
+        """Extend the vHub's deadline by a standstill of the supervisor's loop."""
         self._since_ns += stood_ns
 
     def timeout(self, now_ns: int) -> str:
@@ -95,7 +95,7 @@ class VhubLoss:
         return f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s"
 
     def note(self) -> None:
-        """Add the loss to the account: the world has stood still until now."""
+        """Record the loss, with the outage until now."""
         self._entry = self._state.note_recovery("vhub", channels.VHUB, self._reason, *self._lost_at)
 
 
@@ -120,16 +120,16 @@ class PlayerLosses:
 
     def on_report(self, hub: Process) -> None:
         """Add the new entries of a vHub's report; those that the journal has are not new."""
-        state, told = self._state, hub.report.get("absences")
-        if told is None or not state.is_open or state.end is not None:
+        state, absences = self._state, hub.report.get("absences")
+        if absences is None or not state.is_open or state.end is not None:
             return
-        if told["boot"] != hub.boot:
+        if absences["boot"] != hub.boot:
             return  # a late report of a vHub before this one
         if hub.boot != self._boot:
             self._boot, self._heard = hub.boot, 0
             self._known = Counter((entry.what, entry.name, entry.reason, entry.tick) for entry in state.recovered)
-        gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in told["away"]}
-        for number, what, name, reason, tick in told["over"]:
+        gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in absences["away"]}
+        for number, what, name, reason, tick in absences["over"]:
             if number <= self._heard:
                 continue
             self._heard = number

@@ -36,7 +36,7 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Lease:
-    """The frames per second, links and readings that one viewer wants, and until when."""
+    """The frames per second, links and readings that one viewer requests, and until when."""
 
     hz: float
     links: list[Pair]
@@ -49,7 +49,7 @@ class Viewing:
 
     def __init__(self, state: RunState) -> None:
         self.is_shown = False
-        """Whether a viewer wants frames: the only question of a commit while none does."""
+        """Whether a viewer requests frames: the only check at a commit without viewers."""
         self._state = state
         self._leases: dict[str, _Lease] = {}
         """By requester."""
@@ -139,7 +139,7 @@ class Viewing:
             self._say_watched(self._watched)
 
     def _hub_is_wrong(self) -> bool:
-        """Whether the vHub reports what no viewer wants: it has missed that, or an earlier supervisor told it to."""
+        """Whether the vHub reports values that no viewer requests, after a missed message or a failover."""
         hub = self._state.roster.by_name.get(channels.VHUB)
         keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
         return keeps and not self._is_watching and self._state.end is None
