@@ -1,1 +1,1 @@
-"""What a capture says: explanations of packets, comparison of captures, tables, exports."""
+"""Analysis of captures: explanations of packets, comparison of captures, tables, exports."""

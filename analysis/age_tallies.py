@@ -32,12 +32,12 @@ class AgeTallies:
         self._counts: dict[Channel, Counts] = {}
 
     def take_row(self, row: AgeRow) -> None:
-        """Take what a capture tells of a second."""
+        """Add a capture's row of one second."""
         counts = {age_ns // self._tick_ns: count for age_ns, count in zip(row.ages_ns, row.counts, strict=False)}
         add_counts(self._counts.setdefault((row.source, row.client, row.channel), {}), counts)
 
     def take(self, ages: Iterable[Age]) -> None:
-        """Take what a closing tells."""
+        """Add the ages of a closing."""
         for age in ages:
             add_counts(self._counts.setdefault((age.source, age.client, age.channel), {}), age.counts)
 

@@ -63,7 +63,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Diff:
-    """What a comparison found. `about` names what the two say of themselves that is not equal; it decides nothing."""
+    """The result of a comparison. `about` names unequal metadata of the two, which do not affect the result."""
 
     channels: Mapping[str, Channel]
     about: tuple[str, ...]
@@ -155,7 +155,7 @@ def _differs(a: About, b: About, key: str) -> bool:
 
 
 class _Comparison:
-    """Compares what has been taken of both sides, and holds what one is ahead."""
+    """Compares the rows of both sides, and keeps those by which one is ahead."""
 
     def __init__(self, tick_ns: int, fields: frozenset[str], topics: frozenset[str]) -> None:
         self.channels: dict[str, Channel] = {}
@@ -213,7 +213,7 @@ class _Comparison:
 
 
 def _differ_in_walls(one: Message, other: Message) -> bool:
-    """Whether two rows are equal but for the fields that a clock of the real world told: most of those of two runs."""
+    """Whether two rows are equal except for wall times, as most rows of two equal runs are."""
     unwalled = _UNWALLED.get(one.topic)
     if not unwalled:
         return False
@@ -236,7 +236,7 @@ def _row(message: Message) -> Row:
 
 
 def _content(message: Message) -> Any:
-    """Return what a message holds, as plain values with names."""
+    """Return a message as plain values by name."""
     if message.topic == POSES:
         poses = read_poses(message.data)
         return {pose.link: {"position": [*pose.position], "orientation": [*pose.orientation]} for pose in poses}
@@ -286,7 +286,7 @@ def first_difference(a: Any, b: Any, ignored: frozenset[str], path: str = "") ->
 
 
 def _texts(a: Any, b: Any) -> tuple[str, str]:
-    """Return two different values as texts; of long ones what stands where they differ."""
+    """Return two different values as texts; of long ones the part where they differ."""
     one, other = (value if isinstance(value, str) else msgspec.json.encode(value).decode() for value in (a, b))
     if max(len(one), len(other)) <= VALUE_LENGTH_MAX:
         return one, other

@@ -1,4 +1,4 @@
-"""Explaining the drops of a link that somebody looks at while the run goes on, from what the vHub reports of it."""
+"""Explains the drops of a watched link of a running system, from the vHub's report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from foosim.world.frame import Frame
 
 @dataclass(frozen=True)
 class Reported:
-    """What is known beside a row: the deployment, what the vHub reported under `watched`, and frames that were shown.
+    """The context of a row: the deployment, what the vHub reported under `watched`, and frames that were shown.
 
     `shown(tick)` gives the newest of them at or before a tick, None where none is kept: then what took how much of a
     signal in between is not told.

@@ -103,7 +103,7 @@ def explain_packet(capture: CaptureData, which: PacketName) -> Explained:
 
 
 def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
-    """Return what became of a packet, by its row and by what else is known of its run. Raises CaptureError."""
+    """Return the explanation of a packet's fate, by its row and its run. Raises CaptureError."""
     return _told(Stages(evidence, row))
 
 

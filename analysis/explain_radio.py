@@ -23,7 +23,7 @@ from foosim.vhub.stages.medium import ACCESS_BLOCK, wifi_timing
 
 
 def attempts_of(row: PacketRow, setup: LinkSetup, *, broadcast: bool) -> tuple[float, list[str]]:
-    """Return the probability that an attempt to send collided, and what became of each; none where nobody contends."""
+    """Return the probability of a collision per attempt, and the result of each; none without contenders."""
     settings, contenders = setup.settings, max(1, row.contenders)
     if settings.medium == "wifi":
         threshold = wifi_contention(contenders, wifi_timing(settings), unicast=not broadcast).threshold

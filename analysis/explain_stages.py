@@ -69,7 +69,7 @@ def _share(word: int) -> str:
 
 
 class Evidence(Protocol):
-    """What is known of the run of a row beside it: a capture, or what a running system keeps."""
+    """The context of a row: a capture, or the recent state of a running system."""
 
     @property
     def deployment(self) -> Deployment: ...
@@ -82,7 +82,7 @@ class Evidence(Protocol):
         """Return what was asked of the network up to a tick: ticks and events as JSON, in their order."""
 
     def frame(self, tick: int) -> Frame | None:
-        """Return the newest frame at or before a tick, None where none is known."""
+        """Return the newest frame at or before a tick, None where there is none."""
 
     def clients(self) -> Iterable[ClientRow]:
         """Return who joined and left, in their order."""

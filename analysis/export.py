@@ -133,7 +133,7 @@ class CsvSink:
 
 
 class ParquetSink:
-    """Parquet by pyarrow, a row group a batch; units stand in the metadata of the columns."""
+    """Parquet by pyarrow, a row group for each batch; units are in the metadata of the columns."""
 
     def __init__(self, path: Path, table: Table) -> None:
         try:

@@ -102,7 +102,7 @@ def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
 
 
 def use_text(status: dict[str, Any]) -> str:
-    """`18 links used`: those that a packet was offered to, however many of them are told."""
+    """`18 links used`: links with packets, including those without a line."""
     count = status["links_in_all"]
     return f"{count} link{'' if count == 1 else 's'} used"
 

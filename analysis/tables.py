@@ -31,7 +31,7 @@ POSES_TABLE: Final = "poses"
 COMMANDS_TABLE: Final = "commands"
 
 Decode = Callable[[msgspec.json.Decoder[Any], Message], Any]
-"""Gives the row that a message holds, or says which message of which file is damaged."""
+"""Decodes the row of a message, or raises with the file and the place of a damaged one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ _UNITS: Final[Mapping[str, str]] = {
 
 
 def unit_of(name: str) -> str:
-    """Return the unit that a name says."""
+    """Return the unit by the ending of a name."""
     return _UNITS.get(name.rpartition("_")[2], "")
 
 
@@ -126,7 +126,7 @@ def _columns(kind: type[Row]) -> tuple[Column, ...]:
 
 
 def _plain(kind: inspect.Type) -> inspect.Type:
-    """Return a type without what says more of it than its values."""
+    """Return a type without its annotations."""
     while isinstance(kind, inspect.Metadata):
         kind = kind.type
     return kind
@@ -158,7 +158,7 @@ def _rows_table(name: str, topic: str, kind: type[Row]) -> Table:
 
 
 class _Decoded:
-    """Turns payloads into values, as far as it is known what they mean."""
+    """Decodes payloads of channels with a known type."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -176,7 +176,7 @@ class _Decoded:
         return self._kinds[pair]
 
     def numbers(self, kind: str, payload: bytes) -> dict[str, Any]:
-        """Return what a payload holds by name; nothing when it is no payload of its channel, or plain bytes."""
+        """Return the values of a payload by name; none for plain bytes and for an invalid payload."""
         if not kind:
             return {}
         try:

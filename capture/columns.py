@@ -120,7 +120,7 @@ class Frames:
         return len(self.ticks)
 
     def frame(self, index: int) -> Frame:
-        """Return one of them as a frame, from which a world can go on."""
+        """Return one of them as a frame, from which a world can be continued."""
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
     def column(self, entity: str, field: str, count: int = 1) -> Numbers:
@@ -156,7 +156,7 @@ class AllFrames:
         return self._one_block().values
 
     def frame(self, index: int) -> Frame:
-        """Return one of them as a frame, from which a world can go on; raises IndexError."""
+        """Return one of them as a frame, from which a world can be continued; raises IndexError."""
         left = index + len(self) if index < 0 else index
         for block in self.blocks:
             if 0 <= left < len(block):

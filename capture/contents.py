@@ -41,7 +41,7 @@ CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cu
 """Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
 metadata `foosim`."""
 CUT_REASON: Final = "cut"
-"""The reason of its end that a part says."""
+"""The reason in the metadata at the end of a part."""
 OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
 """The metadata that differ between the files of a capture."""
 
@@ -96,7 +96,7 @@ def write_all(file: int, content: bytes) -> None:
 
 
 def check_new(path: Path, *, is_split: bool = False) -> None:
-    """Raise CaptureError when there is something where a capture is to be, or where one that is split goes on."""
+    """Raise CaptureError when a file exists at the path of a capture, or of a part of a split one."""
     there = parts_at(path) if is_split else {0: path} if os.path.lexists(path) else {}
     for found in there.values():
         raise CaptureError(f"{found}: exists already; a capture is never overwritten")

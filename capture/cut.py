@@ -36,7 +36,7 @@ from foosim.common.units import format_ns
 from foosim.world.frame import chain_next
 
 _BEFORE_TICK: Final = frozenset({EPOCHS, LAYOUT, CLIENTS, RECOVERIES})
-"""Rows of a closing that stand before its row of /tick."""
+"""Rows of a closing that precede its row of /tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class _Start:
     chain: bytes = b""
 
     def take(self, scan: Scan, message: Message) -> None:
-        """Take one more message; what it brings holds from here on."""
+        """Add a message to the active state."""
         if message.topic == TICK:
             row = scan.decode(DECODERS[TICK], message)
             self.digest = bytes.fromhex(row.digest)
@@ -177,7 +177,7 @@ class _Copy:
         return True
 
     def _begin_tick(self) -> None:
-        """Write what stands before a row of /tick; at the first one of the cut that is what is in force there."""
+        """Write the rows before a row of /tick; before the first one of the cut, the active state."""
         head, self._head = self._head, []
         if self._begun:
             for message in head:

@@ -23,7 +23,7 @@ from foosim.common.units import format_ns
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """Bytes of a file that are not what was written, and how that is known."""
+    """Damaged bytes of a file, and the check that found them."""
 
     file: str
     byte: int
@@ -140,7 +140,7 @@ class _Walk:
 
 
 def _following(stream: BinaryIO, at: int, stop: int) -> int:
-    """Return where reading goes on behind a broken record: at the next one, where its length leads to one."""
+    """Return where reading continues after a broken record: at the next one, if its length leads to one."""
     following = _behind(stream, at, stop)
     if following == stop or (following is not None and _behind(stream, following, stop) is not None):
         return following

@@ -28,7 +28,7 @@ from foosim.capture.mcap.format import MAGIC, RECORD, Content, McapFile, Message
 FOOTER: Final = struct.Struct("<BQQQI8s")
 """The last record of an MCAP file, and the magic bytes behind it."""
 _BEHIND_FOOTER: Final = 4 + len(MAGIC)
-"""Its checksum, which is of what stands before it, and those bytes."""
+"""Its checksum, which is over the bytes before it, and those bytes."""
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
@@ -77,7 +77,7 @@ def first_there(path: Path) -> Path:
 
 
 def head_of(path: Path) -> dict[str, str]:
-    """Return what a file says of itself at its beginning; nothing when it does not. Raises CaptureError."""
+    """Return the metadata at a file's beginning; empty without it. Raises CaptureError."""
     try:
         with path.open("rb") as stream:
             size = path.stat().st_size
@@ -92,7 +92,7 @@ def head_of(path: Path) -> dict[str, str]:
 
 
 def number_of(path: Path, head: dict[str, str], entry: str = PART) -> int:
-    """Return a whole number that a file says of itself. Raises CaptureError when it is none."""
+    """Return an integer of a file's metadata. Raises CaptureError when it is none."""
     text = head[entry]
     if not (text.isascii() and text.isdigit() and len(text) < 19):
         raise CaptureError(f"{path}: its {entry} is no number, {text!r}")
@@ -136,7 +136,7 @@ def files_from(path: Path) -> list[Path]:
 
 
 def end_of(path: Path) -> dict[str, str] | None:
-    """Return what a file says at its end, by its summary; None when it has no end. Raises CaptureError."""
+    """Return the metadata at a file's end, by its summary; None for an unfinished file. Raises CaptureError."""
     try:
         with path.open("rb") as stream:
             size = path.stat().st_size
@@ -209,7 +209,7 @@ class Joined:
 
     @property
     def is_checked(self) -> bool:
-        """Whether the first file has the digests of what stands before its messages, and they are right."""
+        """Whether the first file has the digests of the records before its messages, and they are right."""
         return self._first is not None and self._first.is_checked
 
     @property

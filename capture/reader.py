@@ -137,7 +137,7 @@ class About:
 
 
 class Scan:
-    """One pass over a file: it yields the messages of some topics and gathers what stands beside them (`about`)."""
+    """One pass over a file: yields the messages of some topics and collects the file's metadata (`about`)."""
 
     def __init__(self, path: Path, since_ns: int = 0, *, earlier: bool = False) -> None:
         """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`).
@@ -174,7 +174,7 @@ class Scan:
             yield message.topic, self.decode(DECODERS[message.topic], message)
 
     def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
-        """Return the row that a message holds."""
+        """Return the row of a message."""
         try:
             return decoder.decode(message.data)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -276,7 +276,7 @@ class CaptureData:
 
     @property
     def frames(self) -> AllFrames:
-        """All captured frames, whatever was added and removed in between."""
+        """All captured frames, over changes of the layout."""
         return AllFrames(str(self.path), self.frame_blocks)
 
     @cached_property

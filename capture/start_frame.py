@@ -1,4 +1,4 @@
-"""A frame of a capture as the start of another run: `CAPTURE@12.5s` or `CAPTURE@last`, read with what has to fit.
+"""A frame of a capture as the start of another run: `CAPTURE@12.5s` or `CAPTURE@last`, and its checks.
 
 A branch begins with the newest captured frame at or before the time, keeps its tick, and goes on from the chain over
 all frames up to it: with the inputs of the captured run it has the digests of the captured run.
@@ -23,7 +23,7 @@ from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Outbox
 
 LAST: Final = "last"
-"""What stands for the time of the last captured frame."""
+"""The word for the time of the last captured frame."""
 
 
 class BadBranch(Refused):

@@ -82,7 +82,7 @@ class LatchedTopic:
 
 
 def _book_of(path: Path) -> Book:
-    """Return where the chunks of a file stand, and what they are of."""
+    """Return the places of a file's chunks, with their times and topics."""
     try:
         with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as content:
             return scan(content, str(path)).book

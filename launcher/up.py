@@ -484,8 +484,13 @@ class Up:
         """Report the child that ended before the run did, with the end of its log, and the path of the log to blame."""
         child = self._lost
         if child is None:
-            blamed = self._launcher.children.get(result["reason"].partition(" ")[0])
-            return [] if blamed is None else [f"the log of {blamed.name} is {blamed.log}"]
+            name = result["reason"].removeprefix("lost ").partition(" ")[0].rstrip(":")
+            blamed = self._launcher.children.get(name)
+            if blamed is None:
+                return []
+            has_failed = blamed.exit_code not in (None, DONE)
+            how = f"{name} {blamed.ending}; its log is" if has_failed else f"the log of {name} is"
+            return [f"{how} {blamed.log}"]
         return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
 
     def _capture_lines(self) -> list[str]:

@@ -62,9 +62,9 @@ class Playback:
         """Continue from a captured time."""
         self._entries = self._entries_from(time_ns)
         self._time_ns = self._last_ns = time_ns
-        """Captured time at the anchor, or of a replay that stands; captured time of the last published entry."""
+        """Captured time at the anchor, or of a paused replay; captured time of the last published entry."""
         self._anchor_ns: int | None = None
-        """Wall time at which `_time_ns` was due; None while it stands."""
+        """Wall time at which `_time_ns` was due; None while paused."""
         self._problem = ""
         self._is_empty = True
         self._load()

@@ -49,7 +49,7 @@ BIG: Final = frozenset({TICK, FRAME})
 """The topics that only a re-simulation needs, played when they are selected."""
 
 WAITING_MAX: Final = 100_000
-"""How many entries are held for sorting, whatever a file holds."""
+"""Greatest number of entries that are kept for sorting."""
 
 Decode = Callable[[msgspec.json.Decoder[Any], Message], Any]
 """Returns the row of a message; raises CaptureError, which names file and message."""

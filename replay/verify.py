@@ -82,7 +82,7 @@ def verify(
     start: Start | None = None,
     files: Mapping[str, bytes] | None = None,
 ) -> Verified:
-    """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare.
+    """Simulate again the run of `ticks` (from 0, or from that of `start` on, in order) on `nodes` nodes, and compare.
 
     `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
     """

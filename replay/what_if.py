@@ -1,4 +1,4 @@
-"""What if the network had been another one: the packets that a capture says were offered, judged again.
+"""What-if: the packets of a capture, judged again by another network.
 
 The ticks of the capture are closed again by the vHub's own state, with the frames, clients and orders that the capture
 has, and with the network that is asked about. It is an open loop: robots and clients send what they sent, whatever
@@ -214,7 +214,7 @@ class _Compared:
         key = flight.source, flight.sequence, flight.destination, flight.copy
         before = self._rows.pop(key, None)
         if before is None and not flight.copy and self._is_part:
-            return  # its row is behind the end of a part: another receiver's says that it was sent
+            return  # its row is after the end of a part: the row of another receiver shows that it was sent
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
         if after != before:

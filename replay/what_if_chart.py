@@ -28,7 +28,7 @@ _FIGURES: Final[tuple[tuple[str, Callable[[LinkChange, Side], float]], ...]] = (
 
 
 def picture(found: WhatIf, title: str) -> str:
-    """Return an SVG document that stands by itself."""
+    """Return a self-contained SVG document."""
     links = found.links[:LINKS_MAX]
     width, height = NAME + len(_FIGURES) * (PANEL + GAP), TOP + ROW * len(links) + 20
     head = f"{title}: {found.packets} packets, {found.changed} changed"

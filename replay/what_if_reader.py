@@ -26,7 +26,7 @@ from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
 
 Frames = Literal["first", "captured", "computed"]
-"""Where frames come from: the first one stands for all, each is in the capture, or they are simulated again."""
+"""Source of frames: the first one is used for all, each is in the capture, or they are simulated again."""
 _INDEX: Final = (1 << OUTBOX_SHIFT) - 1
 
 

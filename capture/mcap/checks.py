@@ -100,7 +100,7 @@ class Described:
         return {**self.digests, BEFORE: f"{before:08x}"}
 
     def check(self, told: Mapping[str, str], before: int) -> None:
-        """Compare with what `CHECKS` says. Raises ValueError for the first that differs."""
+        """Compare with the values of `CHECKS`. Raises ValueError for the first that differs."""
         for name, value in sorted(self.entries(before).items()):
             if told.get(name) != value:
                 what = "the file up to here" if name == BEFORE else f"attachment {name!r}"
@@ -112,7 +112,7 @@ class Described:
 
 
 class Span:
-    """The times of the chunk at a byte: as its head tells them, and as its indexes do."""
+    """The times of the chunk at an offset: those of its head, and those of its indexes."""
 
     def __init__(self, at: int, first_ns: int, last_ns: int) -> None:
         self.at = at

@@ -51,7 +51,7 @@ IN_SUMMARY: Final = frozenset(
         *(Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET, Opcode.FOOTER),
     }
 )
-"""Which records stand before the end of the data, and which behind it; any other is a damaged one."""
+"""Records before the end of the data, and records after it; any other is damaged."""
 _SEARCH_BYTES: Final = 1 << 20
 
 assert sys.byteorder == "little", "indexes are written as the machine has them"
@@ -59,7 +59,7 @@ assert sys.byteorder == "little", "indexes are written as the machine has them"
 
 @dataclass(slots=True)
 class Book:
-    """What the summary of a file says in the end: kept while it is written, found again in one that has none."""
+    """The contents of a file's summary: collected while it is written, or read again from an unfinished file."""
 
     offset: int = 0
     """How many bytes the file has."""
@@ -105,7 +105,7 @@ class ByteSource(Protocol):
 
 
 class McapFile:
-    """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
+    """Reads an MCAP file from start to end. `unfinished_bytes` is what follows the last whole record."""
 
     def __init__(
         self, stream: BinaryIO, size: int, name: str, since_ns: int = 0, topics: frozenset[str] | None = None
@@ -118,9 +118,9 @@ class McapFile:
         self._stream, self._size, self._name = stream, size, name
         self._since_ns, self._wanted = since_ns, topics
         self.repeats = False
-        """Whether the first chunk only says again what was said in another file: then it is passed by."""
+        """Whether the first chunk repeats the state of another file, and is skipped."""
         self.at = 0
-        """Where the record stands that is read, or that is damaged."""
+        """The offset of the present record, or of the damaged one."""
         self._is_whole = True
         """Whether nothing was left out as damaged."""
         self._crc: int | None = 0
@@ -171,7 +171,7 @@ class McapFile:
 
     @property
     def is_checked(self) -> bool:
-        """Whether the digests of what stands before the messages have come, and are right."""
+        """Whether the digests of the records before the messages are there, and right."""
         return self._described.is_checked
 
     def _damaged(self, what: str) -> Damaged:
@@ -182,7 +182,7 @@ class McapFile:
             self._crc = crc32(content, crc32(head, self._crc))
 
     def _check(self, opcode: int, content: bytes) -> None:
-        """Compare what a record says of the bytes before it. Raises ValueError."""
+        """Compare a record's digests with the bytes before it. Raises ValueError."""
         if opcode == Opcode.MESSAGE_INDEX:
             if self._span is not None:
                 self._span.take(content)
@@ -207,7 +207,7 @@ class McapFile:
             raise Damaged(f"{error}: one is damaged that no other checksum is of", f"all before it: {error}") from None
 
     def _check_span(self, span: Span) -> None:
-        """Compare the times of a chunk with its indexes, behind which a record stands. Raises Damaged."""
+        """Compare the times of a chunk with those of its indexes. Raises Damaged."""
         try:
             span.check()
         except ValueError as error:

@@ -1,4 +1,4 @@
-"""The whole records of an MCAP file, for a writer that goes on behind them, and for those who look for a few messages.
+"""The whole records of an MCAP file, for a writer that resumes after them, and for readers of a few messages.
 
 A process that is killed leaves a record that is cut; a machine that loses its power may leave bytes that were never
 written. Everything before is kept, nothing behind is. Records are found by their heads: a chunk's content is read and
@@ -43,21 +43,21 @@ from foosim.capture.mcap.format import (
 )
 
 UNSYNCED_BYTES: Final = 8 * 1024 * 1024
-"""More than is written between two syncs, a second apart: what stands before that is on the disk."""
+"""More than is written between two syncs, a second apart: earlier bytes are on the disk."""
 _DAMAGED: Final = (EndOfFile, struct.error, ValueError, KeyError, IndexError, CaptureError, zstandard.ZstdError)
 """What reading a record raises that is not what was written."""
 
 
 @dataclass(slots=True)
 class Scanned:
-    """What a file holds up to its last whole record, or chunk with its indexes. `book.offset` is where that ends."""
+    """The contents of a file up to its last valid record, or chunk with its indexes, which ends at `book.offset`."""
 
     book: Book
     size: int
     finished: bool = False
-    """Whether the file has an end: then there is nothing to go on with."""
+    """Whether the file is finished, and cannot be resumed."""
     is_damaged: bool = False
-    """Whether more than one record that is cut stands behind the whole ones."""
+    """Whether more than one truncated record follows the valid ones."""
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """The entries of each record of metadata, by its name."""
 

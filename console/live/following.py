@@ -65,7 +65,7 @@ class Following:
         self._watched: Watched | None = None
         self._statuses = 0
         self._disturbers: dict[int, str] = {}
-        """The requester of an event of the network, by the tick from which it holds."""
+        """The requester of an event of the network, by the tick from which it applies."""
         self.stopped_by = ""
         """The requester of the run's end; empty without one."""
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
@@ -74,7 +74,7 @@ class Following:
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def world_of(self, what: Mapping[str, Any], files: Files) -> World:
-        """Return the world that an answer to `describe` is about: the known one where it is the same.
+        """Return the world of an answer to `describe`: the present one where it is the same.
 
         It may take a while, and changes nothing: for a thread. Raises Refused for what cannot be read.
         """

@@ -36,7 +36,7 @@ ROW_BYTES: Final = 256
 Points = list[tuple[float, float]]
 Numbers = NDArray[np.floating[Any]]
 Row = tuple[int, Any, Numbers]
-"""The tick, what the numbers are, the numbers; none of them is where nothing was heard before the next row."""
+"""The tick, what the numbers are, the numbers; empty where a gap precedes the next row."""
 _HOLE: Final[Numbers] = np.empty(0)
 
 
@@ -124,7 +124,7 @@ class History:
         """Set what is received from now on: frames while a browser watches, readings that a browser plots."""
         if not (wanted.readers and wanted.hz):
             self._frames.interrupt()
-        self._watched = wanted.readings  # further ones come as long as their lease lasts
+        self._watched = wanted.readings  # readings of other viewers last as long as their lease
         for reading, rows in self._readings.items():
             if reading not in wanted.readings:
                 rows.interrupt()

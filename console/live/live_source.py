@@ -71,7 +71,7 @@ class LiveSource:
         self._overlay_s = 0.0
         self._wanted = Wanted()
         self._changed = asyncio.Event()
-        """Something else is wanted, or frames do not fit the layout."""
+        """Set when another subscription is needed, or frames do not fit the layout."""
         self._closing = threading.Event()
         self._viewing = ThreadPoolExecutor(1, "console-view")
         self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
@@ -118,7 +118,7 @@ class LiveSource:
     # --- looking on --------------------------------------------------------------------------------------------------
 
     async def run(self, feed: Feed) -> None:
-        trouble = ""  # what was said last of a run that is not there
+        trouble = ""  # the last reported reason of a missing run
         try:
             while True:
                 try:

@@ -23,7 +23,7 @@ class StatusMarks:
         marks = []
         for entry in status["recoveries"][self._recoveries :]:
             if entry["outage_ms"] is None:
-                break  # it is told when it is over
+                break  # it is marked when it has ended
             marks.append({"tick": entry["tick"], "kind": "recovery", "text": recovery_text(entry)})
             self._recoveries += 1
         requests = [(asked["tick"], asked["verb"], asked["text"], asked["who"]) for asked in status["requests"]]

@@ -19,7 +19,7 @@ from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame
 
 FRAMES_KEPT: Final = 64
-"""Frames that were shown, for what stood between the ends of a packet that was dropped."""
+"""Recent frames, for the obstacles between the ends of a dropped packet."""
 FRAMES_APART_TICKS: Final = 20
 
 

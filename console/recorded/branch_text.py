@@ -15,7 +15,7 @@ from foosim.deployment.loader import load_deployment, read_deployment_text
 
 
 def branch_answer(recording: Recording, tick: int) -> Answered:
-    """Return the command that goes on from a tick; its tick is that of the captured frame that the run begins with.
+    """Return the command that continues from a tick; its tick is that of the captured frame that the run begins with.
 
     Behind a `#` it says where the deployment's file is not the captured one. Raises BadValue for a tick without a frame
     before it, CaptureError.
@@ -38,7 +38,7 @@ def _near(path: Path) -> Path:
 
 
 def _remark(recording: Recording, file: Path) -> str:
-    """Return what a reader should know of the deployment's file, empty when it is the captured one."""
+    """Return a note about the deployment's file, empty when it is the captured one."""
     try:
         there = load_deployment(read_deployment_text(file), str(file))
     except Refused:

@@ -22,7 +22,7 @@ WINDOW_NS: Final = 5_000_000_000
 READING_NS: Final = 30_000_000_000
 """How far back readings are looked for."""
 SPREAD_NS: Final = 1_000_000_000
-"""By how much rows of packets may stand behind later ones: what is longer on its way is not found."""
+"""By how much rows of packets may be out of order: packets that were longer in flight are not found."""
 
 Points = list[tuple[float, float]]
 

@@ -23,7 +23,7 @@ SLICE_ROWS: Final = 500
 TOLD_MAX: Final = 1024
 """Drops whose explanations are kept."""
 PACKETS_MAX: Final = 10_000_000
-"""Packets whose times are kept: some hundred MB. What comes behind them is in no window, and a note says so."""
+"""Packets whose times are kept: some hundred MB. Later ones are in no window, which a note reports."""
 
 
 class CaptureHistory:
@@ -66,7 +66,7 @@ class CaptureHistory:
 
     @property
     def left_packets(self) -> int:
-        """Packets that are in no window, for want of room."""
+        """Packets above the limit, which are in no window."""
         return max(0, len(self.recording.index.places[PACKETS]) - PACKETS_MAX)
 
     def _there(self, topic: str) -> int:

@@ -79,7 +79,7 @@ class _Part:
     done: int = 0
     ended: bool = False
     topics: dict[int, str] = field(default_factory=dict)
-    """By channel, of those that are wanted."""
+    """By requested channel."""
     last: int = -1
     """Number of its last chunk, -1 before the first."""
     taken: set[int] = field(default_factory=set)
@@ -220,7 +220,7 @@ class CaptureIndex:
                 self._complete(part)
             CHUNK_FIELDS.unpack_from(content)
             self.chunks.append(Chunk(part.number, part.done, RECORD.size + length))
-            # What the first chunk of a further file says again stands in the file before.
+            # The first chunk of a further file repeats rows of the file before.
             is_repeat = part.number > 0 and part.last < 0
             part.last = len(self.chunks) - 1
             part.taken = set(part.topics) if is_repeat else set()

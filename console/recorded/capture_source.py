@@ -347,6 +347,6 @@ class FileSource:
             return name, unit, []
         try:
             points = await self._in(self._back, curve_points, history, curve, self.tick(), max(self._world, 0))
-        except CaptureError:  # the pass over the whole capture tells of it
+        except CaptureError:  # the pass over the whole capture reports it
             points = []
         return name, unit, points

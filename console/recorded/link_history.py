@@ -22,7 +22,7 @@ from foosim.vhub.links.fabric import link_name
 from foosim.vhub.network.packet import DELIVERED, DROPPED
 
 LINKS_MAX: Final = 4096
-"""Links that are told apart; packets of further ones are counted in `others`."""
+"""Number of links with counts of their own; packets of further ones are counted in `others`."""
 DROPS_SHOWN: Final = 8
 SHARE_DIGITS: Final = 6
 

@@ -103,7 +103,7 @@ class _Table:
         return self._names.index(name), LENGTHS[name[1:]]
 
     def row(self, place: str, cells: Sequence[str]) -> tuple[str, int, list[float]]:
-        """Return what a line says: name, time in ns, the pose's seven numbers."""
+        """Return a line's values: name, time in ns, the pose's seven numbers."""
         if len(cells) != len(self._names):
             raise BadPoses(f"{place}: {len(cells)} values, the first line names {len(self._names)} columns")
         name = cells[self._name].strip()

@@ -31,7 +31,7 @@ MARKER_COLOUR: Final = (0.9, 0.6, 0.1, 1.0)
 UNSEEN_HZ: Final = 2.0
 BYTES_MAX: Final = 4 * 1024**3
 NOWHERE: Final = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
-"""Where a link is drawn that is not known at a time: out of sight."""
+"""The position of a link without a pose at a time: out of sight."""
 
 
 def load_tracks(path: Path) -> dict[str, Track]:

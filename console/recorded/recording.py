@@ -67,7 +67,7 @@ class Look:
     tick: int
     kind: Kind
     world: int
-    """Number of the world that holds."""
+    """Number of the present world."""
     poses: NDArray[np.float32]
     frame: Frame | None
     values: NDArray[np.float64]
@@ -130,7 +130,7 @@ class Recording:
             raise CaptureError(f"{self.path}: {message.topic} at {message.log_ns} ns: {error}") from None
 
     def world_at(self, tick: int) -> int:
-        """Return the number of the world that holds at a tick; the first one before it begins."""
+        """Return the number of the world at a tick; the first one before its beginning."""
         return max(0, bisect_right(self.worlds, tick, key=lambda world: world.tick) - 1)
 
     # --- the world at a tick -----------------------------------------------------------------------------------------

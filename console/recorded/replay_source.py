@@ -49,7 +49,7 @@ class PlayedSource:
     """One replay."""
 
     def __init__(self, connect: Callable[[tuple[str, ...]], Replay]) -> None:
-        """`connect` makes a connection that hears some streams. Raises what it raises."""
+        """`connect` opens a connection that receives some streams; its errors are raised."""
         self._replay: Final = connect(STREAMS)
         status = self._replay.status()
         self.tick_ns: Final = int(status["tick_ns"])

@@ -33,7 +33,7 @@ Recomputing = Callable[[Path], Recompute]
 
 
 def read_offset(second: Path | None, offset: str | None) -> int:
-    """Return the offset in ns that an option says, 0 without one. Raises BadValue."""
+    """Return the offset of an option in ns, 0 without one. Raises BadValue."""
     if offset is not None and second is None:
         raise BadValue("--offset needs --second")
     return 0 if offset is None else read_at("--offset", parse_offset_ns, offset)
@@ -78,7 +78,7 @@ def open_follower(
 
 
 def compared_text(path: Path, both: Collection[str]) -> str:
-    """Return the line that says what is compared."""
+    """Return the line that names the compared captures."""
     return f"second: {path.name}, compared by {_some(both)}"
 
 

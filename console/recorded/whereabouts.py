@@ -16,13 +16,13 @@ class Whereabouts:
     """Gives the poses of a recording's entities at times of a deck, in the thread that the recording belongs to."""
 
     def __init__(self, recording: Recording, offset_ns: int = 0, *, links: bool = False) -> None:
-        """`offset_ns`: the capture's time at time 0 of the deck. `links`: tell of each link under its name, too."""
+        """`offset_ns`: the capture's time at time 0 of the deck. `links`: report each link under its name, too."""
         self._recording: Final = recording
         self._offset_ns = offset_ns
         self._links = links
 
     def __call__(self, time_ns: int) -> dict[str, Pose]:
-        """Return the pose of each entity (that of its last link) whose place is known. Raises CaptureError."""
+        """Return the pose of each entity (that of its last link) that has a position. Raises CaptureError."""
         recording = self._recording
         own_ns = time_ns + self._offset_ns
         tick, rest_ns = divmod(own_ns, recording.tick_ns)

@@ -223,7 +223,7 @@ class Board:
             told.watched[message["link"][0], message["link"][1]] = text
         if kind == "presence":
             told.presence = message
-            told.warning = b""  # it was about this
+            told.warning = b""  # the warning was about this load
         if kind == "note":
             told.warning = b"" if message["level"] == "info" else text
         for reader in list(self.readers.values()):

@@ -84,7 +84,7 @@ class Reader:
         self.wake()
 
     def show(self, shown: Shown, now_s: float) -> None:
-        """Add a moment, as often as the page wants them; one at which time jumps or stands is never left out."""
+        """Add a moment, at the page's rate; moments of jumps and pauses are always added."""
         follows = self.follows[shown.source]
         if follows.hz <= 0.0:
             return

@@ -140,7 +140,7 @@ class ConsoleServer:
             self.board.tell(number, {"type": "note", "level": "error", "text": str(refused)})
 
     async def _take_leave(self) -> None:
-        """Tell all browsers why no more comes: that what they look at has ended, or this console alone."""
+        """Send all browsers the reason of the end: that of the source, or of this console alone."""
         text = self.board.has_ended()
         code, why = (ENDED, text) if text else (GOING, "the console was ended")
 
@@ -157,7 +157,7 @@ class ConsoleServer:
     # --- HTTP --------------------------------------------------------------------------------------------------------
 
     def _connection(self) -> type[ServerConnection]:
-        """Return the class of this server's connections: one that is too many is ended before it says anything."""
+        """Return the class of this server's connections: a connection above the limit is closed at once."""
         console = self
 
         class Counted(ServerConnection):
@@ -176,7 +176,7 @@ class ConsoleServer:
     def _answer_http(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file; None lets a WebSocket open."""
         if self._is_local and _host(request.headers.get("Host", "")) not in LOCAL_HOSTS:
-            # A name of somebody else's that leads here would make his pages pages of this host.
+            # Another host name that resolves to this address would give its pages the rights of this origin.
             return _response(421, PLAIN, b"This console is asked for as 127.0.0.1 or localhost.\n")
         path = request.path.partition("?")[0]
         if path == "/ws":
@@ -187,7 +187,7 @@ class ConsoleServer:
         return _response(200, file.content_type, file.content)
 
     def _is_own_page(self, request: Request) -> bool:
-        """Whether a WebSocket is opened by this page, or by no page at all: programs say no origin."""
+        """Whether a WebSocket is opened by this page, or by no page at all: programs send no origin."""
         origin = request.headers.get("Origin")
         scheme = "https" if self._secured else "http"
         return origin is None or origin == f"{scheme}://{request.headers.get('Host', '')}"
@@ -337,7 +337,7 @@ def _response(status: int, content_type: str, content: bytes) -> Response:
 
 
 def _silent() -> logging.Logger:
-    """Return a log for what strangers do to a connection, which says nothing: it is their matter."""
+    """Return a silent log for connections that clients break: they are no errors of the console."""
     logger = logging.getLogger("foosim.console.connections")
     logger.setLevel(logging.CRITICAL)
     logger.propagate = False

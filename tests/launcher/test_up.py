@@ -158,16 +158,30 @@ def test_the_console_ends_last_when_it_is_known_how_the_run_ended(
     assert told["reason"] == outcome.result["reason"] == "lost red: it ended with exit code 1"
 
 
-def test_of_a_player_that_hangs_it_is_said_where_its_stack_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("name", "ends_by", "reason", "line"),
+    [
+        (
+            "player-red",
+            "true",
+            "player-red has not answered tick 101 for 2 s (deadlines.lockstep_fast)",
+            "the log of player-red is",
+        ),
+        ("vhub", "false", "lost vhub: it cannot go on: no journal", "vhub ended with exit code 1; its log is"),
+    ],
+)
+def test_the_log_of_the_process_that_the_reason_names_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, ends_by: str, reason: str, line: str
+) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
-    for name in (SUPERVISOR, "player-red"):
-        up._launch(name, ["true"])
-        up._launcher.children[name].process.wait()
-    reason = "player-red has not answered tick 101 for 2 s (deadlines.lockstep_fast)"
+    up._has_begun = True
+    for child, command in ((SUPERVISOR, "true"), (name, ends_by)):
+        up._launch(child, [command])
+        up._launcher.children[child].process.wait()
     up.folder.write_result({**up.unended(reason), "reason": reason, "failed": True})
-    log = up._launcher.children["player-red"].log
-    assert up._outcome().lines[:2] == (f"the run has ended: {reason}", f"the log of player-red is {log}")
+    log = up._launcher.children[name].log
+    assert up._outcome().lines[:2] == (f"the run has ended: {reason}", f"{line} {log}")
     up._launcher.close()
 
 
