@@ -25,20 +25,23 @@ MARKS = {"fine": "ok", "warning": "!", "problem": "NO"}
 def doctor(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
     listen: Annotated[
-        str | None, typer.Option(help="Where it would listen: HOST[:PORT], by default as deployed.")
+        str | None, typer.Option(help="HOST[:PORT] of the supervisor; by default the deployment's.")
     ] = None,
-    insecure: Annotated[bool, typer.Option("--insecure", help="As for `up`.")] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Check for a run that listens without certificates, as `up --insecure`.")
+    ] = False,
     pki: PkiOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")] = False,
     version: VersionOption = False,
 ) -> None:
-    """Look whether a deployment could run on this machine and its hosts, before it does.
+    """Check whether a deployment can run on this machine and its hosts.
 
-    Checks versions, the players' classes, certificates (names, dates, keys, hosts), ports, the clock and disks, here
-    and, through ssh, on each host of the deployment: also whether it answers, whether the supervisor's port is reached
-    from there and the vHub's from here, how far its clock is off, and the units of systemd. For that, foosim imports
-    the modules of players and listens at these ports for a moment. Each line says what is fine, what is not, and what
-    to do. Exit codes: 0 nothing stands in the way, 1 something does, 2 bad input.
+    Checks versions, the players' classes, certificates (names, dates, keys, hosts), ports, the clock and disks, on
+    this machine and through ssh on each host of the deployment. Of a host it also checks that it answers, that the
+    ports of supervisor and vHub are reached, the offset of its clock, and its systemd units. The check imports the
+    modules of players and listens at the ports for a moment. Each line has a result and, where needed, what to do.
+
+    Exit codes: 0 the deployment can run, 1 it cannot, 2 bad input.
     """
     text = read_deployment_text(file)
     deployment = load_deployment(text, str(file))

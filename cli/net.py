@@ -1,4 +1,4 @@
-"""The command `foosim-net`: what a network means, what became of a packet, and events on a running system.
+"""The command `foosim-net`: analyses networks, explains packets, and disturbs live runs.
 
 Each subcommand is a thin shell over typed functions: `vhub.lint`, `vhub.explain`, `links_shown`, `control`.
 """
@@ -40,23 +40,27 @@ from foosim.vhub.network.custom_models import check_link_models
 
 app = new_app()
 
-Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
+Run = Annotated[str | None, typer.Option("--run", help="Name of the run; by default the newest live one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-Lasts = Annotated[str | None, typer.Option("--for", help="How long in simulated time, e.g. 10s; else until a heal.")]
-Random = Annotated[bool, typer.Option("--random", help="--for is a mean: how long is drawn, exponential.")]
+Lasts = Annotated[
+    str | None, typer.Option("--for", help="Duration in simulated time, e.g. 10s; by default until `heal`.")
+]
+Random = Annotated[
+    bool, typer.Option("--random", help="Draw the duration from an exponential distribution; --for is its mean.")
+]
 EVERY_S: Final = 1.0
 ALONE: Final = (
-    "the network stands alone: whom its selectors match is not known; rules are shown over all radios that there are"
+    "a network section without its deployment: the selectors match no endpoints; rules are shown for all radios"
 )
 
 
 @app.callback()
 def foosim_net(version: VersionOption = False) -> None:
-    """Understand a network, and have things happen to the one of a running system.
+    """Analyse a network, and disturb the network of a live run.
 
-    `lint` and `presets` say what a configuration means, `explain` what became of one captured packet and why, `top`
-    what the links of a running system do. The others happen at a tick, which they name, are logged as orders are, and
-    so are in every re-simulation.
+    `lint` and `presets` show what a configuration means, `explain` the fate of a captured packet and its cause, `top`
+    the links of a live run. The other commands disturb a live run from the tick that they print; they are recorded
+    with the orders, so a re-simulation repeats them.
 
     Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
     """
@@ -73,11 +77,11 @@ def lint(
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the file; may be repeated.")] = None,
     json: Json = False,
 ) -> None:
-    """Print what a network means, per rule and radio, and warn of what looks wrong.
+    """Print the figures of a network, per rule and radio, with warnings of likely mistakes.
 
-    Mean loss beside geometry, mean bursts, delay, airtime, greatest throughput of one station and of ten, range,
-    duty cycle, and how long a full queue is. All problems of a file are shown at once, as by validate; a link model has
-    to be installed here, unless the deployment places the vHub on another machine.
+    Figures are: mean loss without geometry, mean bursts, delay, airtime, maximum throughput of one and of ten
+    stations, range, duty cycle, and the delay of a full queue. All problems of a file are printed at once. Custom link
+    models are imported, unless the vHub runs on another machine.
     """
     found, is_alone = linted(file, sets or [])
     if json:
@@ -100,7 +104,10 @@ def lint(
 
 
 def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
-    """Return what a file's network means, and whether it stands alone. Raises DeploymentError or AssetError."""
+    """Return the analysis of a file's network, and whether the file has no deployment.
+
+    Raises DeploymentError or AssetError.
+    """
     name, text = str(file), read_deployment_text(file)
     network = load_network(text, name, sets)
     if network is None:
@@ -117,10 +124,10 @@ def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
 
 @app.command()
 def presets(
-    name: Annotated[str | None, typer.Argument(help="Which preset; by default all.", show_default=False)] = None,
+    name: Annotated[str | None, typer.Argument(help="Name of a preset; by default all.", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """Print the values of presets, with the numbers that their media have beside, and where each comes from.
+    """Print the values of presets, the numbers of their media, and the source of each.
 
     [S] read in a standard's reference code or a project's source, [M] measured in a cited paper, [C] computed from
     such, [R] recalled from a standard that was not at hand: unverified, [J] judgement.
@@ -154,7 +161,7 @@ def explain(
     ],
     json: Json = False,
 ) -> None:
-    """Print the stages that a captured packet went through, with their numbers, and what became of it.
+    """Print the stages of a captured packet with their numbers, and its fate.
 
     PACKET is SOURCE:SEQUENCE[:DESTINATION[:COPY]], e.g. camera:655360:player-red. The sequence number of a robot's
     packet is its tick times 65536 plus its place among those of that tick. Where it had one receiver, the destination
@@ -176,10 +183,10 @@ def explain(
 @app.command()
 def top(
     run: Run = None,
-    once: Annotated[bool, typer.Option("--once", help="Print the links once, since the start, and end.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Print the totals since the start, once.")] = False,
     json: Json = False,
 ) -> None:
-    """Show the links of a running system, those with the most traffic first, until Ctrl-C.
+    """Show the links of a live run, those with the most traffic first, until Ctrl-C.
 
     Traffic is packets offered in a second of simulated time. With --json, or without a terminal, a block a second.
     """
@@ -240,7 +247,7 @@ def set_link(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Change settings of a link rule, until a heal of settings.
+    """Change settings of a link rule until `heal settings`.
 
     Keys are those of a rule, with dots for what is inside: burst.loss=1% burst.mean_bad=20ms. A mapping is written
     whole.
@@ -258,11 +265,11 @@ def partition(
     ],
     lasts: Lasts = None,
     random: Random = False,
-    one_way: Annotated[bool, typer.Option("--one-way", help="Cut only what the first group sends.")] = False,
+    one_way: Annotated[bool, typer.Option("--one-way", help="Drop only packets from the first group.")] = False,
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Cut what endpoints of different groups send one another."""
+    """Drop packets between endpoints of different groups."""
     event = {"partition": [_split(group) for group in groups], **_for(lasts, random)}
     _show(control.network({**event, "symmetric": False} if one_way else event, run), json)
 
@@ -276,20 +283,20 @@ def clog(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Have packets wait until it is over; then all come at once, in their order."""
+    """Delay packets to the end of the clog; then all arrive at once, in order."""
     ends = {"from": _split(source), "to": _split(destination)}
     _show(control.network({"clog": ends, **_for(lasts, random)}, run), json)
 
 
 @app.command()
 def chaos(
-    lasts: Annotated[str, typer.Option("--for", help="How long in simulated time, at most 1 h.", show_default=False)],
+    lasts: Annotated[str, typer.Option("--for", help="Duration in simulated time, at most 1 h.", show_default=False)],
     among: Annotated[str, typer.Option(help="Endpoints, with commas.")] = "*",
     random: Random = False,
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Have random delays, losses, copies, clogs and partitions, drawn by the run's seed."""
+    """Disturb links with random delays, losses, copies, clogs and partitions, drawn from the run's seed."""
     _show(control.network({"chaos": {"among": _split(among)}, **_for(lasts, random)}, run), json)
 
 
@@ -299,7 +306,7 @@ def heal(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """End what lasts: at once, also what clogs hold."""
+    """End disturbances of the network; clogged packets are released at once."""
     _show(control.network({"heal": what}, run), json)
 
 

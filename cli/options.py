@@ -1,4 +1,4 @@
-"""What commands have in common: options of a dataclass, the arguments of `foosim-replay`, a bad file as bad input."""
+"""Shared by commands: options from a dataclass, the arguments of `foosim-replay`, bad files as bad input."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from foosim.common.units import parse_ns
 
 
 class BadCapture(Refused):
-    """A file that is no capture, or is damaged, is bad input."""
+    """A file is no capture, or is damaged: bad input."""
 
     exit_code = 2
 
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Have what is wrong with the file end the command as bad input."""
+    """Turn a CaptureError into BadCapture, which ends the command with exit code 2."""
     try:
         yield
     except CaptureError as error:
@@ -37,15 +37,15 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 
 def time_of(option: str, text: str | None) -> int | None:
-    """Return the simulated time in ns that an option says, None without one; raises BadValue, which names it."""
+    """Return an option's simulated time in ns, None without one; raises BadValue with the option's name."""
     return None if text is None else read_at(option, parse_ns, text)
 
 
 def with_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Have a command take the fields of its parameter that is a dataclass: all of them, or those with these names.
+    """Make command options of the fields of a command's dataclass parameter: of all, or of those in `names`.
 
-    The fields say with annotations of typer which options they are. For a parameter `X | None` what X needs may be
-    left out on the command line; then the command gets None.
+    The fields have annotations of typer. For a parameter `X | None` the required fields of X may be left out on the
+    command line; the command then gets None.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:

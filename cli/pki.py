@@ -28,14 +28,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 @app.callback()
 def foosim_pki(version: VersionOption = False) -> None:
-    """Make the certificates that a run needs where other machines reach it.
+    """Create and check the certificates of a run on several machines.
 
-    `init` makes what everybody in a deployment needs, and with --send brings to each host of the deployment what
-    belongs to its processes. To any other machine copy the root ca.pem and what belongs to its processes; keep ca.key
-    where certificates are issued.
+    `init` creates the certificates of a deployment's processes; with --send it copies them to the deployment's hosts.
+    Any other machine needs ca.pem, and the certificates and keys of its own processes. ca.key stays where
+    certificates are issued.
 
-    Exit codes: 0 done, 1 a certificate would not be accepted (show) or a host has not got
-    its own (init --send), 2 bad input, 3 refused.
+    Exit codes: 0 done, 1 a certificate would be rejected (show) or a copy failed (init --send), 2 bad input, 3
+    refused.
     """
 
 
@@ -45,25 +45,24 @@ def init(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
     host: Annotated[
         list[str] | None,
-        typer.Option(help="A name or address by which others reach supervisor and vHub; may be repeated."),
+        typer.Option(help="A name or address of this machine, for supervisor and vHub; may be repeated."),
     ] = None,
-    days: Annotated[int, typer.Option(help="How long a new certificate lasts.")] = LEAF_DAYS,
+    days: Annotated[int, typer.Option(help="Validity of a new certificate, in days.")] = LEAF_DAYS,
     within: Annotated[
-        int, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Issue anew what ends within so many days.")
+        int, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Renew certificates that expire within this many days.")
     ] = RENEW_DAYS,
-    send: Annotated[bool, typer.Option("--send", help="Bring to the hosts of the deployment what is theirs.")] = False,
+    send: Annotated[bool, typer.Option("--send", help="Copy each host's files to it through ssh.")] = False,
 ) -> None:
-    """Make what the folder lacks for a deployment: a root, and a certificate and key for each of its identities.
+    """Create a root certificate, and a certificate and key for each identity of a deployment.
 
-    What is there stays; so the same command serves after a change of the deployment. A certificate that ends soon, has
-    another root or lacks a --host is issued anew, for the same key, length of time, names and addresses. A process
-    takes the new one when it is started again. Supervisor and vHub may listen as this machine's names and as the hosts
-    given. Where the deployment has `access: {radio: password}` each client gets a random password, in
-    client.NAME.password, unless there is one.
+    Existing files are kept, so the command can be repeated after a change of the deployment. A certificate that
+    expires soon, has another root or lacks a --host is renewed, with the same key, validity, names and addresses; a
+    process reads it at its next start. The certificates of supervisor and vHub have this machine's names and every
+    --host. With `access: {radio: password}` in the deployment each client gets a random password in
+    client.NAME.password.
 
-    With --send the root, and certificates, keys and passwords of what the deployment places on a host, go through ssh
-    into the folder that the deployment names as the host's `pki`, readable by who logs in there alone. Nobody else's
-    key is sent. What is there already under these names is replaced.
+    --send copies ca.pem, and the certificates, keys and passwords of the processes on a host, through ssh into the
+    folder in the host's `pki` setting. Files there are replaced; only the ssh user can read them.
     """
     deployment = load_deployment(read_deployment_text(file), str(file))
     if send and not places(deployment):
@@ -77,7 +76,7 @@ def init(
 
 
 def _is_sent(deployment: Deployment, folder: Path) -> bool:
-    """Bring to each host what is its own; say what was brought, and which host has not got it."""
+    """Copy each host's files to it; print the copies, and the hosts where that failed."""
     failures = []
     for name in sorted(set(places(deployment).values())):
         try:

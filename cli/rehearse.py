@@ -39,44 +39,43 @@ app = new_app()
 @with_options("file", "duration", "seed", "branch", "sets", "engine")
 def foosim_rehearse(
     options: RunOptions,
-    nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN; each has an engine of its own.")] = 1,
-    swarm: Annotated[bool, typer.Option("--swarm", help="Fly the random faults of --seed: see below.")] = False,
-    seeds: Annotated[int, typer.Option(help="With --swarm: how many seeds, from --seed (or 1) on.", min=1)] = 1,
+    nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN, each with its own engine.")] = 1,
+    swarm: Annotated[bool, typer.Option("--swarm", help="Inject random faults, drawn from --seed.")] = False,
+    seeds: Annotated[int, typer.Option(help="With --swarm: the number of seeds, from --seed (or 1) on.", min=1)] = 1,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
     version: VersionOption = False,
 ) -> None:
-    """Rehearse a deployment: supervisor, vHub, nodes and players in one process, as fast as it goes.
+    """Simulate a deployment in one process on virtual time, as fast as possible.
 
-    The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
-    are those of `up`, whatever the number of nodes.
+    The supervisor, the vHub, the nodes and the lockstep players are the same code and exchange the same bytes as the
+    processes of `foosim-supervisor up`. The digests are those of `up`, with any number of nodes.
 
-    With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
-    repeats) and 8 to 20 faults of at least three kinds in 208 ticks on the pure engine (--for: more of both): processes
-    killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
-    messages once more; in every eighth seed players lost; robots moved, balls added, removed and pushed, the run
-    paused. Everything that is written, said and closed is checked against the laws; then all heals, and everybody has
-    to be back.
+    A line of progress a second goes to standard error: simulated time, its speed, the score, and the process that the
+    run waited for the longest. Ctrl-C ends the rehearsal in order, a second Ctrl-C at once; the last line has the last
+    tick and the capture's path. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
-    A line of progress each second goes to standard error: simulated time, its speed, the score, and which process was
-    waited for the most. A Ctrl-C ends the rehearsal in order, a second one at once; the last line says how far it came
-    and where the capture is. A player that does not answer within `deadlines.lockstep_fast` ends the run.
+    With --swarm the seed draws 3 to 5 nodes, their clocks, delay, loss and duplication of messages, and 8 to 20 faults
+    of at least three kinds in 208 ticks on the pure engine; --for simulates longer, with more faults. Faults are:
+    killed, interrupted, paused, slow and stopped processes; partitions in one or both directions and clogs; jumps of
+    memory and clocks; old messages; lost players (every eighth seed); moved robots; added, removed and pushed balls;
+    pauses of the run. Every record, message and committed tick is checked against the laws. At the end all faults
+    heal, and every process has to take part again.
 
-    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its
-    disk has no room, 130 second Ctrl-C.
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its disk is full, 130
+    second Ctrl-C.
     """
     if swarm:
         raise typer.Exit(_swarm(options, seeds, json))
     if options.duration is None:
-        raise BadValue("--for is missing: how long is needed, e.g. --for 20s")
+        raise BadValue("--for is missing: the simulated time, e.g. --for 20s")
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     plan = make_plan(replace(options, pace="fast", listen=LOOPBACK))
     check_models_here(plan)
     free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
     if free:
-        raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
-
+        raise BadValue("a rehearsal has lockstep players only; these are free-running", ", ".join(free))
     check_players_here(plan)
     for warning in check_rooms(plan.deployment.capture, capture, None):
         _note(f"warning: {warning}")
@@ -175,7 +174,7 @@ def _swarm(options: RunOptions, count: int, json: bool) -> int:
         faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
         done, seen = sum(flight.ticks for flight in flown), sum(flight.seen for flight in flown)
         typer.echo(
-            f"{count} seeds: {done} ticks, {faults} faults, {losses} nodes lost, {seen} things written and said, "
+            f"{count} seeds: {done} ticks, {faults} faults, {losses} nodes lost, {seen} messages and records, "
             f"{len(broken)} seeds broke a law"
         )
     return FAILED if broken else DONE

@@ -1,4 +1,4 @@
-"""The command `foosim-replay`: what a capture holds, whether it repeats, and all else that is done with one.
+"""The command `foosim-replay`: shows, verifies, recovers, plays, exports and compares captures.
 
 Here are `info`, `verify` and `recover`, shells over the reader, `verify` and the recovery.
 """
@@ -39,7 +39,7 @@ def foosim_replay(version: VersionOption = False) -> None:
 
 @app.command()
 def info(capture: Capture, json: Json = False) -> None:
-    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets by fate, cause and
+    """Show the content of a capture: run, duration, digests, nodes and their arithmetic, packets by fate, cause and
     channel, recoveries, topics, files and versions.
     """
     with reading():
@@ -49,7 +49,7 @@ def info(capture: Capture, json: Json = False) -> None:
 
 def _describe(found: CaptureInfo) -> str:
     if NEXT in found.end:
-        state = f"it goes on in {found.end[NEXT]}, which is not here"
+        state = f"continues in {found.end[NEXT]}, which is missing"
     elif found.finished:
         state = "whole, of a run that failed" if FAILED_RUN in found.end else "finished"
     else:
@@ -61,8 +61,8 @@ def _describe(found: CaptureInfo) -> str:
         f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
         f"  digest of all ticks {found.chain}",
-        f"  nodes {', '.join(found.nodes) or 'not known'}",
-        f"  arithmetic {', '.join(found.arithmetic) or 'not known'}",
+        f"  nodes {', '.join(found.nodes) or 'unknown'}",
+        f"  arithmetic {', '.join(found.arithmetic) or 'unknown'}",
         f"  clients {', '.join(found.clients) or 'none'}",
         f"  packets {_counted(found.packets)}",
         *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
@@ -92,17 +92,17 @@ def verify(
     capture: Capture,
     nodes: Annotated[int, typer.Option(help="Number of nodes to simulate on.")] = 1,
     from_first_frame: Annotated[
-        bool, typer.Option("--from-first-frame", help="Verify a cut: what follows on the first frame that it has.")
+        bool, typer.Option("--from-first-frame", help="Verify a cut: the ticks after its first frame.")
     ] = False,
     json: Json = False,
 ) -> None:
     """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
 
-    A cut, and a later file of a run, is refused: how its first frame came is not in it. With --from-first-frame that
-    frame is taken as it is, and all behind it is verified.
+    Prints the first tick and the entities that differ. Any number of nodes gives the same result. A difference is
+    explained on standard error when the capture's nodes had another arithmetic than this machine.
 
-    Names the first tick and the entities that differ. The number of nodes need not be the capture's. Where ticks differ
-    and the capture comes from nodes with another arithmetic than this machine's, standard error says so.
+    A cut, and a later file of a split capture, is refused, since the ticks before its first frame are missing. With
+    --from-first-frame the ticks after that frame are verified.
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
@@ -146,21 +146,22 @@ def _verdict(found: Verified) -> str:
 def recover(
     capture: Capture,
     journals: Annotated[
-        Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
+        Path | None, typer.Option(help="The folder with its vHub's journal, e.g. RUN/journals.", show_default=False)
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="The capture to write, else CAPTURE with .recovered in its name."),
+        typer.Option("--out", "-o", help="The capture to write; by default CAPTURE's name with .recovered."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Make a valid capture of one that its writer left unfinished; what a journal has is added.
+    """Write a valid capture from an unfinished one and the vHub's journal.
 
-    A new file is written, with all up to the last whole chunk, or to what is damaged; CAPTURE stays as it is.
-    `foosim-supervisor up` does this by itself with what earlier ones of the same user left. Of a capture that has its
-    end and is damaged it says what is damaged and which ticks are whole. Exit codes: 0 the new capture has all that was
-    recorded, or CAPTURE has its end, 1 it could not be recovered, or is damaged, 3 the new capture is without what no
-    journal told.
+    The new file has everything up to the last whole chunk, or up to the first damage, and the ticks that the journal
+    adds. CAPTURE is not changed. `foosim-supervisor up` recovers the captures that earlier runs of the same user left
+    unfinished. For a finished but damaged capture the damage and the undamaged ticks are printed.
+
+    Exit codes: 0 everything that was recorded is in the new capture, or CAPTURE is finished, 1 CAPTURE is damaged or
+    cannot be recovered, 3 ticks that were in no journal are missing in the new capture.
     """
     try:
         found = recover_capture(capture, journals, out)

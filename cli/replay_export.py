@@ -27,19 +27,19 @@ _TABLES = ", ".join(table_names())
 def export(
     capture: Capture,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="The file to write, - for standard output.", show_default=False)
+        Path, typer.Option("--out", "-o", help="The file to write; - is standard output.", show_default=False)
     ],
     what: Annotated[str, typer.Option(help=f"The table: {_TABLES}.")] = "packets",
     form: Annotated[
-        str | None, typer.Option("--format", help="csv or parquet; by default as the file's name ends, csv for -.")
+        str | None, typer.Option("--format", help="csv or parquet; by default from the file's suffix, csv for -.")
     ] = None,
     json: Json = False,
 ) -> None:
     """Write a table of a capture as CSV or Parquet.
 
-    `packets` has a row per offered packet, `commands` those that were to move robots, with their numbers, `poses` a row
-    per link and captured pose; any other kind of row is a table, too. Times are whole ns of simulated time. Parquet
-    needs pyarrow: pip install 'foosim[parquet]'. An existing file is not overwritten.
+    `packets` has a row per offered packet, `commands` a row per decoded command to a robot, `poses` a row per link and
+    captured pose; the other tables have the capture's rows of that name. Times are simulated time in integer ns.
+    Parquet needs pyarrow: pip install 'foosim[parquet]'. An existing file is not overwritten.
     """
     with reading():
         done = export_capture(capture, what, out, _format(form))
@@ -65,15 +65,14 @@ def _format(text: str | None) -> Format | None:
 def cut(
     capture: Capture,
     out: Annotated[Path, typer.Option("--out", "-o", help="The capture to write.", show_default=False)],
-    begin: Annotated[str | None, typer.Option("--from", help="Where it begins, e.g. 10s.")] = None,
-    end: Annotated[str | None, typer.Option("--to", help="Where it ends, e.g. 20s.")] = None,
+    begin: Annotated[str | None, typer.Option("--from", help="Time at which it begins, e.g. 10s.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Time at which it ends, e.g. 20s.")] = None,
     json: Json = False,
 ) -> None:
-    """Write a part of a capture as a capture of its own.
+    """Write a part of a capture as a new capture.
 
-    It begins with the newest captured frame at or before --from and has all that was recorded up to --to, times being
-    the capture's own. A run can begin with its frames (`up --from`); `verify` takes it with
-    --from-first-frame, since a run is verified from where it began.
+    It begins with the newest captured frame at or before --from and ends at --to, with the times of the original. A
+    run can start with its frames (`up --from`). `verify` needs --from-first-frame, since the ticks before are missing.
     """
     from_ns, to_ns = time_of("--from", begin), time_of("--to", end)
     with reading():
@@ -93,15 +92,16 @@ def diff(
     other: Annotated[Path, typer.Argument(metavar="B", help="Another one.", show_default=False)],
     ignore: Annotated[
         list[str] | None,
-        typer.Option(help="A field (digest) or a channel (/epochs) that is not compared; may be repeated."),
+        typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Compare two captures: the first difference of each channel, and how many rows both have.
+    """Compare two captures: the first difference of each channel, and the number of rows in both.
 
-    Fields that begin with `wall_`, and `/log`, come from clocks of the real world and are not compared. What the two
-    say of themselves (run, versions, deployment) is named where it differs, and decides nothing. Exit codes: 0 equal,
-    1 different, 2 one of them cannot be read.
+    Fields that begin with `wall_`, and `/log`, depend on real clocks and are not compared. Differences of the metadata
+    (run, versions, deployment) are printed and do not count.
+
+    Exit codes: 0 equal, 1 different, 2 a capture cannot be read.
     """
     with reading():
         found = diff_captures(one, other, ignore or ())
@@ -142,7 +142,7 @@ def _diff_text(found: Diff) -> str:
         if channel.first is not None and channel.first is not found.first:
             lines += [f"  {line}" for line in _difference_lines(channel.first)]
     if found.about:
-        lines.append(f"they say otherwise of themselves: {', '.join(found.about)}")
+        lines.append(f"different metadata: {', '.join(found.about)}")
     return "\n".join(lines)
 
 

@@ -27,31 +27,36 @@ from foosim.runtime.process import Stop
 
 def play(  # noqa: PLR0913, PLR0917  # a command's options
     capture: Capture,
-    begin: Annotated[str | None, typer.Option("--from", help="Begin at this time of the capture, e.g. 12.5s.")] = None,
-    until: Annotated[str | None, typer.Option(help="End at this time of the capture.")] = None,
+    begin: Annotated[str | None, typer.Option("--from", help="Start time in the capture, e.g. 12.5s.")] = None,
+    until: Annotated[str | None, typer.Option(help="End time in the capture.")] = None,
     rate: Annotated[str, typer.Option(help="realtime, fast, or a factor such as 2x.")] = "realtime",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
-    paused: Annotated[bool, typer.Option("--paused", help="Begin paused.")] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="Start again at the end.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Start paused.")] = False,
     topic: Annotated[
-        list[str] | None, typer.Option(help="Play this: /packets, /packets/camera, /tf, ...; may be repeated.")
+        list[str] | None,
+        typer.Option(help="Publish only this topic: /packets, /packets/camera, /tf, ...; may be repeated."),
     ] = None,
     remap: Annotated[
         list[str] | None,
-        typer.Option(help="OLD:=NEW for an endpoint or a body, /OLD:=/NEW for a channel; may be repeated."),
+        typer.Option(help="Rename OLD:=NEW (endpoint or body) or /OLD:=/NEW (channel); may be repeated."),
     ] = None,
     listen: Annotated[str, typer.Option(help="HOST[:PORT] to listen at.")] = LOOPBACK,
-    insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
+    ] = False,
     pki: PkiOption = None,
     json: Json = False,
 ) -> None:
-    """Publish captured packets, poses, scenes, log and rows again, at the times at which they were released.
+    """Publish captured packets, poses, scenes, logs and rows, at the times at which they were released.
 
-    Listeners are programs with `foosim.client.replay_listener.hear_replay`; a replay has a plane of its own. Names are
-    /packets/SOURCE/DESTINATION/CHANNEL, /tf for poses, and all topics of the capture; /tick and /frame are played only
-    with --topic. Keys on a terminal: space pauses and resumes, s steps a tick, up and down double and halve the rate,
-    left and right seek by 5 s, q quits. `foosim-replay control` does the same from elsewhere. A capture without an end
-    is played up to its last whole chunk. Ctrl-C ends the replay in order. Exit codes: 0 played or stopped, 1 the
-    capture is damaged, 2 bad input, 3 refused.
+    Programs subscribe with `foosim.client.replay_listener.hear_replay`. Topics are /packets/SOURCE/DESTINATION/CHANNEL,
+    /tf for poses, and all topics of the capture; /tick and /frame are published only with --topic. An unfinished
+    capture is played up to its last whole chunk.
+
+    Keys in a terminal: space pauses and resumes, s steps a tick, up and down double and halve the rate, left and right
+    seek by 5 s, q quits. `foosim-replay control` controls the replay from another terminal. Ctrl-C ends it in order.
+
+    Exit codes: 0 played or stopped, 1 the capture is damaged, 2 bad input, 3 refused.
     """
     options = PlayOptions(
         time_of("--from", begin),
@@ -92,11 +97,9 @@ def _played_text(result: PlayResult) -> str:
 def control(
     request: Annotated[str, typer.Argument(help=f"One of {', '.join(ARGUMENTS)}.", show_default=False)],
     value: Annotated[
-        str | None, typer.Argument(help="For step a number of ticks, for seek a time, for rate a rate.")
+        str | None, typer.Argument(help="A number of ticks (step), a time (seek) or a rate (rate).")
     ] = None,
-    address: Annotated[
-        str | None, typer.Option(help="Where the replay listens; by default the newest of this user.")
-    ] = None,
+    address: Annotated[str | None, typer.Option(help="Address of the replay; by default this user's newest.")] = None,
     pki: PkiOption = None,
     json: Json = False,
 ) -> None:

@@ -21,11 +21,11 @@ def report(
     out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.", show_default=False)],
     json: Json = False,
 ) -> None:
-    """Write a page about the network of a captured run.
+    """Write an HTML report about the network of a captured run.
 
-    Packets by fate and cause, links, delay and loss over time, causes of losses, age of information, queues and
-    airtime, events, what was configured beside what was measured, and a map. The page is one file that needs nothing
-    else. --json prints what is on it. An existing file is not overwritten.
+    The report has packets by fate and cause, links, delay and loss over time, causes of losses, age of information,
+    queues and airtime, events, configured and measured figures, and a map. It is one file without external resources.
+    --json prints its content. An existing file is not overwritten.
     """
     check_name("--out", out, "the page", (".html", ".htm"))
     with reading():

@@ -39,27 +39,28 @@ def view(  # a command's options
         Path,
         typer.Argument(
             metavar="CAPTURE|CSV|ADDRESS",
-            help="A capture, a table of poses (.csv), or the tcp/HOST:PORT of a replay that is played.",
+            help="A capture, a table of poses (.csv), or tcp/HOST:PORT of a running replay.",
             show_default=False,
         ),
     ],
     second: SecondOption = None,
     offset: OffsetOption = None,
-    listen: Annotated[str, typer.Option(help="HOST[:PORT] to serve the page at.")] = LOOPBACK,
+    listen: Annotated[str, typer.Option(help="Serve the page at this HOST[:PORT].")] = LOOPBACK,
     certificate: Annotated[
-        Path | None, typer.Option(help="A PEM certificate for HTTPS, which another address than loopback takes.")
+        Path | None, typer.Option(help="A PEM certificate for HTTPS; required except at loopback.")
     ] = None,
-    key: Annotated[Path | None, typer.Option(help="The key of that certificate, PEM.")] = None,
+    key: Annotated[Path | None, typer.Option(help="The private key of that certificate, PEM.")] = None,
     pki: PkiOption = None,
-    open_browser: Annotated[bool, typer.Option("--open", help="Show the page in the browser of this machine.")] = False,
+    open_browser: Annotated[bool, typer.Option("--open", help="Open the page in this machine's browser.")] = False,
 ) -> None:
-    """Serve a page that shows a capture: played, sought, stepped to the tick, with all that happened marked.
+    """Serve the console for a capture: play, seek, step to the tick, with events marked on the time line.
 
-    Prints an address; the token in it is the permission. A tick without a captured frame is computed again, and shown
-    when its digest is the captured one. A capture that is still being written, one without an end and
-    one of several files are shown as well. With --second the distance between the two is plotted, entity by entity: two
-    captures, a run and its what-if, a simulation and recorded poses. Ctrl-C ends it. Exit codes: 0 ended, 1 nobody can
-    listen, 2 bad input, 3 refused.
+    Prints an address with a token, which grants access. A tick without a captured frame is simulated again, and shown
+    if its digest is the captured one. The capture may be unfinished, still being written, or split into files. With
+    --second the distance between the entities of two recordings is plotted: of two captures, a run and its what-if, a
+    simulation and recorded poses. Ctrl-C ends the command.
+
+    Exit codes: 0 ended, 1 the address is not available, 2 bad input, 3 refused.
     """
     offset_ns = read_offset(second, offset)
     with reading():

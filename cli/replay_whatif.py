@@ -33,19 +33,21 @@ def whatif(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Change a setting of the network, e.g. network.links.everything.loss='5 %'."),
+        typer.Option(
+            "--set", help="Change a network setting, e.g. network.links.everything.loss='5 %'; may be repeated."
+        ),
     ] = None,
-    packets: Annotated[bool, typer.Option("--packets", help="Name each packet that changed.")] = False,
+    packets: Annotated[bool, typer.Option("--packets", help="List each packet that changed.")] = False,
     drawing: Annotated[
-        Path | None, typer.Option("--picture", help="Draw what changed per link, as NAME.svg.", show_default=False)
+        Path | None, typer.Option("--picture", help="Draw the changes per link into NAME.svg.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:
-    """Judge a capture's packets again, over another network.
+    """Send a capture's packets through another network.
 
-    Robots and clients send what they sent: what another network would have made them send is not known. Per link: what
-    is delivered, its delay, and the age of information; per channel how old it is when its receiver acts. Without
-    another network every fate is the captured one.
+    Robots and clients send the captured packets: how they would have reacted to the other network is unknown. Prints
+    deliveries, delay and age of information per link, and the age at use per channel. With the captured network every
+    fate is the captured one.
     """
     if drawing is not None:
         check_name("--picture", drawing, "the picture", (".svg",))

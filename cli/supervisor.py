@@ -51,27 +51,25 @@ from foosim.supervisor.main import serve
 
 app = new_app()
 
-Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
+Run = Annotated[str | None, typer.Option("--run", help="Name of the run; by default the newest live one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-ConsoleOption = Annotated[
-    bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
-]
+ConsoleOption = Annotated[bool, typer.Option("--console", help="Serve the console of the run; its address is printed.")]
 Second = Annotated[
     Path | None,
-    typer.Option(metavar="CAPTURE|CSV", help="What the console shows beside the run, on its clock."),
+    typer.Option(metavar="CAPTURE|CSV", help="A recording that the console shows beside the run."),
 ]
-Offset = Annotated[str | None, typer.Option(help="The time of --second at which the run has time 0, e.g. 2.5s or -1s.")]
+Offset = Annotated[str | None, typer.Option(help="Time in --second at time 0 of the run, e.g. 2.5s or -1s.")]
 BESIDE_RESUME: Final = ("resumed", "console", "open_browser", "second", "offset", "pki", "json")
-"""What `up --resume` takes; the rest it takes from the run."""
-RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
+"""The options that `up --resume` accepts; it reads all others from the run."""
+RunName = Annotated[str | None, typer.Option("--run", help="Name of the new run; by default WORLD-TIME.")]
 
 
 @app.callback()
 def foosim_supervisor(version: VersionOption = False) -> None:
-    """Run a distributed simulation, and control one that runs.
+    """Start simulation runs and control them.
 
-    `up` starts everything that a deployment file declares and shows it. The other commands control a
-    run from another terminal; each names the tick at which it takes effect.
+    `up` starts all processes that a deployment file declares and shows the run. The other commands control a
+    run from another terminal; each answer has the tick at which it takes effect.
 
     Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
     """
@@ -82,29 +80,30 @@ def foosim_supervisor(version: VersionOption = False) -> None:
 def up(  # noqa: PLR0913, PLR0917  # a command's options
     context: typer.Context,
     options: RunOptions | None = None,
-    capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
+    capture: Annotated[
+        Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")
+    ] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     run: RunName = None,
-    detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
-    resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
+    detached: Annotated[bool, typer.Option("--detach", help="Run in the background; `down` ends it.")] = False,
+    resumed: Annotated[str | None, typer.Option("--resume", help="Resume this run, whose launcher died.")] = None,
     console: ConsoleOption = False,
-    open_browser: Annotated[bool, typer.Option("--open", help="--console, and show it in the browser.")] = False,
+    open_browser: Annotated[bool, typer.Option("--open", help="As --console, and open the page in a browser.")] = False,
     second: Second = None,
     offset: Offset = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
-    """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
+    """Run a deployment, on this machine and its hosts, until Ctrl-C or --for.
 
-    Supervisor, vHub, nodes and players are processes of their own, each with a log; they end with this command. Ctrl-C
-    ends the run in order and leaves a finished capture; a second one kills everything. What the deployment places on
-    another host is started there through ssh. Nodes that it declares as `launch: manual` are waited for; their command
-    line is printed.
+    The supervisor, the vHub, each node and each player are processes, each with a log file; they end with this command.
+    Ctrl-C ends the run in order and finishes the capture; a second Ctrl-C kills all processes. Processes on other hosts
+    are started through ssh. For a node with `launch: manual` the command line is printed, and the run waits for it.
 
-    With --from the world begins with the newest captured frame at or before that time (with @last, or without a time,
-    with the last one), and time goes on from there; --for counts from there, too. The deployment may differ from the
-    captured one in everything but its robots, their sensors, and the tick.
+    --from starts the world with the newest captured frame at or before that time; with @last, or without a time, with
+    the last frame. Simulated time continues from that frame, and --for counts from it. The deployment may differ from
+    the captured one, except in its robots, their sensors and the tick.
 
-    --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
+    --resume continues a run whose launcher died, from its last committed frame and with its options.
     """
     display = Display(sys.stderr if json else sys.stdout)
     begun: Up | Outcome | None = None
@@ -137,7 +136,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 
 
 def _given(context: typer.Context, but: Collection[str]) -> list[str]:
-    """Return which parameters of a command were typed, as they are typed, but for those with these names."""
+    """Return the parameters given on the command line, as they are typed, without those named in `but`."""
     return [
         parameter.opts[0] if parameter.param_type_name == "option" else str(parameter.metavar)
         for parameter in context.command.params
@@ -160,8 +159,10 @@ def _begin(
     display: Display,
     console: Page | None,
 ) -> Up | Outcome:
-    """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
-    default, where any is wanted (`captures`)."""
+    """Return a new run that the caller runs, or start it detached.
+
+    `captures` is whether a capture is written; without a `capture` its path is the default.
+    """
     plan = make_plan(options)
     check_models_here(plan)
     check_players_here(plan)
@@ -175,7 +176,7 @@ def _begin(
 
 
 def _go_on(folder: RunFolder, display: Display, console: Page | None) -> Up | Outcome:
-    """Return a run that is to go on; of one that has ended return how."""
+    """Return a run to be resumed, or the outcome of one that has ended."""
     if folder.result() is not None:
         recover_leftovers(display.say)
         return ended_outcome(folder)
@@ -187,7 +188,7 @@ def _go_on(folder: RunFolder, display: Display, console: Page | None) -> Up | Ou
 
 
 def _look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
-    """Raise Refused where a run would end at once, and warn where it soon might."""
+    """Raise Refused where a disk is too full to begin, and warn where it is nearly full."""
     captured_here = None if VHUB in places(plan.deployment) else capture
     for warning in check_rooms(plan.deployment.capture, captured_here, runs):
         display.say(warning)
@@ -206,13 +207,12 @@ def run_supervisor(
     run: RunName = None,
     progress_file: ProgressOption = None,
 ) -> None:
-    """Run a supervisor alone.
+    """Run a supervisor only.
 
-    vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
-    folder has the run file, logs and journals.
+    The vHub, nodes and players are started separately. The run's folder has the run file, logs and journals.
     """
     plan = make_plan(options)
-    if not has_launcher():  # which has looked, and ends a run in order whose room gets lost meanwhile
+    if not has_launcher():  # a launcher has checked, and watches the disks
         _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
@@ -228,13 +228,13 @@ def status(run: Run = None, json: Json = False) -> None:
 
 @app.command()
 def pause(run: Run = None, json: Json = False) -> None:
-    """Stop simulated time; what is released is still computed."""
+    """Pause simulated time, after the ticks that are released already."""
     _show(control.pause(run), json)
 
 
 @app.command()
 def resume(run: Run = None, json: Json = False) -> None:
-    """Go on after a pause."""
+    """Continue after a pause."""
     _show(control.resume(run), json)
 
 
@@ -242,7 +242,7 @@ def resume(run: Run = None, json: Json = False) -> None:
 def step(
     count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1, run: Run = None, json: Json = False
 ) -> None:
-    """Let a number of ticks pass, then pause."""
+    """Simulate a number of ticks, then pause."""
     _show(control.step(count, run), json)
 
 
@@ -289,13 +289,13 @@ def move(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Have another node own a robot; the world does not notice."""
+    """Move a robot to another node; the world stays the same."""
     _show(control.move(robot, node, run), json)
 
 
 @app.command()
 def balance(run: Run = None, json: Json = False) -> None:
-    """Move robots from busy nodes to idle ones, once; the answer says which, and by which loads."""
+    """Move robots from busy nodes to idle ones, once; prints the robots and the loads."""
     _show(control.balance(run), json)
 
 
@@ -304,16 +304,16 @@ Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
 
 @app.command()
 def stop(node: Node, run: Run = None, json: Json = False) -> None:
-    """Have a node end; its robots move to the others first."""
+    """Stop a node, after its robots have moved to the other nodes."""
     _show(control.stop(node, run), json)
 
 
 @app.command()
 def start(node: Node, run: Run = None, json: Json = False) -> None:
-    """Let a node take part again, with its robots: one that was stopped, or that its launcher has given up.
+    """Start a node that was stopped, or that its launcher has given up; its robots move back.
 
-    `up` starts the processes of local nodes, with a new count of their ends; one that is launched by hand has to be
-    started by hand.
+    `up` starts the process of a local node and counts its failures anew. A node with `launch: manual` is started by
+    hand.
     """
     _show(control.start(node, run), json)
 
@@ -327,15 +327,15 @@ def push(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Give a ball an impulse.
+    """Apply an impulse to a ball.
 
-    On a ball of 21 g, 0.021 N s are 1 m/s.
+    An impulse of 0.021 N s changes the velocity of a ball of 21 g by 1 m/s.
     """
     _show(control.push(_three("impulse", "N s", impulse), name, run), json)
 
 
 def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
-    """Return three numbers; raises BadValue, since typer does not say which ones are needed."""
+    """Return three numbers; raises BadValue with what the numbers are, which typer's message lacks."""
     needed = f"{what}: three numbers are needed, X Y Z in {unit}"
     if len(words) != 3:
         raise BadValue(f"{needed}; here are {len(words)}", " ".join(words))
@@ -353,7 +353,7 @@ def down(run: Run = None, json: Json = False) -> None:
 
 
 def _show(answer: Answer, json: bool) -> None:
-    """Print what the supervisor answered."""
+    """Print the supervisor's answer."""
     print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
 
 
@@ -362,8 +362,8 @@ def _show(answer: Answer, json: bool) -> None:
 def validate(options: RunOptions, json: Json = False) -> None:
     """Check a deployment file.
 
-    All problems are shown at once, one a line: file:line:column: what, value, nearest valid name. Of a file without
-    any the classes of the players that run here are imported, in a process of its own.
+    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
+    classes of the players on this machine are imported, in a separate process.
     """
     plan = make_plan(options)
     check_players_here(plan)
@@ -382,21 +382,23 @@ def validate(options: RunOptions, json: Json = False) -> None:
 def install_units(  # a command's options
     host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path("deploy/cluster.yaml"),
-    listen: Annotated[str | None, typer.Option(help="HOST:PORT of the supervisor, by default as deployed.")] = None,
-    user: Annotated[bool, typer.Option("--user", help="Of a user's own systemd; with --print or --output.")] = False,
+    listen: Annotated[
+        str | None, typer.Option(help="HOST:PORT of the supervisor; by default the deployment's.")
+    ] = None,
+    user: Annotated[bool, typer.Option("--user", help="Units of a user's systemd; with --print or --output.")] = False,
     show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
-    output: Annotated[Path | None, typer.Option(help="Write them into this folder, not onto the host.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write the units into this folder of this machine.")] = None,
     pki: PkiOption = None,
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
 ) -> None:
-    """Write a unit of systemd for each node of a host, onto the host.
+    """Install a systemd unit for each node of a host, on that host.
 
-    A unit restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. As root on the
-    host they are units of the system; any other user gets units of its own systemd, which run without a login after
+    systemd restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. When the ssh
+    user is root, system units are installed, otherwise units of that user; these run without a login after
     `loginctl enable-linger`.
 
-    With --pki the units are for runs with certificates: a node has its own from the folder that the deployment names
-    as the host's `pki`. What belongs there is brought there as by `foosim-pki init --send`.
+    With --pki the units are for runs with certificates. A node reads its certificate from the folder in the host's
+    `pki` setting; the files are sent there as by `foosim-pki init --send`.
     """
     plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
     deployment = plan.deployment
@@ -420,7 +422,7 @@ def install_units(  # a command's options
 
 
 def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:
-    """Print the one object of `up --json` also where its options cannot be read."""
+    """Print the JSON object of `up --json` when its options are invalid, too."""
     if words[:1] == ["up"]:
         _print_result(refused_result(None, None, str(problem)), "--json" in words)
 

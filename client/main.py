@@ -155,19 +155,19 @@ app = new_app()
 
 @app.command()
 def player(
-    name: Annotated[
-        list[str], typer.Option(help="Its name, as the deployment declares it under players; may be repeated.")
-    ],
+    name: Annotated[list[str], typer.Option(help="Name of a player in the deployment; may be repeated.")],
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
-    world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
-    """Play in a run: load the class that the deployment names and let it act; of several players, each its own.
+    """Run players: the classes that the deployment names for them.
 
-    The process ends with the run; it exits with 0 when the run ended, with 1 when the player failed or the vHub was
-    gone for longer than a run waits for it, and with 3 when the vHub would not have it.
+    The process ends with the run.
+
+    Exit codes: 0 when the run ended, 1 when a player failed or the vHub was lost for longer than the deployment's
+    `deadlines.vhub_back`, 3 when the vHub refused it.
     """
     die_with_parent()
     end_with_stack()

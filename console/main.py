@@ -31,26 +31,28 @@ app = new_app()
 @app.command(no_args_is_help=False)
 def foosim_console(  # noqa: PLR0913, PLR0917  # a command's options
     run: Annotated[
-        str | None, typer.Argument(metavar="[RUN]", help="The run to look at; by default the newest live one.")
+        str | None, typer.Argument(metavar="[RUN]", help="Name of the run; by default the newest live one.")
     ] = None,
-    listen: Annotated[str, typer.Option(help="HOST[:PORT] to serve the page at.")] = LOOPBACK,
+    listen: Annotated[str, typer.Option(help="Serve the page at this HOST[:PORT].")] = LOOPBACK,
     certificate: Annotated[
-        Path | None, typer.Option(help="A PEM certificate for HTTPS, which another address than loopback takes.")
+        Path | None, typer.Option(help="A PEM certificate for HTTPS; required except at loopback.")
     ] = None,
-    key: Annotated[Path | None, typer.Option(help="The key of that certificate, PEM.")] = None,
-    view_only: Annotated[bool, typer.Option("--view-only", help="Let nobody operate the run.")] = False,
-    open_browser: Annotated[bool, typer.Option("--open", help="Show the page in the browser of this machine.")] = False,
+    key: Annotated[Path | None, typer.Option(help="The private key of that certificate, PEM.")] = None,
+    view_only: Annotated[bool, typer.Option("--view-only", help="Permit viewing only.")] = False,
+    open_browser: Annotated[bool, typer.Option("--open", help="Open the page in this machine's browser.")] = False,
     second: SecondOption = None,
     offset: OffsetOption = None,
     announce: Annotated[Path | None, typer.Option(hidden=True)] = None,
     version: VersionOption = False,
 ) -> None:
-    """Serve a page that shows a live run, and lets operators do what foosim-supervisor's commands do.
+    """Serve the console of a live run, a page that shows and controls it.
 
-    Prints an address for who operates and one for who only looks; the token in it is the permission. While no browser
-    is open it asks the run for its status once a second. With --second a recording follows the run on its clock, beside
-    it or as a ghost in it, and the distance between the two is plotted, entity by entity. Ctrl-C ends it; the run goes
-    on. Exit codes: 0 ended, 1 no run is live or nobody can listen, 2 bad input, 3 refused.
+    Prints one address for operators and one for viewers; the token in an address grants access. With --second a
+    recording is shown beside the run or as a ghost in it, on the run's clock, and the distance between their entities
+    is plotted. While no browser is connected, the console requests the run's status once a second. Ctrl-C ends the
+    console; the run continues.
+
+    Exit codes: 0 ended, 1 no run is live or the address is not available, 2 bad input, 3 refused.
     """
     die_with_parent()
     offset_ns = read_offset(second, offset)

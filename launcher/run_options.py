@@ -24,7 +24,7 @@ class RunOptions:
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")] = None
     branch: Annotated[
         str | None,
-        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame: run.mcap@12.5s or @last."),
+        typer.Option("--from", metavar="CAPTURE@TIME", help="Start with a captured frame: run.mcap@12.5s or @last."),
     ] = None
     sets: Annotated[
         tuple[str, ...],
@@ -35,7 +35,9 @@ class RunOptions:
         str | None,
         typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
     ] = None
-    insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False
+    insecure: Annotated[bool, typer.Option("--insecure", help="Listen for other machines without certificates.")] = (
+        False
+    )
     pki: PkiOption = None
     balance: Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")] = False
 

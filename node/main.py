@@ -123,18 +123,19 @@ app = new_app()
 
 @app.command()
 def node(
-    name: Annotated[str, typer.Option(help="Its name, as the deployment declares it.")],
+    name: Annotated[str, typer.Option(help="Name of the node in the deployment.")],
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
-    world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
-    """Take part in a run as a node.
+    """Run a simulation node.
 
-    One address is enough: deployment and models come from the supervisor. The process ends with the run; it exits with
-    0 when the run ended, with 1 when the supervisor was lost for longer than the deployment's `deadlines.orphan`, and
-    with 3 when the supervisor would not have it.
+    The supervisor sends the deployment and the models. The process ends with the run.
+
+    Exit codes: 0 when the run ended, 1 when the supervisor was lost for longer than the deployment's
+    `deadlines.orphan`, 3 when the supervisor refused it.
     """
     die_with_parent()
     raise typer.Exit(run_node(name, connect, world, pki, progress_file))

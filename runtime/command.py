@@ -41,7 +41,7 @@ VersionOption = Annotated[
 
 PkiOption = Annotated[
     Path | None,
-    typer.Option("--pki", envvar=PKI_VARIABLE, help="The folder with ca.pem and its own certificate and key."),
+    typer.Option("--pki", envvar=PKI_VARIABLE, help="Folder with ca.pem, the certificate and its key."),
 ]
 
 

@@ -158,7 +158,7 @@ class Loop:
         self._sign_ns = NEVER_NS
 
     def show_progress(self, path: Path | None) -> None:
-        """Write signs of life to this file while the loop advances; none without a path. Raises Failed."""
+        """Write the loop's progress to this file; do nothing without a path. Raises Failed."""
         if path is not None:
             self._progress = ProgressFile(path)
             self._sign_ns = 0
@@ -246,7 +246,7 @@ class Loop:
         try:
             self._progress.write(now_ns)
         except OSError as error:  # the sign gets old; the run itself is not affected
-            self._log.warning("no sign of life could be written: %s", error.strerror)
+            self._log.warning("the progress file could not be written: %s", error.strerror)
 
     def _measure(self, now_ns: int, slept_ns: int) -> None:
         self._slept_ns += slept_ns

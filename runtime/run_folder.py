@@ -1,8 +1,8 @@
-"""Where a run keeps its run file, logs and journals, and how control commands find it without an address.
+"""The folder of a run: run file, logs, journals; with it control commands find the run.
 
-Each run has a folder named as the run, by default in the platform's state folder. Its supervisor holds a lock as long
-as it lives, so a run that is over is never taken for a live one, whatever process has its id by now. The run file says
-where the run listens.
+Each run has a folder with its name, by default in the platform's state folder. Its supervisor keeps a lock on it while
+it lives, so an ended run is never mistaken for a live one when its process id is used again. The run file has the
+run's addresses.
 """
 
 from __future__ import annotations
@@ -92,10 +92,7 @@ class RunFolder:
         (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
 
     def hold_launcher(self) -> None:
-        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run.
-
-        Raises Refused when another one does.
-        """
+        """Lock the folder as its run's launcher, until this process ends. Raises Refused when it has another one."""
         self._launcher = self._take(LAUNCHER_FILE)
         if self._launcher is None:
             raise Refused(f"run {self.name} is looked after by the launcher that started it")
@@ -129,17 +126,17 @@ class RunFolder:
         return not any((self.path / name).exists() for name in (LAUNCHER_FILE, LAUNCH_FILE, LOCK_FILE, RUN_FILE))
 
     def is_left(self) -> bool:
-        """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
+        """Whether the run has lost its launcher and its supervisor, so that its processes are not restarted."""
         return (self.path / LAUNCHER_FILE).exists() and not is_locked(self.path / LAUNCHER_FILE) and not self.is_live()
 
     def release(self) -> None:
-        """Give the lock back: the run is over."""
+        """Release the lock after the run."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
 
     def is_live(self) -> bool:
-        """Whether a supervisor holds the folder."""
+        """Whether a supervisor has locked the folder."""
         return is_locked(self.path / LOCK_FILE)
 
     def write_info(self, info: RunInfo) -> None:
@@ -147,7 +144,7 @@ class RunFolder:
         _replace(self.path / RUN_FILE, msgspec.json.format(msgspec.json.encode(info)))
 
     def info(self) -> RunInfo | None:
-        """Return what the run file says, or None while there is none."""
+        """Return the run file's content, or None while there is none."""
         try:
             return msgspec.json.decode((self.path / RUN_FILE).read_bytes(), type=RunInfo)
         except UNREADABLE:
@@ -252,7 +249,7 @@ def live_runs() -> list[RunFolder]:
 
 
 def left_runs() -> list[RunFolder]:
-    """Return the runs of this user that nobody looks after any more, the newest first."""
+    """Return this user's runs without launcher and supervisor, the newest first."""
     return [folder for folder in _newest_first(runs_folder()) if folder.is_left()]
 
 

@@ -1,8 +1,7 @@
-"""How long a process's own loop stood still: stopped, without the processor, its machine asleep, or busy in a turn.
+"""Detects standstills of a process's own loop: stopped, without a processor, machine asleep, or busy in a turn.
 
-Such a process has not looked, so it cannot know what others did meanwhile, and blames nobody for that time: every
-deadline that it keeps for another one rests. It sees this by its own monotonic clock alone, since its loop knows when
-it was to look again at the latest. Pure.
+Such a process has read no messages meanwhile, so every deadline that it keeps for another process is suspended for
+that time. The loop detects a standstill from its own monotonic clock, since it knows when its next turn was due. Pure.
 """
 
 from __future__ import annotations
@@ -10,22 +9,22 @@ from __future__ import annotations
 from typing import Final
 
 STOOD_NS: Final = 20_000_000
-"""A loop that looks again later than it meant to by no more than this has not stood still."""
+"""A turn that is late by at most this is no standstill."""
 REPORTED_NS: Final = 1_000_000_000
-"""One that stood still for so long says so. Its connections may have closed, which is no fault of the others either:
-`session_settings.LEASE_MS`."""
+"""A standstill of at least this is logged. Its connections may have closed meanwhile (`settings.LEASE_MS`), which is
+no failure of the other processes."""
 
 
 class Standstill:
-    """When a loop looked last."""
+    """The time of a loop's last turn."""
 
     def __init__(self, now_ns: int) -> None:
         self._looked_ns = now_ns
 
     def look(self, due_ns: int, now_ns: int) -> int:
-        """The loop looks, and meant to at `due_ns` at the latest: return how long it stood still, 0 for hardly at all.
+        """Begin a turn that was due at `due_ns`; return the length (ns) of the standstill before it, 0 for none.
 
-        A turn that takes long past the time at which the next one was due counts, too.
+        A turn that ends after the next one was due counts as a standstill, too.
         """
         late_ns = now_ns - max(due_ns, self._looked_ns)
         self._looked_ns = now_ns
@@ -33,5 +32,5 @@ class Standstill:
 
 
 def standstill_text(stood_ns: int) -> str:
-    """Return what people are told of it; empty when it is too short for that."""
+    """Return the log line of a standstill; empty for a short one."""
     return f"stood still for {stood_ns / 1e9:.1f} s: no other process is blamed" if stood_ns >= REPORTED_NS else ""

@@ -1,4 +1,4 @@
-"""The timeout of a process without its supervisor: it holds, and ends when none returns. Pure."""
+"""The timeout of a process that has lost its supervisor. It waits, and ends at the timeout. Pure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 from foosim.deployment.schema import Deployment
 
 UNKNOWN_NS: Final = 30_000_000_000
-"""The timeout while the deployment is not known."""
+"""The timeout before the deployment has been received."""
 
 
 class Orphan:

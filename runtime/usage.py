@@ -1,6 +1,6 @@
-"""What was typed and is no use of a command, in one line: where, what is wrong, the value, what is valid.
+"""Usage errors in one line: the command, the problem, the value, what is valid.
 
-`command` shows it. What typer raises has the faults apart, but not their classes: they are told by their attributes.
+`command` prints them. Typer's exceptions for different problems share a class; their attributes distinguish them.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from foosim.common.names import nearest_name
 
 
 class BadUsage(BadValue):
-    """What was typed is no use of the command: an option or argument that it does not have, or has otherwise."""
+    """The command line is invalid: an unknown option or argument, or a bad value of one."""
 
 
 def bad_usage(error: typer.TyperException, root: Any, program: str, words: Sequence[str]) -> BadUsage:
-    """Return what is wrong with `words`, which typer has refused with `error`; `root` is what `program` is."""
+    """Return the error in `words`, which typer refused with `error`; `root` is the typer command of `program`."""
     command, place, words = _meant(error, root, program, words)
     option, parameter = getattr(error, "option_name", None), getattr(error, "param", None)
     if option is not None:
@@ -36,7 +36,7 @@ def bad_usage(error: typer.TyperException, root: Any, program: str, words: Seque
 
 
 def _meant(error: Exception, root: Any, program: str, words: Sequence[str]) -> tuple[Any, str, list[str]]:
-    """Return the command that was refused, what it is called, and the words behind its name."""
+    """Return the refused command, its name, and the words after its name."""
     commands, context = getattr(root, "commands", {}), getattr(error, "ctx", None)
     if context is None or context.parent is not None:
         for number, word in enumerate(words):
@@ -46,7 +46,7 @@ def _meant(error: Exception, root: Any, program: str, words: Sequence[str]) -> t
 
 
 def _shown(parameter: Any) -> str:
-    """A parameter as the docs call it: `--seed`, `COUNT`."""
+    """Return the name of a parameter as in the docs: `--seed`, `COUNT`."""
     if parameter.param_type_name == "option":
         return str(max(parameter.opts, key=len))
     return str(parameter.metavar or parameter.name.upper())
@@ -66,7 +66,7 @@ def _unknown(what: str, word: str, kind: str, valid: Sequence[str]) -> BadUsage:
 
 
 def _value_of_option(command: Any, place: str, option: str, words: Sequence[str]) -> BadUsage:
-    """An option with too few values, or with one where it is said or not."""
+    """Return the error of an option with too few values, or of a flag with a value."""
     parameter = next(one for one in command.params if option in one.opts)
     where = f"{place} {option}"
     if getattr(parameter, "is_flag", False):

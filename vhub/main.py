@@ -430,13 +430,15 @@ app = new_app()
 @app.command()
 def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
-    listen: Annotated[str, typer.Option(help="Address for clients; port 0: any free port.")] = LOOPBACK,
+    listen: Annotated[str, typer.Option(help="Address for clients; port 0 is any free port.")] = LOOPBACK,
     insecure: Annotated[
-        bool, typer.Option("--insecure", help="Listen on addresses that other machines reach.")
+        bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
     ] = False,
-    capture: Annotated[Path | None, typer.Option(help="File to write; by default captures/WORLD-TIME.mcap.")] = None,
+    capture: Annotated[
+        Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")
+    ] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
-    run_folder: Annotated[Path | None, typer.Option(help="Folder of its journal; by default RUN.vhub.")] = None,
+    run_folder: Annotated[Path | None, typer.Option(help="Folder of the journal; by default RUN.vhub.")] = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,

@@ -36,6 +36,6 @@ class Admission:
             assert self._credentials is not None
             who = self._credentials.identity
             raise NotAuthorised(
-                f"{who}: not authorised, or not reachable: the {self._router} at {self._locator} lets it connect and "
-                f"tells it nothing; is {who} in the deployment, and is this the right plane's address?"
+                f"{who}: not authorised, or not reachable: the {self._router} at {self._locator} accepts the "
+                f"connection and sends nothing; is {who} in the deployment, and is this the right plane's address?"
             )

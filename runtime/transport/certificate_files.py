@@ -69,7 +69,7 @@ def check_key(path: Path, found: x509.Certificate) -> None:
 
 
 def common_name(found: x509.Certificate) -> str:
-    """Return whom a certificate names; empty when nobody, or more than one."""
+    """Return the identity in a certificate; empty without one, and with more than one."""
     names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     return str(names[0].value) if len(names) == 1 else ""
 

@@ -16,7 +16,7 @@ FILE_BYTES_MAX: Final = 65_536
 
 
 class CertificateError(Refused):
-    """A certificate, key or password that is not there, or with which nobody would be let in; the text says why."""
+    """A certificate, key or password is missing or would be rejected; the text has the reason."""
 
 
 def read_bounded(path: Path) -> bytes:

@@ -43,7 +43,7 @@ SOON: Final = timedelta(days=14)
 
 
 class NotAuthorised(Refused):
-    """The router will not have us, or we not the router; the text says why, as far as that can be known."""
+    """The router rejects this process, or the other way round; the text has the reason where it is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ def _credentials_of_one(folder: Path, role: str, variable: str) -> Credentials |
     known = [who for who in identities_in(folder) if who.startswith(f"{role}.")]
     if len(known) != 1:
         there = f"several {role}s ({', '.join(known)})" if known else f"no {role}'s certificate"
-        raise CertificateError(f"{folder} has {there}: {variable}=NAME in the environment says which it is")
+        raise CertificateError(f"{folder} has {there}: set {variable}=NAME in the environment")
     return load_credentials(folder, known[0])
 
 

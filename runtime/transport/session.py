@@ -1,4 +1,4 @@
-"""A session on a plane: the one file that knows Zenoh.
+"""A session on a plane; the only file that uses Zenoh.
 
 The supervisor's session is the router of the simulation plane, the vHub's second one that of the radio plane. All
 others are clients, which connect to one address and never listen. Scouting is off, so no links bypass a router.
@@ -90,7 +90,7 @@ class Publisher:
         self._pid = os.getpid()
 
     def put(self, payload: bytes) -> None:
-        """Publish. A stuck reader holds a blocking publisher for at most half a second; a loss is not reported."""
+        """Publish. A stuck reader blocks a blocking publisher for at most half a second; a loss is not reported."""
         assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
         self._put(payload)
         self.sent += 1

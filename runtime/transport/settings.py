@@ -17,7 +17,7 @@ from foosim.runtime.transport.certificates import Credentials
 LEASE_MS: Final = 1000
 """The silence after which a peer is lost."""
 BLOCK_US: Final = 500_000
-"""How long one stuck reader may hold a sender before its link is closed."""
+"""The longest time a stuck reader may block a sender; then its link is closed."""
 QUERY_S: Final = 2.0
 
 
@@ -43,7 +43,7 @@ def router_settings(address: Address, message_bytes_max: int, security: Security
     }
     if security is None:
         return settings
-    assert security.access is not None, "a router with certificates says who may do what"
+    assert security.access is not None, "a router with certificates has access rules"
     return settings | _certificate_settings(security) | _access_settings(security.access, security.passwords_file)
 
 

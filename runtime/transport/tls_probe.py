@@ -28,8 +28,8 @@ def probe(address: Address, credentials: Credentials | None, is_last: bool) -> N
     else:
         if credentials is not None and is_last:
             raise NotAuthorised(
-                f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and lets nobody in "
-                "by this " + ("user and password" if credentials.password else "certificate")
+                f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and refuses this "
+                + ("user and password" if credentials.password else "certificate")
             )
 
 
@@ -40,7 +40,7 @@ def _shake(link: socket.socket, address: Address, credentials: Credentials | Non
         context.check_hostname = False
         context.verify_mode = ssl.CERT_NONE
         with context.wrap_socket(link):
-            raise NotAuthorised(f"{address} lets in only who has a certificate or a password: --pki DIR says where")
+            raise NotAuthorised(f"{address} requires a certificate or a password: --pki DIR has its folder")
     context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=str(credentials.ca))
     if credentials.certificate is not None:
         context.load_cert_chain(credentials.certificate, credentials.key)

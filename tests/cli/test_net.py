@@ -94,7 +94,7 @@ def test_lint_of_a_network_alone_says_what_it_cannot_know(command: Command, tmp_
     file.write_text(yaml.safe_dump({"network": {**NETWORK, "robots": {"anybody*": ["wifi"]}}}))
     done = command("lint", file)
     assert done.code == 0
-    assert done.out.startswith("the network stands alone: whom its selectors match is not known")
+    assert done.out.startswith("a network section without its deployment: the selectors match no endpoints")
     network = "  radios:\n    wifi: {preset: wifi_5, loss: 2}\n  links:\n  - {id: x, from: a, via: wif}\n"
     file.write_text(f"network:\n{network}")
     done = command("lint", file)

@@ -82,7 +82,7 @@ def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> Non
     (tmp_path / "run_0000.mcap").touch()
     for number in (4, 5, 6):
         (tmp_path / f"run_000{number}.mcap").unlink()
-    assert "it goes on in run_0003.mcap, which is not here" in replay("info", tmp_path / "run.mcap").out
+    assert "continues in run_0003.mcap, which is missing" in replay("info", tmp_path / "run.mcap").out
 
 
 def test_the_last_seconds_are_played_cut_and_told(split: Path, run: Path, tmp_path: Path) -> None:

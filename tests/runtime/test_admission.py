@@ -33,7 +33,9 @@ def test_an_open_plane_is_said_at_once_and_every_minute() -> None:
     exposure = Exposure(parse_address("0.0.0.0:7400"), 7)
     said = [now_ns for now_ns in range(7, 7 + 3 * EVERY_NS, EVERY_NS // 10) if exposure.due(now_ns)]
     assert said == [7, 7 + EVERY_NS, 7 + 2 * EVERY_NS]
-    assert "whoever reaches tcp/192.168.0.1:5 takes part" in Exposure(parse_address("192.168.0.1:5"), 0).due(0)
+    assert "any process that reaches tcp/192.168.0.1:5 can take part" in Exposure(
+        parse_address("192.168.0.1:5"), 0
+    ).due(0)
 
 
 @pytest.mark.parametrize("address", ["tcp/127.0.0.1:7400", "tcp/[::1]:7400", "tls/0.0.0.0:7400", "tls/10.0.0.1:1"])

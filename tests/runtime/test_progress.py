@@ -35,7 +35,7 @@ def test_the_age_is_counted_on_the_monotonic_clock(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (None, "no sign of life, No such file or directory"),
+        (None, "no progress file, No such file or directory"),
         (b"", "not a progress file"),
         (b"1" * 20, "not a progress file"),
         (b"-" + b"1" * 19 + b"\n", "not a progress file"),
@@ -56,7 +56,7 @@ def test_a_probe_says_no_when_the_last_sign_is_too_old(tmp_path: Path) -> None:
     assert probe_file(path, "1 h") < 3600 * S
     file.write(time.monotonic_ns() - 10 * S)
     assert probe_file(path, "1 h") >= 10 * S
-    with pytest.raises(NoProgress, match=r"the last sign of life is \d\d+\.\d s old, more than 5s"):
+    with pytest.raises(NoProgress, match=r"the last progress is \d\d+\.\d s old, more than 5s"):
         probe_file(path, "5s")
     with pytest.raises(BadValue, match="--within"):
         probe_file(path, "0 s")
@@ -114,4 +114,4 @@ def test_signs_that_cannot_be_written_harm_nothing(tmp_path: Path, caplog: pytes
         os.dup2(unwritable.fileno(), loop._progress._file)
     with caplog.at_level(logging.WARNING):
         loop.go_round()
-    assert "no sign of life could be written: Bad file descriptor" in caplog.text
+    assert "the progress file could not be written: Bad file descriptor" in caplog.text

@@ -312,7 +312,7 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
         nameless = replace(ours, certificate=None, key=None, user="red", password="guess")
         with pytest.raises(NotAuthorised, match=r"it does not accept who has no certificate \("):
             Session.client(router.locator, LONG_S, security=Security(nameless))
-        with pytest.raises(NotAuthorised, match="lets in only who has a certificate or a password"):
+        with pytest.raises(NotAuthorised, match="requires a certificate or a password"):
             Session.client(router.locator.replace("tls/", "tcp/"), LONG_S)
         Session.client(router.locator, LONG_S, security=Security(ours)).close()
 
