@@ -240,7 +240,9 @@ def test_a_viewer_is_the_only_one_or_named_or_the_operator(folder: Path, monkeyp
         found = viewer_credentials(folder)
         assert found is not None and found.identity == expected
     pki.issue(folder, ["viewer.wall"])
-    with pytest.raises(CertificateError, match=r"several viewers \(viewer\.desk, viewer\.wall\): set FOOSIM_VIEWER=NAME"):
+    with pytest.raises(
+        CertificateError, match=r"several viewers \(viewer\.desk, viewer\.wall\): set FOOSIM_VIEWER=NAME"
+    ):
         viewer_credentials(folder)
     monkeypatch.setenv("FOOSIM_VIEWER", "wall")
     found = viewer_credentials(folder)

@@ -29,6 +29,8 @@ LONG: Final = (
     " start: 900 s, orphan: 900 s, vhub_back: 900 s, client_back: 900 s}"
 )
 """Nobody is given up for being slow; a test of one of these deadlines sets that one."""
+NO_CAPTURE_TO_CLOSE: Final = ("--set", "deadlines.close=1 s")
+"""For a run whose vHub is gone at its end: the supervisor waits as long as this for it to close its capture."""
 LIMIT_S: Final = 900.0
 LOOK_S: Final = 0.3
 SLOW: Final = "0.1x"

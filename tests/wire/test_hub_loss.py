@@ -17,7 +17,7 @@ from foosim.client.errors import RunEnded
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
-from tests.wire.conftest import LIMIT_S, LONG
+from tests.wire.conftest import LIMIT_S, LONG, NO_CAPTURE_TO_CLOSE
 from tests.wire.test_run import last_json
 from tests.wire.test_same_bytes import PLAYERS, scribes
 
@@ -133,7 +133,7 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
 
 def test_a_run_whose_vhub_cannot_go_on_ends_in_order_and_says_why(house: House) -> None:
     """Its journal cannot be read any more: however often it was started again, it would not come back."""
-    up = house.up("--json")
+    up = house.up("--json", *NO_CAPTURE_TO_CLOSE)
     house.ticking(5)
     for journal in house.live().journals.glob("vhub-*.journal"):
         journal.write_bytes(b"nothing of a journal")

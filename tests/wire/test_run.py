@@ -27,7 +27,7 @@ from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.inbox import Inbox
 from foosim.world.frame import frame_from_bytes
 from foosim.world.layout import build_layout
-from tests.wire.conftest import LIMIT_S, LONG
+from tests.wire.conftest import LIMIT_S, LONG, NO_CAPTURE_TO_CLOSE
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -216,7 +216,7 @@ def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> N
         port = free_port()
         taken.bind(("127.0.0.1", port + 1))
         taken.listen()
-        code, out, err = house.end(house.up("--json", "--listen", f"127.0.0.1:{port}"))
+        code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, "--listen", f"127.0.0.1:{port}"))
     content = last_json(out)
     assert code == 1
     assert (content["reason"], content["failed"]) == ("lost vhub: it ended with exit code 1", True)
@@ -226,7 +226,7 @@ def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> N
 
 def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> None:
     (house.folder / "file").touch()
-    run = house.start("foosim-supervisor", "run", house.table, "--set", LONG, "--run", "mine")
+    run = house.start("foosim-supervisor", "run", house.table, "--set", LONG, *NO_CAPTURE_TO_CLOSE, "--run", "mine")
     info = house.wait_for("the run file", house.live().info)
     code, _, err = house.run("foosim-vhub", "--connect", info.simulation, "--capture", "file/run.mcap")
     assert code == 3 and "file/run.mcap: cannot be created" in err
