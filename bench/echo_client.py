@@ -25,8 +25,8 @@ from foosim.common.names import CHANNEL_ECHO
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.channels import Plane
-from foosim.runtime.loop import Wire
 from foosim.runtime.process import new_boot
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session, use_client_runtime
 

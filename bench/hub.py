@@ -30,7 +30,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Samples, Sent, Subscription, Up
 from foosim.runtime.journal import Journal
-from foosim.runtime.loop import collect_seldom
+from foosim.runtime.roles.loop import collect_seldom
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.capture_queue import RecordClosing

@@ -19,7 +19,9 @@ from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
 from foosim.node.tick import Work
 from foosim.protocol.channels import Channel
-from foosim.runtime.loop import Loop
+from foosim.runtime.roles import shell
+from foosim.runtime.roles.loop import Loop
+from foosim.runtime.roles.role import Role
 from foosim.runtime.transport.inbox import Inbox, Item
 
 PARTS: Final = ("load", "command", "step", "read", "encode", "decode", "wait")
@@ -53,18 +55,23 @@ class MeteredInbox(Inbox):
 
 
 class MeteredLoop(Loop):
-    """Counts publishing, and marks every tick."""
+    """Marks every tick."""
 
     def go_round(self) -> None:
         super().go_round()
-        assert isinstance(self.core, NodeCore)
-        frame = self.core.frame
+        core = self.roles[0].core
+        assert isinstance(core, NodeCore)
+        frame = core.frame
         if frame is None or frame.tick < WARM_TICKS:
             return
         if METER.has_begun:
             METER.mark(frame.tick)
         else:
             METER.begin(frame.tick)
+
+
+class MeteredRole(Role):
+    """Counts publishing."""
 
     def perform(self) -> None:
         begun_ns = time.perf_counter_ns()
@@ -79,8 +86,9 @@ def metered_solver(core: NodeCore) -> Solver:
 
 def run_metered(name: str, connect: str) -> dict[str, float]:
     """Be a node until the run ends; return microseconds a tick by part."""
-    with mock.patch.multiple(
-        node_main, NodeCore=MeteredCore, Inbox=MeteredInbox, Loop=MeteredLoop, Solver=metered_solver
+    with (
+        mock.patch.multiple(node_main, NodeCore=MeteredCore, Solver=metered_solver),
+        mock.patch.multiple(shell, Inbox=MeteredInbox, Loop=MeteredLoop, Role=MeteredRole),
     ):
         node_main.run_node(name, connect)
     spent = METER.us_per_tick()

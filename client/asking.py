@@ -11,7 +11,7 @@ from foosim.common.errors import Malformed
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Answer
-from foosim.runtime.loop import Wire
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox
 
 AGAIN_S: Final = 0.1

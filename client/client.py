@@ -153,7 +153,9 @@ class Link:
     """The client's connection to the vHub: its core on a session, driven by the thread that waits."""
 
     def __init__(self, core: ClientCore, session: Session) -> None:
-        from foosim.runtime.loop import Loop, Wire
+        from foosim.runtime.roles.loop import Loop
+        from foosim.runtime.roles.role import Role
+        from foosim.runtime.roles.wire import Wire
 
         self.core: Final = core
         self.locator: Final = session.locator
@@ -162,9 +164,11 @@ class Link:
         self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
         self._until_ns = NEVER_NS
         self._wire = Wire(session, Plane.RADIO, self._inbox, core.name)
-        self._loop = Loop(core, self._inbox, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
-        self._loop.connect(self._wire)
-        self._loop.on_alive, self._loop.stood = self._on_alive, core.rest
+        self._role = Role(core.name, core, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
+        self._role.connect(self._wire)
+        self._role.on_alive, self._role.stood = self._on_alive, core.rest
+        self._loop = Loop(self._inbox, _LOG)
+        self._loop.add(self._role)
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
 
     def be_present(self) -> None:
@@ -174,7 +178,7 @@ class Link:
 
     def perform(self) -> None:
         """Write the core's log lines."""
-        self._loop.perform()
+        self._role.perform()
 
     def wait(self, reached: Callable[[], bool], timeout_s: float | None) -> None:
         """Go round until something is reached or the time is over.

@@ -25,7 +25,7 @@ from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Answer, Fetch, Inquiry, Request
 from foosim.runtime.command import PKI_VARIABLE
-from foosim.runtime.loop import Wire
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.run_folder import RunInfo, find_run
 from foosim.runtime.transport.certificates import Credentials, operator_credentials, viewer_credentials
 from foosim.runtime.transport.inbox import Inbox

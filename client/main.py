@@ -1,124 +1,98 @@
 """The process `foosim-player`: players that the deployment declares, between their classes and the radio plane.
 
-One address is all that it needs: class, rate, robots and parameters come with the welcome. Several players in a process
-have a presence each, and are to the run what they would be alone. They share a session, a loop and a thread; those with
-certificates, which are of one name each, have their own.
+The vHub sends class, rate, robots and parameters with the welcome. Each player of a process is a role with its own
+presence. Players share the process's loop, and its session where there are no certificates, which have one name each.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.process_group import Crew
+from foosim.client.failing import report_failure
+from foosim.client.loading import load_player
+from foosim.client.player import PlayerLoop
 from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity
+from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
-from foosim.runtime.command import DONE, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.loop import Wire
 from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot
-from foosim.runtime.process_shell import ProcessShell, client_session
+from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.transport.certificates import Credentials
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 
 
-class PlayerProcess:
-    """The players of one session, until the run ends, the vHub is gone for good, or `stop`."""
+class PlayerShell:
+    """One player, until the run ends, the vHub is gone for good, the player fails, or `stop`."""
 
     def __init__(
-        self,
-        names: Sequence[str],
-        session: Session,
-        inbox: Inbox,
-        world: str = "",
-        credentials: Credentials | None = None,
-        progress: Path | None = None,
+        self, process: Process, name: str, session: Session, world: str = "", credentials: Credentials | None = None
     ) -> None:
-        now_ns = time.monotonic_ns()
-        self.crew = Crew([ClientCore(name, new_boot(), now_ns, world) for name in names])
-        self._absent = [Wire(session, Plane.RADIO, inbox, name) for name in names]
-        """Those of players that are not admitted yet."""
-        log = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others"
-        first = self._absent[0]
-        self._shell = ProcessShell(
-            self.crew, log, first, inbox, lambda now_ns: self.crew.deadline_ns(), progress, credentials
-        )
-        self._loop = self._shell.loop
-        self._loop.turn = self._turn
-        self._loop.on_alive, self._loop.stood = self._on_alive, self.crew.rest
-        for wire in self._absent:  # a loop waits in the queue of one player, not in those of several
-            wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
-        self._shell.watch_router(VHUB, session.locator)
+        self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        self._player = PlayerLoop(self.core, load_player)
+        self._failure: PlayerError | None = None
+        self._is_present = self._is_stopped = False
+        self._shell = RoleShell(process, name, self.core, lambda now_ns: self._deadline_ns(), credentials)
+        self.role: Final = self._shell.role
+        self.role.turn = self._turn
+        self.role.on_alive, self.role.stood = self._on_alive, self.core.rest
+        self._wire = self._shell.connect(session, Plane.RADIO)
+        self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
+        self._shell.watch_router(self._wire, VHUB)
 
-    def run(self) -> int:
-        """Take part until the end; return the exit code. Raises PlayerError for a player that fails."""
-        try:
-            self._loop.run(lambda: self._shell.stopped or self.crew.is_over)
-        except PlayerError:
-            self._loop.perform()  # the vHub has the reason, the log the place
-            raise
-        code = self.crew.leave()
-        self._loop.perform()
-        return code
+    def is_over(self) -> bool:
+        """Whether the run has ended, or the player leaves it."""
+        core = self.core
+        return self._is_stopped or core.ended or core.lost or bool(core.refusal or self._failure)
+
+    def finish(self) -> int:
+        """Perform the last actions; return the exit code. Raises PlayerError for a player that has failed."""
+        if self.core.lost:
+            self.core.actions.append(Log("error", "lost the vHub"))
+        self.role.perform()  # of one that has failed, the vHub gets the reason, the log the place
+        if self._failure is not None:
+            raise self._failure
+        if self.core.refusal:
+            return REFUSED
+        return DONE if self.core.ended else FAILED
+
+    def leave(self) -> None:
+        """A player keeps nothing in files."""
 
     def stop(self) -> None:
-        """Have `run` return soon; a signal handler may call this."""
-        self._shell.stop()
+        """Have the player leave the run; a signal handler may call this."""
+        self._is_stopped = True
 
     def _turn(self, now_ns: int) -> None:
         self._shell.check(now_ns)
-        if self._absent:
-            self._be_present()
-        self.crew.step(now_ns)
+        if self.core.deployment is not None and not self._is_present:
+            self._is_present = True
+            self._wire.declare_alive()
+        if self._failure is None:
+            try:
+                self._player.step(now_ns)
+            except PlayerError as error:
+                report_failure(self.core, error)
+                self._failure = error
 
-    def _be_present(self) -> None:
-        """Report the players that were admitted."""
-        welcome = {core.name for core in self.crew.cores if core.deployment is not None}
-        for wire in self._absent:
-            if wire.name in welcome:
-                wire.declare_alive()
-        self._absent = [wire for wire in self._absent if wire.name not in welcome]
+    def _deadline_ns(self) -> int:
+        return min(self.core.deadline_ns(), self._player.deadline_ns())
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         self._shell.on_alive(name, is_alive)
         if name == VHUB:
-            self.crew.hub_alive(is_alive, time.monotonic_ns())
-
-
-class Fleet:
-    """The sessions of one process, each in a thread. The first one that fails, or is refused, stops all."""
-
-    def __init__(self, players: Sequence[PlayerProcess]) -> None:
-        self._players = players
-
-    def run(self) -> int:
-        """Take part until the end; return the greatest exit code. Raises the error of a player that failed."""
-        with ThreadPoolExecutor(len(self._players)) as pool:
-            running = [pool.submit(player.run) for player in self._players]
-            for ended in as_completed(running):
-                if ended.exception() is not None or ended.result() != DONE:
-                    self.stop()
-        failed = [error for ended in running if (error := ended.exception()) is not None]
-        if failed:
-            raise failed[0]
-        return max(ended.result() for ended in running)
-
-    def stop(self) -> None:
-        """Have `run` return soon; a signal handler may call this."""
-        for player in self._players:
-            player.stop()
+            (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
 def run_players(
@@ -134,20 +108,19 @@ def run_players(
         if names.count(name) > 1:
             raise BadValue("a player that is named twice", name)
     stop = Stop()
+    log = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others"
+    process = Process(log, progress, is_shared=len(names) > 1)
     with ExitStack() as stack:
-        players: list[PlayerProcess] = []
-        for crew in [names] if pki is None else [[name] for name in names]:  # a session has one certificate
-            who, limit = identity.client(crew[0]), limits.RADIO_MESSAGE_BYTES_MAX
-            link = client_session(connect, who, pki, stop, limit, sets_runtime=not players)
-            session, inbox, credentials = stack.enter_context(link)
-            first = progress if not players else None  # the others end when its loop does not go round any more
-            players.append(PlayerProcess(crew, session, inbox, world, credentials, first))
-        if len(players) == 1:
-            stop.then(players[0].stop)
-            return players[0].run()
-        fleet = Fleet(players)
-        stop.then(fleet.stop)
-        return fleet.run()
+        links: list[tuple[Session, Credentials | None]] = []
+        for name in names:
+            if pki is not None or not links:  # a session has one certificate
+                who, limit = identity.client(name), limits.RADIO_MESSAGE_BYTES_MAX
+                link = client_session(connect, who, pki, stop, limit, sets_runtime=not links)
+                links.append(stack.enter_context(link))
+            session, credentials = links[-1]
+            process.add(PlayerShell(process, name, session, world, credentials))
+        stop.then(process.stop)
+        return process.run()
 
 
 app = new_app()

@@ -28,7 +28,7 @@ from foosim.deployment.channel_kinds import channel_kind
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.channels import ALIVE, PLAYED, REPLAY, Plane
+from foosim.protocol.channels import PLAYED, REPLAY, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.replay_messages import CLOCK, STREAMS, Played, PlayedPacket, ReplayClock
@@ -59,7 +59,7 @@ class Replay:
     """A connection to one replay. Use it in `with`; iterate over it, or `take`."""
 
     def __init__(self, session: Session, name: str, streams: Sequence[str]) -> None:
-        from foosim.runtime.loop import Wire
+        from foosim.runtime.roles.wire import Wire, presence_channel
 
         self.locator: Final = session.locator
         self.clock: ReplayClock | None = None
@@ -84,6 +84,7 @@ class Replay:
             session.subscribe(key, PLAYED.key, self._inbox)
         # Last: a replay that answers knows of the subscriptions before it.
         self._wire = Wire(session, Plane.REPLAY, self._inbox, name)
+        self._presence = presence_channel(Plane.REPLAY, name)
         self._wire.read(((channels.REPLAY_ANSWER, True),))
         self._wire.watch_alive(REPLAY)
 
@@ -144,7 +145,7 @@ class Replay:
             self._on_message(key, name, payload)
 
     def _on_message(self, key: str, name: str, payload: bytes) -> None:
-        if key == ALIVE[Plane.REPLAY]:
+        if key == self._presence:
             self._is_gone |= payload == b"-"
         if key != PLAYED.key:
             return

@@ -84,8 +84,8 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "every process",
         "the end of its own alarm thread; then it ends without it",
     ),
-    ("runtime.standstill", "STOOD_NS"): ("every process", "its own loop; a longer pause is a standstill"),
-    ("runtime.standstill", "REPORTED_NS"): (
+    ("runtime.roles.standstill", "STOOD_NS"): ("every process", "its own loop; a longer pause is a standstill"),
+    ("runtime.roles.standstill", "REPORTED_NS"): (
         "supervisor, vHub",
         "their own loop; a longer standstill is logged, and a closed connection after it is no loss",
     ),
@@ -129,7 +129,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the end of the previous guard"),
     ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
-    ("runtime.process_shell", "CONNECT_S"): (
+    ("runtime.roles.shell", "CONNECT_S"): (
         "vHub, nodes, players",
         "a supervisor or vHub to connect to; then they fail",
     ),

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from foosim.deployment.schema import Deadlines
-from foosim.runtime.standstill import Standstill
+from foosim.runtime.roles.standstill import Standstill
 
 UNANSWERED_MAX: Final = 5
 """Number of unanswered requests after which the supervisor's process is killed."""

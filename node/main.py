@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -21,81 +21,91 @@ from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.loop import Wire
 from foosim.runtime.process import Stop, die_with_parent, new_boot
-from foosim.runtime.process_shell import ProcessShell, client_session
+from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.supervisor_timeout import Orphan
 from foosim.runtime.transport.certificates import Credentials
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 
 
-class NodeProcess:
+class NodeShell:
     """One node on one session, until the run ends, the supervisor is gone for too long, or `stop`."""
 
     def __init__(
-        self,
-        name: str,
-        session: Session,
-        inbox: Inbox,
-        world: str = "",
-        credentials: Credentials | None = None,
-        progress: Path | None = None,
+        self, process: Process, name: str, session: Session, world: str = "", credentials: Credentials | None = None
     ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self._orphan = Orphan()
         self._solver = Solver(self.core)
-        self._is_present = False
-        wire = Wire(session, Plane.SIMULATION, inbox, name)
-        self._shell = ProcessShell(self.core, name, wire, inbox, self._deadline_ns, progress, credentials)
-        self._loop = self._shell.loop
-        self._loop.turn = self._turn
-        self._loop.lacking = lambda: self.core.lacking
-        self._loop.on_alive, self._loop.stood = self._on_alive, self._orphan.rest
-        wire.read(channels.NODE_READS, channels.NODE_WAITS)
-        self._shell.watch_router(SUPERVISOR, session.locator)
+        self._is_present = self._is_stopped = False
+        self._shell = RoleShell(process, name, self.core, self._deadline_ns, credentials)
+        self.role: Final = self._shell.role
+        self.role.turn, self.role.work = self._turn, self._work
+        self.role.lacking = lambda: self.core.lacking
+        self.role.on_alive, self.role.stood = self._on_alive, self._orphan.rest
+        self._wire = self._shell.connect(session, Plane.SIMULATION)
+        self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
+        self._shell.watch_router(self._wire, SUPERVISOR)
 
-    def run(self) -> int:
-        """Take part until the end; return the exit code."""
-        self._loop.run(self._is_over)
-        self._loop.perform()
+    def is_over(self) -> bool:
+        """Whether the run has ended, or this node leaves it."""
+        return self._is_stopped or self.core.ended is not None or bool(self.core.member.refusal)
+
+    def finish(self) -> int:
+        """Perform the last actions; return the exit code."""
+        self.role.perform()
         self._solver.close()
         if self.core.member.refusal:
             return REFUSED
         return DONE if self.core.ended is not None else FAILED
 
-    def stop(self) -> None:
-        """Have `run` return soon; a signal handler may call this."""
-        self._shell.stop()
+    def leave(self) -> None:
+        """Close the engines."""
+        self._solver.close()
 
-    def _is_over(self) -> bool:
-        return self._shell.stopped or self.core.ended is not None or bool(self.core.member.refusal)
+    def stop(self) -> None:
+        """Have the node leave the run; a signal handler may call this."""
+        self._is_stopped = True
 
     def _turn(self, now_ns: int) -> None:
         """Compute ticks as far as the inputs allow; a tick's first messages are published before it is solved."""
         core = self.core
-        core.busy = self._loop.busy
+        core.busy = self.role.busy
         self._shell.check(now_ns)
         if core.member.build is not None and not self._is_present:
             self._is_present = True
-            self._shell.wire.declare_alive()
-        if self._orphan.is_over(core.deployment, now_ns) and not self._is_over():
+            self._wire.declare_alive()
+        if self._orphan.is_over(core.deployment, now_ns) and not self.is_over():
             core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
         core.advance(now_ns)
-        while core.work is not None:
-            self._loop.perform()
-            self._solver.solve(core.work)
-            core.advance(now_ns)
-        if core.frame is None:
+        self._build()
+
+    def _work(self, now_ns: int) -> bool:
+        """Solve the current tick, if there is one to be solved."""
+        work = self.core.work
+        if work is None:
+            return False
+        self._solver.solve(work)
+        self.core.advance(now_ns)
+        self._build()
+        return True
+
+    def _build(self) -> None:
+        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout."""
+        if self.core.work is not None:
+            return
+        if self.core.frame is None:
             self._solver.build_wanted()
         else:
-            self._solver.build_some()  # between two ticks, for a layout to come
+            self._solver.build_some()
 
     def _deadline_ns(self, now_ns: int) -> int:
         return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if plane is not Plane.SIMULATION:
+            return
         self._shell.on_alive(name, is_alive)
         if name != SUPERVISOR or self.core.ended is not None:
             return
@@ -112,10 +122,11 @@ def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, 
     if not is_name(name):
         raise BadValue("not a name for a node", name)
     stop = Stop()
-    with client_session(connect, identity.node(name), pki, stop, sets_runtime=True) as (session, inbox, credentials):
-        node = NodeProcess(name, session, inbox, world, credentials, progress)
-        stop.then(node.stop)
-        return node.run()
+    with client_session(connect, identity.node(name), pki, stop, sets_runtime=True) as (session, credentials):
+        process = Process(name, progress)
+        process.add(NodeShell(process, name, session, world, credentials))
+        stop.then(process.stop)
+        return process.run()
 
 
 app = new_app()

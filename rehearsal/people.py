@@ -10,7 +10,7 @@ from foosim.protocol import channels
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Inquiry, Request
-from foosim.rehearsal.bus import Bus
+from foosim.runtime.roles.bus import Bus
 
 OPERATOR: Final = "operator"
 

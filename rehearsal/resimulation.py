@@ -17,7 +17,7 @@ from foosim.protocol.asset_transfer import piece_of
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Prepare
-from foosim.rehearsal.bus import Bus
+from foosim.runtime.roles.bus import Bus
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame
 from foosim.world.initial_state import AddedEntity, Start, first_frame

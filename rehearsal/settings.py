@@ -11,9 +11,10 @@ from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
 from foosim.node.engines.interface import EngineFactory
 from foosim.protocol.messages import Epoch
-from foosim.rehearsal.bus import CALM, Message, Observer, Weather
 from foosim.rehearsal.clock import Clock
-from foosim.runtime.standstill import Standstill
+from foosim.rehearsal.trace import Observer
+from foosim.runtime.roles.bus import CALM, Message, Weather
+from foosim.runtime.roles.standstill import Standstill
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import Closing

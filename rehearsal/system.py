@@ -24,12 +24,13 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.journals import Ending, HubJournal
 from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
+from foosim.rehearsal.trace import Traced
+from foosim.runtime.roles.bus import Bus, Message
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import ClosingCore, HubCore

@@ -33,7 +33,7 @@ from foosim.replay.core import Playback, Span
 from foosim.replay.entries import Entries, Entry, make_selection
 from foosim.replay.requests import KEYS_TEXT, Requests
 from foosim.replay.terminal import Lines, keys_of_terminal
-from foosim.runtime.loop import Wire
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.certificates import check_host, load_credentials
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.open_plane_warning import Exposure

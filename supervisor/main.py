@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
 from foosim.capture.parts import is_complete
-from foosim.common import limits, wall_clock
+from foosim.common import wall_clock
 from foosim.common.addresses import Address
 from foosim.common.errors import Malformed, Refused
 from foosim.deployment.schema import Deployment
@@ -27,12 +28,10 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.disk import Level, room_on_disk
 from foosim.runtime.journal import Journal, JournalError, journal_files, remove_journal
-from foosim.runtime.loop import Wire
 from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot
-from foosim.runtime.process_shell import ProcessShell
+from foosim.runtime.roles.shell import Process, RoleShell
 from foosim.runtime.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.runtime.transport.certificates import check_host, load_credentials, warn_of_end
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.supervisor.core import SupervisorCore
@@ -72,24 +71,22 @@ class JournalRoom:
                 self._core.fail(f"lost room for the journal: {self._folder}: {room}")
 
 
-class SupervisorProcess:
+class SupervisorShell:
     """The supervisor on its session, until the run has ended."""
 
     def __init__(
         self,
+        process: Process,
         settings: RunSettings,
         pki: Path | None,
         folder: RunFolder,
         session: Session,
-        inbox: Inbox,
         journal: Journal,
         history: History | None,
-        progress: Path | None = None,
     ) -> None:
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
-        self._inbox = inbox
         self._end_requested = False
         self._info = RunInfo(
             folder.name,
@@ -103,32 +100,38 @@ class SupervisorProcess:
         known = folder.info()
         if history is not None and known is not None:
             self._info = msgspec.structs.replace(self._info, started=known.started, radio=known.radio)
-        wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
-        self._shell = ProcessShell(self.core, SUPERVISOR, wire, inbox, self.core.deadline_ns, progress)
+        self._shell = RoleShell(process, SUPERVISOR, self.core, self.core.deadline_ns)
         self._shell.listens(session.locator)
-        self._loop, self.log = self._shell.loop, self._shell.log
-        self._journal = self._loop.journal = journal
+        self.role: Final = self._shell.role
+        self.log: Final = self._shell.log
+        self._journal = self.role.journal = journal
         self._turned_tick = 0
-        self._loop.turn = self._turn
-        self._loop.on_unwritten = self._on_unwritten
+        self.role.turn = self._turn
+        self.role.on_unwritten = self._on_unwritten
         reserve = self.core.state.deployment.capture.reserve_bytes
         self._room = JournalRoom(folder.journals, reserve, self.core)
-        self._loop.took = self.core.progress.took
-        self._loop.stood = self.core.on_standstill
-        self._loop.lacking = lambda: self.core.lacking
-        self._loop.on_alive = self._on_alive
+        self.role.took = self.core.progress.took
+        self.role.stood = self.core.on_standstill
+        self.role.lacking = lambda: self.core.lacking
+        self.role.on_alive = self._on_alive
+        wire = self._shell.connect(session, Plane.SIMULATION)
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
         wire.watch_alive()
         wire.declare_alive()
+        self._folder.write_info(self._info)
+        listens = f"run {self._info.run} listens at {self._info.simulation}"
+        self.core.state.log("info", f"{listens}; its folder is {folder.path}")
 
-    def run(self) -> int:
-        """Serve the run until it has ended; write how, and return the exit code. Of one that was resumed and does not
-        go on, nothing is written, so that it can be resumed again."""
-        info = self._info
-        self._folder.write_info(info)
-        self.core.state.log("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
-        self._loop.run(lambda: self.core.state.finished)
-        self._loop.perform()
+    def is_over(self) -> bool:
+        """Whether the run has ended and the vHub has closed the capture."""
+        return self.core.state.finished
+
+    def finish(self) -> int:
+        """Write the result of the run; return the exit code.
+
+        Nothing is written for a resumed run that could not be resumed, so that it can be resumed again.
+        """
+        self.role.perform()
         if self.core.state.abandoned:
             return REFUSED
         if self.core.state.cut_off and self._has_capture():
@@ -136,6 +139,9 @@ class SupervisorProcess:
         result = self.core.result()
         self._folder.write_result(result)
         return FAILED if result["failed"] else DONE
+
+    def leave(self) -> None:
+        """Leave the journal as it is: a restarted supervisor resumes from it."""
 
     def _has_capture(self) -> bool:
         """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""
@@ -145,15 +151,14 @@ class SupervisorProcess:
     def stop(self) -> None:
         """End the run in order, as the command `down` does; a signal handler may call this."""
         self._end_requested = True
-        self._inbox.wake()
 
     def _turn(self, now_ns: int) -> None:
-        self.core.state.busy = self._loop.busy
+        self.core.state.busy = self.role.busy
         self._shell.check(now_ns)
         if self._end_requested:
             self._end_requested = False
             self.core.stop()
-        if not self.core.actions and self._loop.journal is not None:
+        if not self.core.actions and self.role.journal is not None:
             self._turn_journal(now_ns)
         self.core.advance(now_ns)
         self._note_radio()
@@ -167,7 +172,7 @@ class SupervisorProcess:
                 self._journal.forget_before(self._turned_tick)
                 self._turned_tick = tick
         except JournalError as error:
-            self._loop.journal = None
+            self.role.journal = None
             self._on_unwritten(error)
 
     def _on_unwritten(self, error: JournalError) -> None:
@@ -184,7 +189,7 @@ class SupervisorProcess:
             self.core.state.log("info", f"clients find the vHub at {address}")
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
-        if not is_alive:
+        if plane is Plane.SIMULATION and not is_alive:
             self.core.process_gone(name, time.monotonic_ns())
 
 
@@ -202,9 +207,31 @@ def serve(
     has begun.
     """
     die_with_parent()
-    folder.hold()
-    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
+    process = Process(SUPERVISOR, progress)
+    with open_supervisor(process, settings, address, pki, folder, read_records) as supervisor:
+        process.add(supervisor)
+        stop.then(process.stop)
+        code = process.run()
+    if code == DONE:
+        remove_journal(folder.journals, SUPERVISOR)
+    return code
+
+
+@contextmanager
+def open_supervisor(
+    process: Process,
+    settings: RunSettings,
+    address: Address,
+    pki: Path | None,
+    folder: RunFolder,
+    read_records: Callable[[], list[bytes]],
+) -> Iterator[SupervisorShell]:
+    """Open the journal and the session of a run's supervisor, in a process; parameters and errors are those of `serve`.
+
+    The journal stays: after a run without failure the caller removes it.
+    """
+    folder.hold()
     deployment = settings.load_deployment()
     history = _history(settings, deployment, folder, read_records)
     known = folder.info()
@@ -213,13 +240,9 @@ def serve(
     security = None if credentials is None else Security(credentials, access_to(Plane.SIMULATION, deployment))
     with Journal(folder.journals, SUPERVISOR) as journal, Session.router(listen, security=security) as session:
         check_host(credentials, session.locator)
-        supervisor = SupervisorProcess(settings, pki, folder, session, inbox, journal, history, progress)
+        supervisor = SupervisorShell(process, settings, pki, folder, session, journal, history)
         warn_of_end(credentials, supervisor.log)
-        stop.then(supervisor.stop)
-        code = supervisor.run()
-    if code == DONE:
-        remove_journal(folder.journals, SUPERVISOR)
-    return code
+        yield supervisor
 
 
 def _history(

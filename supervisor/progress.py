@@ -14,7 +14,7 @@ from typing import Any, Final
 from foosim.common import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
-from foosim.runtime.standstill import REPORTED_NS, standstill_text
+from foosim.runtime.roles.standstill import REPORTED_NS, standstill_text
 from foosim.supervisor.roster import Process
 from foosim.supervisor.state import RunState
 

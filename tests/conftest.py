@@ -20,7 +20,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.yaml import locate_in, plain, read_tree, write_yaml
-from foosim.runtime.loop import GC_THRESHOLDS
+from foosim.runtime.roles.loop import GC_THRESHOLDS
 from tests.meter import Burden, Meter
 
 settings.register_profile(

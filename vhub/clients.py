@@ -17,7 +17,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.actions import Action, Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, ClientHello, Done, Failure, Go, Join, Tempo, Up
-from foosim.runtime.standstill import REPORTED_NS
+from foosim.runtime.roles.standstill import REPORTED_NS
 from foosim.vhub.absences import Absences
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, received

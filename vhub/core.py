@@ -54,7 +54,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
-from foosim.runtime.standstill import REPORTED_NS, standstill_text
+from foosim.runtime.roles.standstill import REPORTED_NS, standstill_text
 from foosim.runtime.supervisor_timeout import Orphan
 from foosim.vhub.clients import Clients, lost
 from foosim.vhub.network.packet import Flight, received

@@ -9,11 +9,11 @@ from __future__ import annotations
 import logging
 import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 from msgspec.structs import replace
@@ -43,15 +43,13 @@ from foosim.runtime.journal import (
     read_whole,
     remove_journal,
 )
-from foosim.runtime.loop import Wire
 from foosim.runtime.process import Stop, die_with_parent, machine_start, new_boot
-from foosim.runtime.process_shell import ProcessShell, client_session
+from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.transport.certificates import (
     Credentials,
     check_host,
     passwords_file,
 )
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.vhub.core import ClosingCore, HubCore
@@ -86,14 +84,14 @@ def needs_record(message: Publish) -> bool:
     return message.channel not in (channels.HEARTBEAT, channels.WANT)
 
 
-class HubProcess:
+class HubShell:
     """The vHub on its two sessions, until the run ends, the supervisor's timeout passes, or `stop` is called."""
 
     def __init__(
         self,
+        process: Process,
         simulation: Session,
         open_radio: Callable[[Deployment], Session],
-        inbox: Inbox,
         options: HubOptions,
         credentials: Credentials | None = None,
     ) -> None:
@@ -101,7 +99,7 @@ class HubProcess:
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), machine=machine_start())
         self._options = options
         self._open_radio = open_radio
-        self._inbox = inbox
+        self._inbox = process.inbox
         self._journal: Journal | None = None
         self._capture: CaptureWriter | None = None
         self._room: RoomWatch | None = None
@@ -109,42 +107,45 @@ class HubProcess:
         self._is_closing = False
         """Whether the run has ended, and the capture accepts no more records."""
         self._why_abandoned = ""
-        """Why this process ends before its run."""
-        self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
-        self._shell = ProcessShell(
-            self.core, VHUB, self._wire, inbox, lambda now_ns: self.core.deadline_ns(), options.progress, credentials
-        )
-        self._log, self._loop = self._shell.log, self._shell.loop
-        self._loop.turn = self._turn
-        self._loop.took, self._loop.stood = self.core.waits.took, self.core.rest
-        self._loop.lacking = lambda: self.core.lacking
-        self._loop.other = self._keep
-        self._loop.on_alive = self._on_alive
-        self._loop.on_log = self._on_log
-        self._loop.on_unwritten = self._on_unwritten
+        """Why this vHub leaves before its run ends."""
+        self._shell = RoleShell(process, VHUB, self.core, lambda now_ns: self.core.deadline_ns(), credentials)
+        self._log: Final = self._shell.log
+        self.role: Final = self._shell.role
+        self.role.turn = self._turn
+        self.role.took, self.role.stood = self.core.waits.took, self.core.rest
+        self.role.lacking = lambda: self.core.lacking
+        self.role.other = self._keep
+        self.role.on_alive = self._on_alive
+        self.role.on_log = self._on_log
+        self.role.on_unwritten = self._on_unwritten
+        self._wire = self._shell.connect(simulation, Plane.SIMULATION)
         self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
-        self._shell.watch_router(SUPERVISOR, simulation.locator)
-
-    def run(self) -> int:
-        """Run until the end of the run, close the capture, send the farewell; return the exit code.
-
-        Every other end, the supervisor's timeout among them, leaves the journal and an unfinished capture, with which a
-        restarted vHub resumes.
-        """
+        self._shell.watch_router(self._wire, SUPERVISOR)
         sys.setswitchinterval(SWITCH_S)
-        try:
-            self._loop.run(self._is_over)
-            self._loop.perform()
-        except BaseException:
-            self._leave()
-            raise
+
+    def is_over(self) -> bool:
+        """Whether the run has ended and the capture is closed, or this vHub leaves it."""
+        core = self.core
+        if core.ended is not None and core.state is None:
+            return True
+        if core.finished:
+            return self._has_closed()
+        return self._is_abandoned or bool(core.member.refusal or core.failure)
+
+    def finish(self) -> int:
+        """Close the capture and send the farewell; return the exit code.
+
+        Every end but that of the run, the supervisor's timeout among them, leaves the journal and an unfinished
+        capture, with which a restarted vHub resumes.
+        """
+        self.role.perform()
         if self.core.finished:
             self._close()
         else:
             if self._is_abandoned:
                 self.core.actions.append(Log("error", self._why_abandoned))
-                self._loop.perform()
-            self._leave()
+                self.role.perform()
+            self.leave()
         if self.core.member.refusal:
             return REFUSED
         if self.core.failure:
@@ -156,18 +157,18 @@ class HubProcess:
         self._wire.put(farewell.channel, farewell.name, farewell.payload)
         return DONE
 
-    def stop(self) -> None:
-        """Have `run` leave journal and capture as they are and return; a signal handler may call this."""
-        self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
-        self._inbox.wake()
+    def leave(self) -> None:
+        """Leave capture and journal as a kill would, for a vHub that resumes the run."""
+        if self._capture is not None:
+            self._capture.leave()
+            self._log.warning("leaves its capture %s unfinished: a restarted vHub can resume it", self._capture.path)
+        if self._journal is not None:
+            with suppress(JournalError):
+                self._journal.close()
 
-    def _is_over(self) -> bool:
-        core = self.core
-        if core.ended is not None and core.state is None:
-            return True
-        if core.finished:
-            return self._has_closed()
-        return self._is_abandoned or bool(core.member.refusal or core.failure)
+    def stop(self) -> None:
+        """Have the vHub leave journal and capture as they are; a signal handler may call this."""
+        self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
 
     def _has_closed(self) -> bool:
         """Begin to close the capture once its queue has everything; return whether it is closed.
@@ -179,9 +180,9 @@ class HubProcess:
             return True
         if not self._is_closing:
             assert ended is not None
-            self._loop.perform()
+            self.role.perform()
             self._is_closing, closing = True, ClosingCore(self.core)
-            self._loop.core, self._loop.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
+            self.role.core, self.role.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
             capture.on_end = self._inbox.wake
             capture.begin_finish({**ending_metadata(ended), "ended": wall_clock.now_text()})
         return capture.has_ended
@@ -194,7 +195,7 @@ class HubProcess:
 
     def _turn(self, now_ns: int) -> None:
         core = self.core
-        core.busy = self._loop.busy
+        core.busy = self.role.busy
         self._shell.check(now_ns)
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build, now_ns)
@@ -202,17 +203,17 @@ class HubProcess:
             self._why_abandoned = "lost the supervisor, and it has not come back"
         sent_ns = now_ns
         while core.step(now_ns, sent_ns):
-            self._loop.perform()
+            self.role.perform()
             sent_ns = time.monotonic_ns()
         if now_ns >= self._look_ns and self._room is not None:
             self._look_ns = now_ns + LOOK_EVERY_NS
             self._look_at_room(self._room, now_ns)
-        if now_ns >= self._forget_ns and self._loop.journal is not None and core.state is not None:
+        if now_ns >= self._forget_ns and self.role.journal is not None and core.state is not None:
             self._forget_ns = now_ns + FORGET_EVERY_NS
             try:
                 self._turn_journal(core.state.closed)
             except JournalError as error:
-                self._loop.journal = None
+                self.role.journal = None
                 self._on_unwritten(error)
 
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
@@ -236,7 +237,7 @@ class HubProcess:
         Committed frames are still written to the capture.
         """
         core = self.core
-        self._loop.holds_back = lambda message: needs_record(message) and not core.finished
+        self.role.holds_back = lambda message: needs_record(message) and not core.finished
         core.lose("the journal", str(error))
 
     def _begin(self, build: Build, now_ns: int) -> None:
@@ -255,7 +256,7 @@ class HubProcess:
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
         resumes = bool(journal_files(folder, VHUB))
-        self._journal = self._loop.journal = Journal(folder, VHUB)
+        self._journal = self.role.journal = Journal(folder, VHUB)
         try:
             self._open_records(build, deployment, folder, now_ns)
         except Refused as error:
@@ -323,8 +324,7 @@ class HubProcess:
         session = self._open_radio(deployment)
         self.core.shell.radio_address = session.locator
         self._shell.listens(session.locator)
-        radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
-        self._loop.connect(radio)
+        radio = self._shell.connect(session, Plane.RADIO)
         radio.read(channels.VHUB_READS, channels.VHUB_WAITS)
         radio.watch_alive()
         radio.declare_alive()
@@ -382,15 +382,6 @@ class HubProcess:
             if not self.core.ended.failed:
                 remove_journal(self._journal.folder, VHUB)
 
-    def _leave(self) -> None:
-        """Leave capture and journal as a kill would, for a vHub that resumes the run."""
-        if self._capture is not None:
-            self._capture.leave()
-            self._log.warning("leaves its capture %s unfinished: a restarted vHub can resume it", self._capture.path)
-        if self._journal is not None:
-            with suppress(JournalError):
-                self._journal.close()
-
 
 def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki: Path | None = None) -> int:
     """Run the vHub until its run ends; return the exit code. Raises Refused when it cannot connect.
@@ -399,16 +390,32 @@ def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki
     """
     address = check_listen(listen, insecure, secured=pki is not None)
     stop = Stop()
-    with ExitStack() as opened, client_session(connect, VHUB, pki, stop) as (simulation, inbox, credentials):
+    process = Process(VHUB, options.progress)
+    with ExitStack() as opened:
+        simulation, credentials = opened.enter_context(client_session(connect, VHUB, pki, stop))
+        process.add(opened.enter_context(open_vhub(process, simulation, address, options, pki, credentials)))
+        stop.then(process.stop)
+        return process.run()
+
+
+@contextmanager
+def open_vhub(
+    process: Process,
+    simulation: Session,
+    address: Address,
+    options: HubOptions,
+    pki: Path | None,
+    credentials: Credentials | None,
+) -> Iterator[HubShell]:
+    """Open a vHub in a process; it listens for clients at `address` once the supervisor has admitted it."""
+    with ExitStack() as opened:
 
         def open_radio(deployment: Deployment) -> Session:
             session = opened.enter_context(_radio_session(address, credentials, deployment, pki))
             check_host(credentials, session.locator)
             return session
 
-        hub = HubProcess(simulation, open_radio, inbox, options, credentials)
-        stop.then(hub.stop)
-        return hub.run()
+        yield HubShell(process, simulation, open_radio, options, credentials)
 
 
 def _radio_session(

@@ -19,7 +19,6 @@ from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
-from foosim.rehearsal.bus import CALM, Traced, Weather
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.resimulation import Replica
@@ -45,6 +44,8 @@ from foosim.rehearsal.swarm.invariants import Laws
 from foosim.rehearsal.swarm.memory_bounds import too_large
 from foosim.rehearsal.swarm.packet_invariants import hold
 from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.trace import Traced
+from foosim.runtime.roles.bus import CALM, Weather
 from foosim.supervisor.settings import RunSettings
 from foosim.world.frame import Frame
 

@@ -17,11 +17,11 @@ from foosim.protocol import channels
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
-from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws, hold
 from foosim.rehearsal.swarm.world_bounds import strays
 from foosim.rehearsal.system import System
+from foosim.rehearsal.trace import Traced
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor

@@ -113,6 +113,7 @@ class Session:
         self._threads: list[threading.Thread] = []
         self._inboxes: list[Inbox] = []
         self._declared: list[Any] = []
+        self._tokens: dict[str, Any] = {}
         _sessions.add(self)
 
     @classmethod
@@ -209,9 +210,15 @@ class Session:
         inbox.attach(source, channel)
 
     def declare_alive(self, key: str) -> None:
-        """Declare presence under this key until the session or its process ends."""
+        """Declare presence under this key until `end_alive`, or until the session or its process ends."""
         self._check()
-        self._declared.append(self._session.liveliness().declare_token(key))
+        self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    def end_alive(self, key: str) -> None:
+        """End the presence under this key, if it was declared."""
+        token = self._tokens.pop(key, None)
+        if token is not None:
+            token.undeclare()
 
     def watch_alive(self, key_expr: str, channel: str, inbox: Inbox) -> None:
         """Offer (channel, name, b"+" or b"-") for all present names, and then for each change.
@@ -258,7 +265,7 @@ class Session:
         self.close()
 
     def _close(self) -> None:
-        for declared in (*self._publishers, *self._declared):
+        for declared in (*self._publishers, *self._declared, *self._tokens.values()):
             # Undeclared already, or borrowed by a thread that puts at this moment: then the session's close ends it.
             with contextlib.suppress(zenoh.ZError, RuntimeError):
                 declared.undeclare()

@@ -27,10 +27,10 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.journal import Journal, journal_files, read_records
+from foosim.runtime.roles.shell import Process
 from foosim.runtime.run_folder import RunFolder, create_run
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
-from foosim.supervisor.main import SupervisorProcess
+from foosim.supervisor.main import SupervisorShell
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.records import Record, fold
 from foosim.supervisor.status import UNFINISHED
@@ -256,10 +256,12 @@ def test_a_capture_that_has_its_end_is_not_cut_off_whatever_was_heard_of_its_vhu
     plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
     thresholds = gc.get_threshold()
     with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
-        inbox = Inbox(1000)
-        process = SupervisorProcess(plan.settings(left.folder.name), None, left.folder, session, inbox, written, None)
-        process.core.finish("stopped", failed=False)
-        process.core.state.finished, process.core.state.cut_off = True, "the capture is cut off: nobody said how"
+        process = Process(SUPERVISOR)
+        settings = plan.settings(left.folder.name)
+        supervisor = SupervisorShell(process, settings, None, left.folder, session, written, None)
+        supervisor.core.finish("stopped", failed=False)
+        supervisor.core.state.finished, supervisor.core.state.cut_off = True, "the capture is cut off: nobody said how"
+        process.add(supervisor)
         assert process.run() == (DONE if is_closed else FAILED)
     gc.set_threshold(*thresholds)
     gc.unfreeze()
@@ -279,10 +281,11 @@ def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> N
         for record in records:
             written.append(record)
         history = fold(plan.deployment, iter(records))
-        settings, inbox = plan.settings(left.folder.name), Inbox(1000)
-        process = SupervisorProcess(settings, None, left.folder, session, inbox, written, history)
-        process.core.finish("lost vhub", failed=True)
-        assert process.run() == REFUSED and process.core.state.abandoned == "lost vhub"
+        settings, process = plan.settings(left.folder.name), Process(SUPERVISOR)
+        supervisor = SupervisorShell(process, settings, None, left.folder, session, written, history)
+        supervisor.core.finish("lost vhub", failed=True)
+        process.add(supervisor)
+        assert process.run() == REFUSED and supervisor.core.state.abandoned == "lost vhub"
     gc.set_threshold(*thresholds)
     gc.unfreeze()
     assert left.folder.result() is None

@@ -15,11 +15,11 @@ from foosim.capture.reader import open_capture
 from foosim.client.player import Samples
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.bus import Weather
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
+from foosim.runtime.roles.bus import Weather
 from foosim.world.frame import Frame
 from foosim.world.payloads import Drive
 

@@ -18,24 +18,24 @@ import pytest
 
 from foosim.client.client import Link
 from foosim.client.core import ClientCore
-from foosim.client.main import PlayerProcess
+from foosim.client.main import PlayerShell
 from foosim.common.units import Pace
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
-from foosim.node.main import NodeProcess
+from foosim.node.main import NodeShell
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.runtime import loop as loops
 from foosim.runtime.journal import Journal
+from foosim.runtime.roles import loop as loops
+from foosim.runtime.roles.shell import Process, Runnable
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.supervisor_timeout import Orphan
-from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.main import SupervisorProcess
+from foosim.supervisor.main import SupervisorShell
 from foosim.vhub.core import HubCore
-from foosim.vhub.main import HubOptions, HubProcess
+from foosim.vhub.main import HubOptions, HubShell
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60
@@ -230,44 +230,44 @@ def plane() -> Iterator[Session]:
         yield session
 
 
-def supervisor_of(session: Session, inbox: Inbox, folder: Path) -> object:
+def supervisor_of(process: Process, session: Session, folder: Path) -> SupervisorShell:
     plan = make_plan(RunOptions(TABLE, duration="1 s", sets=("engine=pure",)))
     with Journal(folder / "journals", SUPERVISOR) as journal:
-        return SupervisorProcess(plan.settings(folder.name), None, RunFolder(folder), session, inbox, journal, None)
+        return SupervisorShell(process, plan.settings(folder.name), None, RunFolder(folder), session, journal, None)
 
 
-SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type, str]]] = {
+SHELLS: Final[dict[str, tuple[Callable[[Process, Session, Path], Runnable], type, str]]] = {
     "supervisor": (supervisor_of, SupervisorCore, "on_standstill"),
     "vhub": (
-        lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()),
+        lambda process, session, _: HubShell(process, session, lambda deployment: session, HubOptions()),
         HubCore,
         "rest",
     ),
-    "node": (lambda session, inbox, _: NodeProcess("n1", session, inbox), Orphan, "rest"),
-    "players": (lambda session, inbox, _: PlayerProcess(PLAYERS, session, inbox), ClientCore, "rest"),
-    "client": (
-        lambda session, _, __: Link(ClientCore("ear", "boot", time.monotonic_ns()), session),
-        ClientCore,
-        "rest",
-    ),
+    "node": (lambda process, session, _: NodeShell(process, "n1", session), Orphan, "rest"),
+    "player": (lambda process, session, _: PlayerShell(process, PLAYERS[0], session), ClientCore, "rest"),
 }
 
 
-@pytest.mark.parametrize("shell", SHELLS)
-def test_each_process_counts_for_how_long_its_own_loop_stood_still(
+@pytest.mark.parametrize("shell", [*SHELLS, "client"])
+def test_each_role_counts_for_how_long_its_own_loop_stood_still(
     shell: str, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    make, has_deadlines, method = SHELLS[shell]
+    make, has_deadlines, method = SHELLS.get(shell, (None, ClientCore, "rest"))
     told: list[tuple[int, int]] = []
     monkeypatch.setattr(has_deadlines, method, lambda self, *what: told.append(what[-2:]))
     clock = [time.monotonic_ns()]  # cores are made by the same one
     monkeypatch.setattr(loops, "time", SimpleNamespace(monotonic_ns=lambda: clock[0]))
-    inbox = Inbox(1000)
-    process = make(plane, inbox, tmp_path)
+    if make is None:
+        link = Link(ClientCore("ear", "boot", time.monotonic_ns()), plane)
+        loop, inbox = link._loop, link._inbox
+    else:
+        process = Process("test")
+        process.add(make(process, plane, tmp_path))
+        loop, inbox = process.loop, process.inbox
     for pass_ns in (60_000 * MS, 10_000 * MS):
         told.clear()
         clock[0] += pass_ns
         inbox.wake()
-        process._loop.go_round()
-    assert [now_ns for _, now_ns in told] == [clock[0]] * (len(PLAYERS) if shell == "players" else 1)
+        loop.go_round()
+    assert [now_ns for _, now_ns in told] == [clock[0]]
     assert all(9_000 * MS < stood_ns <= 10_000 * MS for stood_ns, _ in told), "less the time at which it meant to look"

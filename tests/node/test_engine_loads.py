@@ -16,9 +16,9 @@ from foosim.node.engines_pool import FINGERPRINT_TICKS
 from foosim.protocol.channels import PART
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part
-from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.trace import Traced
 from foosim.world.layout import Entity, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

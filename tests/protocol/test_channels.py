@@ -16,7 +16,7 @@ from foosim.common.units import Pace
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, Channel, Plane
-from foosim.runtime.loop import channel_of
+from foosim.runtime.roles.wire import channel_of
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore

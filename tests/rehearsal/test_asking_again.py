@@ -8,9 +8,10 @@ from pathlib import Path
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part, Want
-from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.settings import Settings
+from foosim.rehearsal.trace import Traced
+from foosim.runtime.roles.bus import Weather
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 40

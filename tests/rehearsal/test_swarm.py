@@ -16,7 +16,6 @@ from foosim.node.core import NodeCore
 from foosim.node.tick import Work
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries, Done, Sent
-from foosim.rehearsal.bus import CALM
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.swarm.campaign import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
@@ -32,6 +31,7 @@ from foosim.rehearsal.swarm.faults import (
 )
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws
 from foosim.rehearsal.system import Settings
+from foosim.runtime.roles.bus import CALM
 from foosim.vhub.state.records import TickRecord
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

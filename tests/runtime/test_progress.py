@@ -13,8 +13,9 @@ from foosim.common.errors import BadValue, Failed
 from foosim.protocol.actions import Action
 from foosim.protocol.channels import Channel
 from foosim.runtime.health import probe_file
-from foosim.runtime.loop import Loop
 from foosim.runtime.progress import EVERY_NS, NoProgress, ProgressFile, age_ns
+from foosim.runtime.roles.loop import Loop
+from foosim.runtime.roles.role import Role
 from foosim.runtime.transport.inbox import Inbox
 
 S = 1_000_000_000
@@ -80,7 +81,10 @@ class Idle:
 
 
 def make_loop(*arguments: Any) -> Loop:
-    return Loop(Idle(), Inbox(8), logging.getLogger("idle"), lambda now_ns: now_ns + 3600 * S)
+    log = logging.getLogger("idle")
+    loop = Loop(Inbox(8), log)
+    loop.add(Role("idle", Idle(), log, lambda now_ns: now_ns + 3600 * S))
+    return loop
 
 
 def test_a_loop_with_nothing_to_do_goes_on_giving_signs_and_one_that_hangs_does_not(tmp_path: Path) -> None:
@@ -101,7 +105,7 @@ def test_a_loop_with_nothing_to_do_goes_on_giving_signs_and_one_that_hangs_does_
         while hung_ns <= EVERY_NS:
             hung_ns = age_ns(path, time.monotonic_ns())
 
-    loop.turn = hang
+    loop.roles[0].turn = hang
     loop.go_round()
     assert hung_ns > EVERY_NS, "else the turn would not have ended"
 

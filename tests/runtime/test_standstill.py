@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.runtime import loop as loops
-from foosim.runtime.loop import Loop
-from foosim.runtime.standstill import STOOD_NS, Standstill, standstill_text
+from foosim.runtime.roles import loop as loops
+from foosim.runtime.roles.loop import Loop
+from foosim.runtime.roles.role import Role
+from foosim.runtime.roles.standstill import STOOD_NS, Standstill, standstill_text
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS, Orphan
 from foosim.runtime.transport.inbox import Inbox
 
@@ -51,8 +52,11 @@ def test_the_loop_tells_of_it_before_anything_else(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(loops, "time", SimpleNamespace(monotonic_ns=lambda: clock[0]))
     core = SimpleNamespace(actions=[], receive=None, wake=lambda now_ns: did.append(("wake", now_ns)))
     inbox = Inbox(10)
-    loop = Loop(core, inbox, logging.getLogger("standstill"), lambda now_ns: now_ns + 100 * MS)
-    loop.stood = lambda stood_ns, now_ns: did.append((stood_ns, now_ns))
+    log = logging.getLogger("standstill")
+    role = Role("standstill", core, log, lambda now_ns: now_ns + 100 * MS)
+    loop = Loop(inbox, log)
+    loop.add(role)
+    role.stood = lambda stood_ns, now_ns: did.append((stood_ns, now_ns))
     for pass_ms in (0, 100, 4_100):
         clock[0] += pass_ms * MS
         inbox.wake()

@@ -28,9 +28,9 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import CAPTURE, Build, End, Heartbeat
 from foosim.runtime.command import DONE, FAILED
 from foosim.runtime.journal import Journal, journal_files
-from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.roles.shell import Process
 from foosim.runtime.transport.session import Session
-from foosim.vhub.main import HubOptions, HubProcess
+from foosim.vhub.main import HubOptions, HubShell
 from foosim.vhub.recording import file as capture_file
 from foosim.vhub.recording.file import CaptureFile, Described
 from foosim.vhub.recording.recovery import UNCLEAN, recover_capture
@@ -79,12 +79,13 @@ def live(plane: Session, run: HubRun, folder: Path) -> str:
     def is_busy(deployment: Deployment) -> Session:
         raise Failed("its port is in use")
 
-    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
-    hub = HubProcess(plane, is_busy, inbox, HubOptions(folder=folder))
+    process = Process("vhub")
+    hub = HubShell(process, plane, is_busy, HubOptions(folder=folder))
     build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, run.text, "fast", [])
     hub.core.receive(channels.BUILD, "vhub", encode(build), time.monotonic_ns())
-    inbox.wake()
-    code = hub.run()
+    process.inbox.wake()
+    process.add(hub)
+    code = process.run()
     assert code == FAILED and hub.core.lost
     return hub.core.lost
 
@@ -139,7 +140,7 @@ def test_a_vhub_that_closes_its_capture_says_meanwhile_how_far_it_is(
     hub_run: HubRun, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its disk takes the end of the capture only when it has said so three times."""
-    inbox, gate, write, told = Inbox(limits.INBOX_MESSAGES_MAX), Event(), capture_contents.write_all, list[str]()
+    process, gate, write, told = Process("vhub"), Event(), capture_contents.write_all, list[str]()
     monkeypatch.setattr(limits, "DOWNLINK_KEPT_NS", 0)
 
     def slow(file: int, content: bytes) -> None:
@@ -156,13 +157,14 @@ def test_a_vhub_that_closes_its_capture_says_meanwhile_how_far_it_is(
 
     def listen(deployment: Deployment) -> Session:
         monkeypatch.setattr(capture_file, "write_all", slow)
-        inbox.offer((channels.END.key, "supervisor", encode(End(0, "enough", False))))
+        process.inbox.offer((channels.END.key, "supervisor", encode(End(0, "enough", False))))
         return radio
 
     with Session.router("tcp/127.0.0.1:0") as radio:
-        hub = HubProcess(plane, listen, inbox, HubOptions(tmp_path / "run.mcap", folder=tmp_path))
+        hub = HubShell(process, plane, listen, HubOptions(tmp_path / "run.mcap", folder=tmp_path))
         monkeypatch.setattr(hub._wire, "put", put)
         build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, hub_run.text, "fast", [])
-        inbox.offer((channels.BUILD.key, "vhub", encode(build)))
-        assert hub.run() == DONE
+        process.inbox.offer((channels.BUILD.key, "vhub", encode(build)))
+        process.add(hub)
+        assert process.run() == DONE
     assert told[:3] == 3 * ["closing"] and open_capture(tmp_path / "run.mcap").about.end["reason"] == "enough"

@@ -238,7 +238,7 @@ def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> No
 
 COUNTED: Final = """
 import os
-from foosim.runtime.loop import Loop
+from foosim.runtime.roles.loop import Loop
 
 go_round, rounds = Loop.go_round, 0
 file = os.open(os.path.join(os.path.dirname(__file__), f"{os.getpid()}.rounds"), os.O_CREAT | os.O_WRONLY)

@@ -16,7 +16,7 @@ from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
-from foosim.runtime.loop import Wire
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport import session as sessions
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import ConnectError, ListenError, Session

@@ -10,7 +10,7 @@ from typing import Final
 
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.runtime.loop import Wire
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.session import Session
 

@@ -1,13 +1,13 @@
-"""The in-memory bus of a rehearsal: messages by virtual time, routed by the table of channels.
+"""The in-memory bus between the roles of one process: messages by time, routed by the table of channels.
 
-Carries the same bytes on the same keys as Zenoh. Delivery can be delayed, reordered and lost by seed; without such
-settings it is immediate and in order.
+Carries the same bytes on the same keys as Zenoh. A rehearsal runs all roles on it in virtual time, and can delay,
+reorder and lose messages by seed; without such settings delivery is immediate and in order.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,19 +32,6 @@ class Weather:
 
 CALM: Final = Weather()
 LATE_NS: Final = 2_000_000_000
-
-
-@dataclass(frozen=True)
-class Traced:
-    """One action of a process, recorded for tests: `what` is journal, publish or receive."""
-
-    now_ns: int
-    process: str
-    what: str
-    channel: str
-    payload: bytes
-    name: str = ""
-    """The process that the channel's key names."""
 
 
 Message = tuple[int, int, str, Channel, str, bytes]
@@ -73,6 +60,16 @@ class Bus:
             readers = self._readers.setdefault((channel.key, process if own else ""), [])
             if process not in readers:
                 readers.append(process)
+
+    def unsubscribe(self, process: str) -> None:
+        """Forget a process that has ended; messages in flight to it are delivered to nobody."""
+        for readers in self._readers.values():
+            if process in readers:
+                readers.remove(process)
+
+    def readers(self, channel: Channel, name: str) -> list[str]:
+        """Return who reads messages of a channel that name this process, in the order of subscription."""
+        return [*self._readers.get((channel.key, ""), ()), *self._readers.get((channel.key, name), ())]
 
     def cut_off(self, process: str, until_ns: int, *, output: bool = True, input_: bool = True) -> None:
         """Drop a process's output, its input, or both, until a virtual time."""
@@ -136,6 +133,3 @@ class Bus:
 
     def pop(self) -> Message:
         return heapq.heappop(self._heap)
-
-
-Observer = Callable[[Traced], None]
