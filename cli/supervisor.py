@@ -212,10 +212,14 @@ def run_supervisor(
     The vHub, nodes and players are started separately. The run's folder has the run file, logs and journals.
     """
     plan = make_plan(options)
-    if not has_launcher():  # a launcher has checked, and watches the disks
+    is_launched = has_launcher()
+    if not is_launched:  # a launcher has checked, and watches the disks
         _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
-    settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
+    settings, records = (
+        plan.settings(folder.name, is_launched=is_launched),
+        partial(supervisor_records, folder, plan.options),
+    )
     raise typer.Exit(serve(settings, plan.address, plan.options.pki, folder, records, progress_file))
 
 

@@ -147,20 +147,25 @@ def _people(view: View) -> Iterator[Finding]:
 
 
 def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:
-    """A process that players share has a name of its own, and is in one place."""
+    """A process that roles share has a name of its own, is in one place, and is started by `up`."""
     places: dict[str, tuple[Any, Any]] = {}
-    for player in view.players:
-        process = view.get("players", player, "process")
+    roles: list[Location] = [("supervisor",), ("vhub",)]
+    roles += [("nodes", node) for node in view.mapping("nodes")]
+    roles += [("players", player) for player in view.players]
+    for role in roles:
+        process, location = view.get(*role, "process"), (*role, "process")
         if not isinstance(process, str):
             continue
-        location: Location = ("players", player, "process")
         if process in names.PROCESS_NAMES_RESERVED:
             yield Finding(location, "a reserved name", process)
         elif process in taken:
             yield Finding(location, f"a name that is also one of {taken[process]}", process)
-        place = view.get("players", player, "host"), view.get("players", player, "label")
+        place = view.get(*role, "host"), view.get(*role, "label")
         if places.setdefault(process, place) != place:
-            yield Finding(location, "a process whose players are not all on the same host", process)
+            yield Finding(location, "a process whose roles are not all on the same host", process)
+        launch = view.get(*role, "launch")
+        if role[0] == "nodes" and launch in ("manual", "systemd"):
+            yield Finding(location, f"a process for a node with `launch: {launch}`, which has its own", process)
 
 
 def _hosts(view: View) -> Iterator[Finding]:

@@ -32,9 +32,16 @@ Span = Annotated[int, Quantity(units.TIME, "10 ms", "10000 h")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
 
 
-class NodeSpec(Placed):
-    """A process that computes: where, who starts it, whether the run needs it, the robots that it owns at the start."""
+SUPERVISOR, VHUB = names.PROCESS_NAMES_RESERVED
 
+
+class NodeSpec(Placed):
+    """A node, which computes: where, who starts it, whether the run needs it, the robots that it owns at the start.
+
+    Roles that name the same `process` share one; else each has its own.
+    """
+
+    process: Name | None = None
     launch: Literal["local", "manual", "systemd"] = "local"
     required: bool = False
     robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
@@ -66,7 +73,15 @@ class Player(Placed):
 
 
 class VHubSpec(Placed):
-    """The process that judges every packet and writes the capture: where it runs."""
+    """The vHub, which judges every packet and writes the capture: where it runs, and in which process."""
+
+    process: Name | None = None
+
+
+class SupervisorSpec(SpecBase):
+    """The supervisor: in which process it runs."""
+
+    process: Name | None = None
 
 
 class ClientSpec(SpecBase):
@@ -148,6 +163,7 @@ class Deployment(WorldSpec):
     listen: Listen = LOOPBACK
     hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
+    supervisor: SupervisorSpec = Field(default_factory=SupervisorSpec)
     vhub: VHubSpec = Field(default_factory=VHubSpec)
     players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
@@ -176,12 +192,12 @@ class Deployment(WorldSpec):
         on_board += [(name, client.on) for name, client in self.clients.items()]
         return {name: robot for name, robot in on_board if robot is not None}
 
-    def player_processes(self) -> dict[str, list[str]]:
-        """The players of each process that `up` starts for them, by its name: a player's own if it shares none."""
-        found: dict[str, list[str]] = {}
-        for name, player in sorted(self.players.items()):
-            found.setdefault(player.process or name, []).append(name)
-        return dict(sorted(found.items()))
+    def declared_processes(self) -> dict[str, str]:
+        """The process of each role that names one, by role."""
+        named = {SUPERVISOR: self.supervisor.process, VHUB: self.vhub.process}
+        named |= {name: node.process for name, node in self.nodes.items()}
+        named |= {name: player.process for name, player in self.players.items()}
+        return {role: process for role, process in named.items() if process is not None}
 
     def heard_by(self, name: str) -> list[tuple[str, str]]:
         """The (endpoint, channel) that a player subscribes to, sorted: its robots' and what `hears` selects."""
@@ -217,20 +233,19 @@ class Deployment(WorldSpec):
 
 
 def places(deployment: Deployment) -> dict[str, str]:
-    """Return the host of each process that has one: nodes, players and the vHub, by name; players that share one, too.
+    """Return the host of each role that has one, by name, and of each process that roles name.
 
     Of the hosts with a label, each process in name order gets the one that has the fewest by then, ties by name.
     """
-    shared = {process: deployment.players[names[0]] for process, names in deployment.player_processes().items()}
-    processes: dict[str, Placed] = {**deployment.nodes, **shared, "vhub": deployment.vhub}
+    declared = deployment.declared_processes()
+    roles: dict[str, Placed] = {**deployment.nodes, **deployment.players, VHUB: deployment.vhub}
+    processes = {declared.get(role, role): placed for role, placed in roles.items()}
     found = {name: placed.host for name, placed in sorted(processes.items()) if placed.host is not None}
     for name, placed in sorted(processes.items()):
         if placed.label is not None:
             fitting = [host for host, about in sorted(deployment.hosts.items()) if placed.label in about.labels]
             found[name] = min(fitting, key=lambda host: sum(taken == host for taken in found.values()))
-    for process, players in deployment.player_processes().items():
-        if process in found:
-            found.update(dict.fromkeys(players, found[process]))
+    found |= {role: found[process] for role, process in declared.items() if process in found}
     return dict(sorted(found.items()))
 
 

@@ -20,6 +20,7 @@ from foosim.cli.doctor import app as doctor_app
 from foosim.cli.guard import app as guard_app
 from foosim.cli.net import app as net_app
 from foosim.cli.pki import app as pki_app
+from foosim.cli.process import app as process_app
 from foosim.cli.rehearse import app as rehearse_app
 from foosim.cli.replay import app as replay_app
 from foosim.cli.supervisor import app as supervisor_app
@@ -42,6 +43,7 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,
     "foosim-player": player_app,
+    "foosim-process": process_app,
     "foosim-probe": probe_app,
     "foosim-guard": guard_app,
     "foosim-pki": pki_app,

@@ -161,15 +161,16 @@ def _head(status: dict[str, Any]) -> Text:
 
 
 def _processes(status: dict[str, Any]) -> Table:
-    """Nodes with their hosts, if any, their entities and their load; then the other processes.
+    """Nodes with their hosts and shared processes, if any, their entities and their load; then the other roles.
 
     The load is a table's share of the ball's ticks, or a hall's ticks in which the node solved a rover.
     """
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
     processes = status["processes"]
     nodes = status["nodes"]
-    hosts = any(process["host"] for process in processes.values())
-    columns = [("name", "left"), *([("host", "left")] if hosts else []), ("owns", "left")]
+    hosts, shared = any(process["host"] for process in processes.values()), status["shared"]
+    columns = [("name", "left"), *([("process", "left")] if shared else []), *([("host", "left")] if hosts else [])]
+    columns.append(("owns", "left"))
     balls = sum(node["ball_ticks"] for node in nodes.values())
     solved = "ball ticks" if balls else "solved ticks"
     for column, justify in (*columns, (solved, "right"), ("load", "right")):
@@ -179,6 +180,7 @@ def _processes(status: dict[str, Any]) -> Table:
         node, process = nodes.get(name), processes.get(name)
         table.add_row(
             name,
+            *([shared.get(name, name)] if shared else []),
             *([process["host"] if process else ""] if hosts else []),
             "" if node is None else _listed(node["owned"]),
             "" if node is None else f"{node['ball_ticks'] / balls:.0%}" if balls else str(node["solved_ticks"]),

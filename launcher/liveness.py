@@ -50,8 +50,12 @@ class OwnTime:
 class SupervisorWatch:
     """Whether the supervisor's process hangs."""
 
-    def __init__(self, deadlines: Deadlines) -> None:
+    def __init__(self, deadlines: Deadlines, has_players: bool = False) -> None:
+        """`has_players`: they share its process, so it does not answer while one of them acts."""
         self._start_s = deadlines.start_ns / 1e9
+        self._unanswered_s = UNANSWERED_MAX * QUESTION_S
+        if has_players:
+            self._unanswered_s += deadlines.lockstep_fast_ns / 1e9
         self._started_s = 0.0
         self.is_found = False
         """Whether it has published its address."""
@@ -75,8 +79,8 @@ class SupervisorWatch:
 
     def why_killed(self, now_s: float) -> str:
         """Return why its process is to be killed; empty when it is not."""
-        if self._unanswered >= UNANSWERED_MAX:
-            return f"it had not answered for {UNANSWERED_MAX * QUESTION_S:g} s"
+        if self._unanswered * QUESTION_S >= self._unanswered_s:
+            return f"it had not answered for {self._unanswered_s:g} s"
         if not self.is_found and now_s - self._started_s >= self._start_s:
             return f"it had not published its address within {self._start_s:g} s (deadlines.start)"
         return ""

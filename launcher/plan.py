@@ -14,13 +14,14 @@ from foosim.common.errors import BadValue, Refused, read_at
 from foosim.common.units import Pace, parse_ns, parse_pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text, refuse_findings
+from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.table_clearance import clearance_findings
 from foosim.launcher.resumable import check_resumable
 from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.node.engines.mesh_trial import check_models
 from foosim.protocol import identity
-from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.channels import VHUB
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
 from foosim.supervisor.settings import RunSettings
@@ -44,16 +45,20 @@ class Plan:
     address: Address
     branch: Branch | None = None
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    processes: Mapping[str, Process] = field(default_factory=dict)
+    """By name, that of the supervisor first."""
 
     @property
     def start(self) -> Start | None:
         return None if self.branch is None else self.branch.start
 
-    def settings(self, run: str) -> RunSettings:
-        """Return the settings of the supervisor of the run with this name."""
+    def settings(self, run: str, *, is_launched: bool = False) -> RunSettings:
+        """Return the settings of the supervisor of the run with this name; `is_launched`: `up` starts its processes."""
         name, balance = str(self.options.file), self.options.balance
         again = replace(self.options, branch=None).arguments()
-        return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, again, self.files)
+        shared = {role: its.name for its in self.processes.values() if len(its.roles) > 1 for role in its.roles}
+        world = self.text, self.pace, self.ticks, self.start
+        return RunSettings(run, name, *world, balance, again, self.files, shared if is_launched else {})
 
 
 def check_certificates(plan: Plan) -> list[str]:
@@ -63,10 +68,13 @@ def check_certificates(plan: Plan) -> list[str]:
     """
     pki, deployment = plan.options.pki, plan.deployment
     elsewhere = places(deployment)
-    local = [name for name, node in deployment.nodes.items() if node.launch == "local" and name not in elsewhere]
-    players = [identity.client(name) for name in deployment.players if name not in elsewhere]
-    servers = [SUPERVISOR] if VHUB in elsewhere else [SUPERVISOR, VHUB]
-    everybody = (*servers, *map(identity.node, local), *players)
+    started = [
+        process
+        for process in plan.processes.values()
+        if not {*process.roles} & {*elsewhere}
+        and not any(role in deployment.nodes and deployment.nodes[role].launch != "local" for role in process.roles)
+    ]
+    everybody = [who for process in started for who in identity.of_process(process, deployment)]
     found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
     warnings = [credentials.ends_soon(wall_clock.now_utc()) for credentials in found if credentials is not None]
     return [warning for warning in warnings if warning]
@@ -112,7 +120,9 @@ def make_plan(options: RunOptions) -> Plan:
         if ticks == 0:
             raise BadValue("--for: a run has at least one tick", options.duration)
     branch = None if options.branch is None else read_branch(options.branch, deployment)
-    return Plan(options, text, deployment, pace, ticks, address, branch, files)
+    shape = "deployed" if options.processes is None else read_at("--processes", parse_shape, options.processes)
+    processes = processes_of(deployment, shape)
+    return Plan(options, text, deployment, pace, ticks, address, branch, files, processes)
 
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:

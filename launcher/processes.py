@@ -14,8 +14,8 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -28,7 +28,8 @@ from foosim.runtime.children import GRACE_S, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
 
 POLL_S: Final = 0.02
-PLAYER: Final = "foosim-player"
+SHOW_STACKS: Final = ("foosim-player", "foosim-process")
+"""Commands whose processes run code of users."""
 STACK_S: Final = 1.0
 """Time for a hanging player to log its stack."""
 LINES: Final = 30
@@ -90,10 +91,10 @@ class Child:
 
     def ask_for_stack(self) -> bool:
         """Make a player on this machine log its stack and end; False for any other process."""
-        is_player = self.command[0] == PLAYER and self.remote is None
-        if is_player:
+        shows = self.command[0] in SHOW_STACKS and self.remote is None
+        if shows:
             self.process.send_signal(STACK_SIGNAL)
-        return is_player
+        return shows
 
     @property
     def is_away(self) -> bool:
@@ -221,6 +222,22 @@ class Launcher:
                 os.killpg(child.process.pid, number)
             except ProcessLookupError:
                 continue
+
+
+@contextmanager
+def counted_signals(count: Callable[[], None]) -> Iterator[None]:
+    """Call `count` at each Ctrl-C, SIGTERM or SIGHUP instead of ending."""
+
+    def take(number: int, frame: object) -> None:
+        count()
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, take) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def command_line(command: Sequence[str]) -> str:

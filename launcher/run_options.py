@@ -40,6 +40,10 @@ class RunOptions:
     )
     pki: PkiOption = None
     balance: Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")] = False
+    processes: Annotated[
+        str | None,
+        typer.Option("--processes", help="deployed, one (a process for each host) or each (a process for each role)."),
+    ] = None
 
     @property
     def all_sets(self) -> tuple[str, ...]:

@@ -10,25 +10,23 @@ import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.client.control import Control, NoAnswer
-from foosim.common.addresses import parse_address
 from foosim.common.errors import Failed, Refused
+from foosim.deployment.processes import Process, process_of
+from foosim.launcher.commands import Commands
 from foosim.launcher.console_child import ConsoleChild, Page
 from foosim.launcher.display import Display, recovery_text
 from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
-from foosim.launcher.hosts.ssh import CAPTURE
 from foosim.launcher.hosts.ssh import remotes as remotes_of
 from foosim.launcher.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
 from foosim.launcher.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
 from foosim.launcher.plan import Plan
-from foosim.launcher.processes import Child, Launcher, command_line
+from foosim.launcher.processes import Child, Launcher, command_line, counted_signals
 from foosim.launcher.restarts import Restarts
 from foosim.launcher.run_options import launch_of
-from foosim.launcher.signals import counted_signals
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
@@ -84,13 +82,18 @@ class Up:
         self.plan = plan
         self.capture = capture
         self.display = display
-        remotes = remotes_of(plan.deployment)
-        check_hosts(plan.deployment, plan.address, remotes)
+        machines = remotes_of(plan.deployment)
+        check_hosts(plan.deployment, plan.address, machines)
+        remotes = {
+            name: machines[process.roles[0]] for name, process in plan.processes.items() if process.roles[0] in machines
+        }
         self.folder: RunFolder = resumed or create_run(plan.deployment.world, run)
         self.folder.hold_launcher()
         self.folder.write_launch(launch_of(plan.options, capture))
         units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
         self._launcher = Launcher(self.folder.name, remotes, units)
+        self._commands = Commands(plan, self.folder, capture)
+        self._process_of = process_of(plan.processes)
         self._console = ConsoleChild(self.folder, display.say, console)
         self._not_home = ""
         """Why the capture was not fetched from the machine on which it was written."""
@@ -104,7 +107,9 @@ class Up:
         self._is_resumed = resumed is not None
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
-        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines)
+        with_supervisor = self._roles(self._process_of[SUPERVISOR])
+        has_players = any(role in plan.deployment.players for role in with_supervisor)
+        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines, has_players)
         self._stalled_watch = StalledWatch(plan.deployment.deadlines)
         self._control: Control | None = None
         self._status: dict[str, Any] = {}
@@ -137,7 +142,7 @@ class Up:
     @property
     def _can_resume(self) -> bool:
         """Whether the run can be resumed: its supervisor is gone or has not resumed it, and nothing has ended it."""
-        is_gone = self._launcher.children[SUPERVISOR].exit_code is not None
+        is_gone = self._supervisor.exit_code is not None
         return self.folder.result() is None and (is_gone or (self._is_resumed and not self._has_begun))
 
     # --- starting ----------------------------------------------------------------------------------------------------
@@ -145,72 +150,68 @@ class Up:
     def _start(self) -> bool:
         """Start each process as soon as it can connect; False when the run was over before all had started."""
         options, folder, display = self.plan.options, self.folder, self.display
-        supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
-        self._launch(SUPERVISOR, supervisor)
+        first, *others = self.plan.processes.values()
+        self._begin(first, None)
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
+        for process in self.plan.processes.values():
+            if len(process.roles) > 1:
+                display.say(f"process {process.name} has {', '.join(process.roles)}")
         for line in start_lines(summaries(self.plan.deployment), str(options.file)):
             display.say(line)
-        info = self._await(self._own_info)
-        if info is None:
-            return False
-        self._launch(VHUB, self._vhub_command(info))
-        for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation, *self._pki_arguments(name)]
-            if node.launch != "manual":
-                self._launch(name, command)
-            else:
-                display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
-        info = self._await(self._info_with_radio)
-        if info is None:
-            return False
-        for process, players in self.plan.deployment.player_processes().items():
-            names = [word for name in players for word in ("--name", name)]
-            self._launch(process, ["foosim-player", *names, "--connect", info.radio, *self._pki_arguments(process)])
+        for needs_radio, ready in ((False, self._own_info), (True, self._info_with_radio)):
+            info = self._await(ready)
+            if info is None:
+                return False
+            for process in others:
+                if self._commands.needs_radio(process) == needs_radio:
+                    self._begin(process, info)
         return True
-
-    def _vhub_command(self, info: RunInfo) -> list[str]:
-        address, folder, capture, options = self.plan.address, self.folder.path, self.capture, self.plan.options
-        listen = replace(address, port=parse_address(info.radio).port) if info.radio else address.next_port()
-        remote = self._launcher.remotes.get(VHUB)
-        if remote is not None:  # where the guard has a folder for the run
-            listen = replace(listen, host=remote.host.address)
-            folder, capture = Path(), None if capture is None else Path(CAPTURE)
-        command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
-        command += ["--insecure"] if options.insecure else []
-        command += self._pki_arguments(VHUB)
-        command += ["--run-folder", str(folder)]
-        return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
-
-    def _pki_arguments(self, name: str) -> list[str]:
-        """Return where a process finds its certificate: in the folder of this machine, or of the one that it is on."""
-        remote = self._launcher.remotes.get(name)
-        given = self.plan.options.pki_arguments()
-        return remote.pki_arguments() if given and remote is not None else given
 
     def _bring_home(self) -> None:
         """Fetch the capture from the machine on which the vHub wrote it."""
-        remote = self._launcher.remotes.get(VHUB)
-        if remote is None or self.capture is None or VHUB not in self._launcher.children:
+        process = self._process_of[VHUB]
+        remote = self._launcher.remotes.get(process)
+        if remote is None or self.capture is None or process not in self._launcher.children:
             return
         try:
             fetch_capture(remote, self.folder.name, self.capture)
         except Failed as failed:
             self._not_home = str(failed)
 
-    def _launch(self, name: str, command: list[str]) -> None:
+    def _begin(self, process: Process, info: RunInfo | None) -> None:
+        """Start a process, or print the command line of a node that is started by hand."""
+        name = process.name
+        command = self._commands.of(process, info, self._launcher.remotes.get(name))
+        node = self.plan.deployment.nodes.get(name)
+        if node is not None and node.launch == "manual":
+            self.display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
+        else:
+            self._launch(name, command)
+
+    def _launch(self, name: str, command: Sequence[str]) -> None:
         self._start_child(name, command, self.folder.log(name))
 
     def _start_child(self, name: str, command: Sequence[str], log: Path) -> None:
         self._launcher.start(name, command, log)
-        if name == SUPERVISOR:
+        if SUPERVISOR in self._roles(name):
             self._supervisor_watch.started(self._own_time.at(time.monotonic()))
+
+    @property
+    def _supervisor(self) -> Child:
+        """The process with the supervisor."""
+        return self._launcher.children[self._process_of[SUPERVISOR]]
+
+    def _roles(self, name: str) -> tuple[str, ...]:
+        """Return the roles of a process."""
+        process = self.plan.processes.get(name)
+        return (name,) if process is None else process.roles
 
     def _own_info(self) -> RunInfo | None:
         """Return the contents of the run file, once our supervisor has written it."""
         info = self.folder.info()
-        return info if info is not None and info.pid == self._launcher.children[SUPERVISOR].process.pid else None
+        return info if info is not None and info.pid == self._supervisor.process.pid else None
 
     def _info_with_radio(self) -> RunInfo | None:
         info = self.folder.info()
@@ -247,7 +248,7 @@ class Up:
 
     def _connect(self, stack: ExitStack) -> Control | None:
         """Connect to the supervisor; None when it has ended before: the run was short, or it was killed."""
-        info, supervisor = self._own_info(), self._launcher.children[SUPERVISOR]
+        info, supervisor = self._own_info(), self._supervisor
         if info is None:
             return None
         try:
@@ -259,7 +260,7 @@ class Up:
             return None
 
     def _show(self, control: Control) -> None:
-        supervisor = self._launcher.children[SUPERVISOR]
+        supervisor = self._supervisor
         try:
             status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
@@ -284,16 +285,16 @@ class Up:
     def _start_wanted(self, starts: dict[str, int]) -> None:
         """Start the nodes requested since: stopped ones, ones in back-off, and ones that were given up."""
         for name, count in starts.items():
-            child = self._launcher.children.get(name)
+            child = self._launcher.children.get(self._process_of.get(name, name))
             if child is None or count <= self._starts.get(name, 0) or name in self._stopped:
                 continue
-            self._restarts.forget(name)
+            self._restarts.forget(child.name)
             if child.exit_code is not None:
-                self._start_child(name, child.command, child.log)
+                self._start_child(child.name, child.command, child.log)
             else:  # it was stopped, and has not ended yet
-                self._wanted.add(name)
+                self._wanted.add(child.name)
         self._starts = starts
-        self._wanted -= self._stopped
+        self._wanted -= {self._process_of.get(name, name) for name in self._stopped}
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Show new recoveries once they are complete."""
@@ -303,9 +304,10 @@ class Up:
 
     def _end_stalled(self, status: dict[str, Any]) -> None:
         """Kill a process that hangs: the run continues without it, and a new one can take part."""
-        alive = {child.name: child for child in self._launcher.alive()}
-        pids = {name: child.process.pid for name, child in alive.items()}
-        away = {name for name, child in alive.items() if child.remote is not None}
+        others = [child for child in self._launcher.alive() if SUPERVISOR not in self._roles(child.name)]
+        alive = {role: child for child in others for role in self._roles(child.name)}
+        pids = {role: child.process.pid for role, child in alive.items()}
+        away = {role for role, child in alive.items() if child.remote is not None}
         killed = self._stalled_watch.look(status, pids, away, self._own_time.at(time.monotonic()))
         for name, why in killed.items():
             self._kill(alive[name], why)
@@ -329,10 +331,10 @@ class Up:
         began = self.folder.info() is not None or supervisor.how.is_by_signal
         if over or not began or supervisor.exit_code in (DONE, REFUSED):
             return False
-        if not self._restarts.is_known(SUPERVISOR):
+        if not self._restarts.is_known(supervisor.name):
             self._restart_later(supervisor, now_s)
         self._start_due(now_s)
-        return SUPERVISOR not in self._restarts.failed
+        return supervisor.name not in self._restarts.failed
 
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
         """Restart processes that ended before the run did; give up those that fail repeatedly or are refused.
@@ -341,7 +343,13 @@ class Up:
         """
         may_judge = self._has_begun or knows or self._control is None
         for child in self._launcher.ended() if may_judge else ():
-            if child.name in self._stopped or child.exit_code == DONE or self._restarts.is_known(child.name):
+            if SUPERVISOR in self._roles(child.name):
+                continue
+            if (
+                self._stopped.intersection(self._roles(child.name))
+                or child.exit_code == DONE
+                or self._restarts.is_known(child.name)
+            ):
                 continue
             if child.exit_code == REFUSED and not knows:
                 continue  # it may have been stopped since the last status
@@ -350,7 +358,7 @@ class Up:
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
-        at_once = child.name in (SUPERVISOR, VHUB)
+        at_once = SUPERVISOR in self._roles(child.name) or VHUB in self._roles(child.name)
         wait_s = None
         if child.exit_code == REFUSED and child.name not in self._wanted:
             self._restarts.give_up(child.name)
@@ -366,7 +374,7 @@ class Up:
     def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
-            command = self._vhub_again() if name == VHUB else child.command
+            command = self._vhub_again(name) if VHUB in self._roles(name) else child.command
             self._start_child(name, command, child.log)
 
     def _comes_back(self, child: Child) -> bool:
@@ -375,34 +383,35 @@ class Up:
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
         player that is not to be restarted is included: it has not acted, so it loses no state.
         """
-        if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
+        roles, nodes = self._roles(child.name), self.plan.deployment.nodes
+        if VHUB in roles and (child.exit_code == REFUSED or child.name in self._restarts.failed):
             return False
         if self._has_begun:
-            return child.name == VHUB or child.name in self.plan.deployment.nodes or self._plays_again(child)
-        is_orphan = child.exit_code == FAILED and self._restarts.has_ended(SUPERVISOR)
+            has_players = any(role in self.plan.deployment.players for role in roles)
+            is_needed = VHUB in roles or any(role in nodes for role in roles)
+            return self._plays_again(child) if has_players else is_needed
+        is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
         may_come = child.how.is_by_signal or child.is_away or is_orphan
         return may_come and child.name not in self._restarts.failed
 
     def _plays_again(self, child: Child) -> bool:
         """Whether these are players whom something else has ended: one that ends by itself has failed."""
-        deployment = self.plan.deployment
-        players = deployment.player_processes().get(child.name, ())
-        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        declared = self.plan.deployment.players
+        players = [declared[role] for role in self._roles(child.name) if role in declared]
+        may_restart = bool(players) and all(player.restart for player in players)
         is_lost = child.how.is_by_signal or child.is_away
         return may_restart and is_lost and child.name not in self._restarts.failed
 
-    def _vhub_again(self) -> list[str]:
-        """Return the command that restarts the vHub, at the address that clients know."""
-        info = self.folder.info()
-        assert info is not None
-        return self._vhub_command(info)
+    def _vhub_again(self, name: str) -> list[str]:
+        """Return the command that restarts the vHub's process, with the address that clients know."""
+        return self._commands.of(self.plan.processes[name], self.folder.info(), self._launcher.remotes.get(name))
 
     def _goes_on(self) -> bool:
         """Handle ended children and Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
             raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
-        supervisor = self._launcher.children[SUPERVISOR]
+        supervisor = self._supervisor
         now_s = self._own_time.at(time.monotonic())
         if supervisor.exit_code is not None:
             if self._supervisor_comes_back(supervisor, now_s):
@@ -437,7 +446,11 @@ class Up:
     def _look_for_lost(self, now_s: float) -> None:
         """Record the first child that ended unexpectedly; a killed one precedes those that ended because of it."""
         if self._lost is None:
-            bad = [child for child in self._launcher.ended() if self._ends_run(child) and child.name != SUPERVISOR]
+            bad = [
+                child
+                for child in self._launcher.ended()
+                if self._ends_run(child) and SUPERVISOR not in self._roles(child.name)
+            ]
             self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
             self._lost_s = now_s
 
@@ -456,9 +469,9 @@ class Up:
         """Report how it ended. Without a supervisor's result nothing has ended it: it can be resumed."""
         ended = self.folder.result()
         if self._lost is None and ended is None:
-            self._lost = self._launcher.children[SUPERVISOR]
+            self._lost = self._supervisor
         reason = "" if self._lost is None else f"lost {self._lost.name}: it {self._lost.ending}"
-        if self._lost is self._launcher.children[SUPERVISOR] and self._lost.exit_code == REFUSED:
+        if self._lost is self._supervisor and self._lost.exit_code == REFUSED:
             reason = self._lost.how.last_words
         if ended is None:
             result = self.unended(reason)
@@ -485,7 +498,7 @@ class Up:
         child = self._lost
         if child is None:
             name = result["reason"].removeprefix("lost ").partition(" ")[0].rstrip(":")
-            blamed = self._launcher.children.get(name)
+            blamed = self._launcher.children.get(self._process_of.get(name, name))
             if blamed is None:
                 return []
             has_failed = blamed.exit_code not in (None, DONE)
@@ -495,7 +508,7 @@ class Up:
 
     def _capture_lines(self) -> list[str]:
         """Report the capture's path, and whether it is finished, which a process that was killed did not do."""
-        journals = None if VHUB in self._launcher.remotes else self.folder.journals
+        journals = None if self._process_of[VHUB] in self._launcher.remotes else self.folder.journals
         lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from foosim.deployment.processes import joint_processes
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels, identity
 from foosim.protocol.channels import ALIVE, CHANNELS, REPLAY, SUPERVISOR, VHUB, Channel, Plane
@@ -57,8 +58,8 @@ class Grant:
     """Keys to which it may subscribe."""
     interests: tuple[str, ...]
     """Keys whose subscribers it learns of: Zenoh sends nothing that has no subscriber."""
-    alive: str
-    """The key of its presence; empty without one."""
+    alive: tuple[str, ...]
+    """The keys of its presence: one for each role; none for people."""
     watches: str
     """The key of its router's presence, which it may read."""
 
@@ -76,6 +77,9 @@ def access_to(plane: Plane, deployment: Deployment) -> Access:
     """Return the grants of all identities on a plane of a run."""
     roles = [role for role, its in _PLANES.items() if plane in its]
     grants = [grant(who, plane) for who in identity.identities_of(deployment) if _role(who) in roles]
+    for process in joint_processes(deployment).values() if plane is Plane.SIMULATION else ():
+        members = [identity.of_role(role, deployment) for role in process.roles]
+        grants.append(_union(process.name, [grant(who, plane) for who in members if _role(who) in roles]))
     return Access(plane, tuple(grants), plane is Plane.RADIO and deployment.access.radio == "password")
 
 
@@ -91,8 +95,25 @@ def grant(who: str, plane: Plane) -> Grant:
         writes=tuple(channel.key_for(key_name) for channel in written),
         reads=tuple(_each(_READS[role], plane, lambda channel, own: _declared(channel, key_name if own else "*"))),
         interests=tuple(sorted({expression for channel in written for expression in _readers(channel, key_name)})),
-        alive="" if role in PEOPLE else presence.replace("{name}", name),
+        alive=() if role in PEOPLE else (presence.replace("{name}", name),),
         watches=presence.replace("{name}", ROUTERS[plane]),
+    )
+
+
+def _union(process: str, grants: Sequence[Grant]) -> Grant:
+    """Return the grants of a process, which has the roles of several identities."""
+
+    def each(keys: Callable[[Grant], Sequence[str]]) -> tuple[str, ...]:
+        return tuple(sorted({key for its in grants for key in keys(its)}))
+
+    return Grant(
+        identity=identity.process(process),
+        name=process,
+        writes=each(lambda its: its.writes),
+        reads=each(lambda its: its.reads),
+        interests=each(lambda its: its.interests),
+        alive=each(lambda its: its.alive),
+        watches=grants[0].watches,
     )
 
 

@@ -1,5 +1,6 @@
 """Identities, which certificates carry: `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players too),
-`operator.NAME` (a person or a script that controls the run), `viewer.NAME` (one that only watches it).
+`process.NAME` (a process with several of these roles), `operator.NAME` (a person or a script that controls the run),
+`viewer.NAME` (one that only watches it).
 
 An identity is the common name of a certificate and the stem of its files.
 """
@@ -10,12 +11,13 @@ from typing import Final
 
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
+from foosim.deployment.processes import Process, is_joint, joint_processes
 from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import SUPERVISOR, VHUB
 
-ROLES: Final = ("node", "client", "operator", "viewer")
-"""Roles of which there are several, told apart by name."""
-FORMS: Final = "supervisor, vhub, node.NAME, client.NAME, operator.NAME or viewer.NAME"
+ROLES: Final = ("node", "client", "process", "operator", "viewer")
+"""Roles of which there are several, distinguished by name."""
+FORMS: Final = "supervisor, vhub, node.NAME, client.NAME, process.NAME, operator.NAME or viewer.NAME"
 
 
 def node(name: str) -> str:
@@ -26,6 +28,29 @@ def node(name: str) -> str:
 def client(name: str) -> str:
     """Return the identity of a client, or of a player."""
     return f"client.{name}"
+
+
+def process(name: str) -> str:
+    """Return the identity of a process with several roles."""
+    return f"process.{name}"
+
+
+def of_role(role: str, deployment: Deployment) -> str:
+    """Return the identity of a role: of the supervisor, the vHub, a node or a player."""
+    if role in (SUPERVISOR, VHUB):
+        return role
+    return node(role) if role in deployment.nodes else client(role)
+
+
+def of_process(its: Process, deployment: Deployment) -> list[str]:
+    """Return the identities that a process needs: as a router, as a client of the simulation plane, and of players.
+
+    Beside the supervisor nodes need none, beside the vHub players.
+    """
+    routers: list[str] = [role for role in (SUPERVISOR, VHUB) if role in its.roles]
+    nodes = [node(role) for role in its.roles if role in deployment.nodes and SUPERVISOR not in its.roles]
+    players = [client(role) for role in its.roles if role in deployment.players and VHUB not in its.roles]
+    return [*routers, *([process(its.name)] if is_joint(its, deployment) else nodes), *players]
 
 
 def operator(name: str) -> str:
@@ -55,6 +80,7 @@ def identities_of(deployment: Deployment) -> list[str]:
         VHUB,
         *map(node, sorted(deployment.nodes)),
         *map(client, sorted([*deployment.players, *deployment.clients])),
+        *map(process, joint_processes(deployment)),
         *map(operator, sorted(deployment.access.operators)),
         *map(viewer, sorted(deployment.access.viewers)),
     ]

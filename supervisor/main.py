@@ -86,6 +86,7 @@ class SupervisorShell:
     ) -> None:
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
+        self.session: Final = session
         self._folder = folder
         self._end_requested = False
         self._info = RunInfo(

@@ -351,6 +351,10 @@ class Requests:
             raise Refused(f"{node} is required by the deployment: the run cannot do without it")
         if state.members == (node,):
             raise Refused(f"{node} is the only node that is left")
+        process = state.settings.processes.get(node)
+        if process is not None:
+            others = [role for role, its in sorted(state.settings.processes.items()) if its == process and role != node]
+            raise Refused(f"{node} shares process {process} with {', '.join(others)}: it cannot be stopped alone")
         state.roster.stopped.add(node)
         answer = self._accept(request, tick, f"{node} stopped at tick {tick}")
         self._node_loss.stop(node, now_ns)

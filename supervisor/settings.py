@@ -30,6 +30,8 @@ class RunSettings:
     """The arguments of the command that began the run; where there are none, its deployment's file."""
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """The contents of the files that the deployment refers to, by path."""
+    processes: Mapping[str, str] = field(default_factory=dict)
+    """The process of each role that `up` started with others in one, by role."""
 
     def load_deployment(self) -> Deployment:
         """The deployment with its files; raises DeploymentError or AssetError."""

@@ -100,6 +100,7 @@ def status(
         "ball": _ball(state),
         "rovers": _rovers(state),
         "processes": _processes(state, waiting_for, refused),
+        "shared": dict(sorted(state.settings.processes.items())),
         "starts": dict(state.roster.starts),
         "vhub_away": state.roster.is_hub_away,
         "vhub_lost": vhub_lost,

@@ -27,6 +27,7 @@ FILES_OF_A_FOLDER_MAX = 16
 ORDER: list[set[str]] = [
     {"cli"},
     {"replay", "console"},
+    {"process"},
     {"analysis", "launcher", "rehearsal"},
     {"vhub", "players"},
     {"supervisor", "node", "client"},
@@ -136,7 +137,9 @@ SHELLS = {
     "launcher/resumable.py",
     "runtime/run_folder.py",
     "launcher/run_options.py",
-    "launcher/signals.py",
+    "cli/process.py",
+    "launcher/commands.py",
+    "process/roles.py",
     "launcher/up.py",
     "capture/start_frame.py",
     "capture/contents.py",

@@ -406,13 +406,18 @@ def open_vhub(
     options: HubOptions,
     pki: Path | None,
     credentials: Credentials | None,
+    on_radio: Callable[[Session], None] = lambda session: None,
 ) -> Iterator[HubShell]:
-    """Open a vHub in a process; it listens for clients at `address` once the supervisor has admitted it."""
+    """Open a vHub in a process; it listens for clients at `address` once the supervisor has admitted it.
+
+    `on_radio` is called with the radio plane's session when it is open.
+    """
     with ExitStack() as opened:
 
         def open_radio(deployment: Deployment) -> Session:
             session = opened.enter_context(_radio_session(address, credentials, deployment, pki))
             check_host(credentials, session.locator)
+            on_radio(session)
             return session
 
         yield HubShell(process, simulation, open_radio, options, credentials)

@@ -29,6 +29,7 @@ from foosim.client.class_check import player_findings
 from foosim.common import limits, wall_clock
 from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import Refused, describe
+from foosim.deployment.processes import joint_processes, processes_of
 from foosim.deployment.schema import Deployment, places
 from foosim.launcher.hosts.install import SYSTEM_FOLDER, USER_FOLDER
 from foosim.launcher.hosts.port_check import REMEDIES, listen, why_not_reached
@@ -37,6 +38,7 @@ from foosim.launcher.hosts.ssh import Remote, remotes, unit_name
 from foosim.launcher.hosts.systemd_units import units_of
 from foosim.launcher.new_capture import place_of
 from foosim.launcher.pki.hosts import identities_on, passwords_of
+from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
 from foosim.runtime.run_folder import hosted_folder, runs_folder
@@ -160,6 +162,17 @@ _Said = tuple[str, State, str, str]
 """Subject, state, text, remedy."""
 
 
+# --- processes -------------------------------------------------------------------------------------------------------
+
+
+def _processes(case: Case) -> Iterator[_Said]:
+    """Which roles share a process, on this machine."""
+    hosts = places(case.deployment)
+    for process in processes_of(case.deployment).values():
+        if len(process.roles) > 1 and hosts.get(process.roles[0]) == case.host:
+            yield process.name, "fine", f"has {', '.join(process.roles)}", ""
+
+
 # --- versions --------------------------------------------------------------------------------------------------------
 
 
@@ -220,7 +233,12 @@ def _certificates(case: Case) -> Iterator[_Said]:
     if (folder / CA_KEY_FILE).exists():
         remedy = "remove it there" if case.is_there else "keep it where certificates are issued"
         yield CA_KEY_FILE, "problem" if case.is_there else "warning", "is beside the certificates", remedy
-    here = identities_on(case.deployment, case.host)
+    declared = [identity.process(name) for name in joint_processes(case.deployment, ("deployed",))]
+    here = [
+        who
+        for who in identities_on(case.deployment, case.host)
+        if who in declared or identity.parse_identity(who)[0] != "process"
+    ]
     passwords = passwords_of(case.deployment, here)
     for who in dict.fromkeys([*here, *passwords]):
         yield _password(folder, who, case) if who in passwords else _certificate(folder, who, case)
@@ -413,6 +431,7 @@ def _players(case: Case) -> Iterator[_Said]:
 
 
 CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
+    "processes": _processes,
     "versions": _versions,
     "arithmetic": _arithmetic,
     "commands": _commands,

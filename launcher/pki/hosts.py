@@ -12,6 +12,7 @@ from pathlib import Path
 
 from foosim.common import wall_clock
 from foosim.common.errors import Failed
+from foosim.deployment.processes import joint_processes
 from foosim.deployment.schema import Deployment, places
 from foosim.launcher.hosts.install import run_there
 from foosim.launcher.hosts.ssh import Remote
@@ -27,6 +28,7 @@ def identities_on(deployment: Deployment, host: str | None) -> list[str]:
     known = {VHUB: where.get(VHUB)}
     known |= {identity.node(name): where.get(name) for name in deployment.nodes}
     known |= {identity.client(name): where.get(name) for name in deployment.players}
+    known |= {identity.process(name): where.get(its.roles[0]) for name, its in joint_processes(deployment).items()}
     return [who for who in identity.identities_of(deployment) if known.get(who) == host]
 
 

@@ -58,6 +58,7 @@ def running() -> dict[str, Any]:
         },
         "links_in_all": 2,
         "vhub_away": False,
+        "shared": {},
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000, "lan", 0, {}, []],
             ["camera", "player-red", 617, 612, 4, 1_297_000, "lan", 0, {}, [["ball", 600, 6_000_000, 8_000_000]]],

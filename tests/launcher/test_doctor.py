@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from foosim.cli.doctor import app
 from foosim.common.errors import Refused
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text
 from foosim.deployment.schema import Capture, Deployment
 from foosim.launcher.doctor import checks as doctor
 from foosim.launcher.doctor.checks import CHECKS, Case, Finding, examine, is_well
@@ -52,7 +52,9 @@ def found(case: Case, subject: str) -> Finding:
 def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: Path) -> None:
     (folder / "ca.key").unlink()
     findings = examine(Case(deployment, "127.0.0.1", pki=folder))
-    assert {finding.check for finding in findings} == CHECKS.keys() - {"units", "hosts", "network"}, "which hosts have"
+    assert {finding.check for finding in findings} == CHECKS.keys() - {"units", "hosts", "network", "processes"}, (
+        "which others have"
+    )
     assert [finding for finding in findings if finding.state == "problem"] == [] and is_well(findings)
     for finding in findings:
         assert (finding.state == "fine") == (finding.remedy == ""), finding
@@ -207,3 +209,11 @@ def test_the_command_tells_it_as_text_and_as_json(folder: Path) -> None:
         "host": "here",
         "text": content["findings"][0]["text"],
     }
+
+
+def test_it_says_which_roles_share_a_process() -> None:
+    sets = [f"{role}.process=main" for role in ("supervisor", "vhub", "nodes.red")]
+    text = apply_sets(read_deployment_text(TABLE), "table.yaml", sets)
+    case = Case(load_deployment(text, "table.yaml"), "127.0.0.1")
+    found = [(finding.subject, finding.text) for finding in examine(case) if finding.check == "processes"]
+    assert found == [("main", "has vhub, supervisor, red")]

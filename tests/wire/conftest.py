@@ -170,6 +170,10 @@ class House:
         info = self.info()
         if process == "supervisor":
             return info.pid
+        shared = processes_with(f"foosim-process {process} ")
+        for pid, line in shared.items():
+            if f"--run {info.run} " in line or f"--connect {info.simulation} " in line:
+                return pid
         marks = {"vhub": "foosim-vhub"}
         mark = marks.get(process, f"--name {process}")
         (pid,) = [

@@ -11,6 +11,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.processes import processes_of
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
 from foosim.world.initial_state import initial_frame, initial_numbers
 from foosim.world.islands import Assignment, reach_of
@@ -104,7 +105,7 @@ def test_stations_do_not_stand_in_one_another() -> None:
 def test_a_process_has_its_players_on_one_host() -> None:
     hosts = "hosts={a: {address: 10.0.0.1}, b: {address: 10.0.0.2}}"
     found = problems(WAREHOUSE, hosts, "players.pilot01.host=a")
-    assert found[0] == "players.pilot01.process: a process whose players are not all on the same host, 'fleet-west'"
+    assert found[0] == "players.pilot01.process: a process whose roles are not all on the same host, 'fleet-west'"
 
 
 def test_a_world_is_a_table_or_a_hall() -> None:
@@ -191,6 +192,5 @@ def test_a_circle_is_clear_of_a_rectangle_from_where_it_touches(x: float, y: flo
 
 def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) -> None:
     deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
-    assert deployment.player_processes() == {"fleet-west": ["dispatch", "pilot01"], "own": ["pilot02"]}
-    table = load_deployment(TABLE, "table.yaml")
-    assert table.player_processes() == {"player-blue": ["player-blue"], "player-red": ["player-red"]}
+    found = {name: process.roles for name, process in processes_of(deployment).items()}
+    assert found["fleet-west"] == ("dispatch", "pilot01") and found["own"] == ("pilot02",)

@@ -1,0 +1,81 @@
+"""The command `foosim-process`: a process with several roles of a run, which `foosim-supervisor up` starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.common.addresses import check_listen
+from foosim.common.errors import BadValue
+from foosim.launcher.plan import make_plan
+from foosim.launcher.run_options import launched_options
+from foosim.process.roles import Roles, run_roles
+from foosim.runtime.command import PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.health import ProgressOption
+from foosim.runtime.process import die_with_parent, end_with_stack
+from foosim.runtime.run_folder import open_run
+from foosim.vhub.main import HubOptions
+
+app = new_app()
+
+
+@app.command()
+def process(  # noqa: PLR0913, PLR0917  # a command's options
+    name: Annotated[str, typer.Argument(help="Name of the process, for its log.", show_default=False)],
+    run: Annotated[
+        str | None, typer.Option("--run", help="Run the supervisor of this run, as it was launched.")
+    ] = None,
+    connect: Annotated[str, typer.Option(help="Address of the supervisor in another process: tcp/HOST:PORT.")] = "",
+    vhub_listen: Annotated[
+        str | None, typer.Option(help="Run the vHub, and listen for clients at this HOST:PORT.")
+    ] = None,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
+    ] = False,
+    capture: Annotated[
+        Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")
+    ] = None,
+    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
+    run_folder: Annotated[Path | None, typer.Option(help="Folder of the vHub's journal; by default RUN.vhub.")] = None,
+    node: Annotated[list[str] | None, typer.Option(help="Run this node; may be repeated.")] = None,
+    player: Annotated[list[str] | None, typer.Option(help="Run this player; may be repeated.")] = None,
+    radio: Annotated[str, typer.Option(help="Address of the vHub's radio plane in another process.")] = "",
+    pki: PkiOption = None,
+    progress_file: ProgressOption = None,
+    version: VersionOption = False,
+) -> None:
+    """Run several roles of a run in one process: supervisor, vHub, nodes, players.
+
+    `foosim-supervisor up` starts such processes where the deployment, or its option --processes, says that roles share
+    one. The process ends with the run; killed and started again with the same options, it resumes from its journals.
+
+    Exit codes: 0 the run ended, 1 it failed, 3 refused.
+    """
+    die_with_parent()
+    end_with_stack()
+    supervisor = None
+    if run is not None:
+        folder = open_run(run)
+        supervisor = make_plan(launched_options(folder)), folder
+        pki, insecure = supervisor[0].options.pki, supervisor[0].options.insecure
+    if (supervisor is None) == (not connect) and (run is not None or vhub_listen is not None or node):
+        raise BadValue("one of --run and --connect is needed: where the supervisor is")
+    if player and vhub_listen is None and not radio:
+        raise BadValue("--radio is missing: the address of the vHub, which players need", ", ".join(player))
+    hub = None
+    if vhub_listen is not None:
+        address = check_listen(vhub_listen, insecure, secured=pki is not None)
+        hub = HubOptions(capture, not no_capture, run_folder), address
+    given = tuple(node or ()), tuple(player or ())
+    raise typer.Exit(run_roles(Roles(name, supervisor, hub, *given, connect, radio, pki, progress_file)))
+
+
+def main() -> None:
+    """Entry of `foosim-process`."""
+    run_app(app, "foosim-process")
+
+
+if __name__ == "__main__":
+    main()

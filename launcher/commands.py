@@ -1,0 +1,86 @@
+"""The command lines of the processes of a run.
+
+A process with one role runs that role's command, one with several runs `foosim-process`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from foosim.common.addresses import parse_address
+from foosim.deployment.processes import Process
+from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher.plan import Plan
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.runtime.run_folder import RunFolder, RunInfo
+
+PROCESS: Final = "foosim-process"
+
+
+class Commands:
+    """The command line of each process of one run."""
+
+    def __init__(self, plan: Plan, folder: RunFolder, capture: Path | None) -> None:
+        self._plan = plan
+        self._folder = folder
+        self._capture = capture
+
+    def needs_radio(self, process: Process) -> bool:
+        """Whether a process connects to the radio plane of another one: it has players and no vHub."""
+        return VHUB not in process.roles and any(role in self._plan.deployment.players for role in process.roles)
+
+    def of(self, process: Process, info: RunInfo | None, remote: Remote | None = None) -> list[str]:
+        """Return the command line of a process; without `info` that of the supervisor's."""
+        if process.is_shared:
+            return self._shared(process, info, remote)
+        role, pki = process.name, self._pki(remote)
+        if role == SUPERVISOR:
+            return ["foosim-supervisor", "run", *self._plan.options.arguments(), "--run", self._folder.name]
+        assert info is not None
+        if role == VHUB:
+            insecure = ["--insecure"] if self._plan.options.insecure else []
+            address = ["--listen", self._radio_address(info, remote)]
+            return ["foosim-vhub", "--connect", info.simulation, *address, *insecure, *pki, *self._records(remote)]
+        if role in self._plan.deployment.nodes:
+            return ["foosim-node", "--name", role, "--connect", info.simulation, *pki]
+        return ["foosim-player", "--name", role, "--connect", info.radio, *pki]
+
+    def _shared(self, process: Process, info: RunInfo | None, remote: Remote | None) -> list[str]:
+        deployment, roles = self._plan.deployment, process.roles
+        if all(role in deployment.players for role in roles):
+            assert info is not None
+            words = [word for role in roles for word in ("--name", role)]
+            return ["foosim-player", *words, "--connect", info.radio, *self._pki(remote)]
+        command = [PROCESS, process.name]
+        if SUPERVISOR in roles:
+            command += ["--run", self._folder.name]
+        else:
+            assert info is not None
+            command += ["--connect", info.simulation, *self._pki(remote)]
+            command += ["--radio", info.radio] if self.needs_radio(process) else []
+        if VHUB in roles:
+            command += ["--vhub-listen", self._radio_address(info, remote), *self._records(remote)]
+            command += ["--insecure"] if self._plan.options.insecure else []
+        for option, declared in (("--node", set(deployment.nodes)), ("--player", set(deployment.players))):
+            command += [word for role in roles if role in declared for word in (option, role)]
+        return command
+
+    def _radio_address(self, info: RunInfo | None, remote: Remote | None) -> str:
+        """Return where the vHub listens: at the address that clients know, once it has listened."""
+        address = self._plan.address
+        known = info is not None and info.radio
+        listen = replace(address, port=parse_address(info.radio).port) if known and info else address.next_port()
+        return str(listen if remote is None else replace(listen, host=remote.host.address))
+
+    def _records(self, remote: Remote | None) -> list[str]:
+        """Return where the vHub writes journal and capture; on a remote machine into the guard's folder of the run."""
+        folder, capture = (self._folder.path, self._capture) if remote is None else (Path(), Path(CAPTURE))
+        written = ["--no-capture"] if self._capture is None else ["--capture", str(capture)]
+        return ["--run-folder", str(folder), *written]
+
+    def _pki(self, remote: Remote | None) -> list[str]:
+        """Return the folder of a process's certificate: of this machine, or of the one that it runs on."""
+        given = self._plan.options.pki_arguments()
+        return remote.pki_arguments() if given and remote is not None else given

@@ -1,0 +1,105 @@
+"""Which roles of a run share a process, in each shape, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foosim.common.errors import BadValue, DeploymentError
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.processes import joint_processes, parse_shape, processes_of
+from foosim.deployment.schema import Deployment
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+
+
+def deployed(*sets: str, file: str = "table.yaml") -> Deployment:
+    return load_deployment(apply_sets((DEPLOY / file).read_text(), file, sets), file)
+
+
+def roles(deployment: Deployment, shape: str) -> dict[str, tuple[str, ...]]:
+    return {name: process.roles for name, process in processes_of(deployment, parse_shape(shape)).items()}
+
+
+def test_each_role_has_a_process_of_its_own() -> None:
+    found = roles(deployed("nodes.red.process=main", "supervisor.process=main"), "each")
+    names = ["supervisor", "vhub", "blue", "red", "player-blue", "player-red"]
+    assert list(found) == names and found == {name: (name,) for name in names}
+
+
+def test_players_that_share_a_process_do_so_in_each_shape() -> None:
+    sets = ("players.player-red.process=teams", "players.player-blue.process=teams")
+    assert roles(deployed(*sets), "each")["teams"] == ("player-blue", "player-red")
+
+
+def test_one_has_all_roles_of_a_machine_but_for_nodes_that_are_started_by_hand() -> None:
+    assert roles(deployed(), "one") == {
+        "one": ("vhub", "supervisor", "blue", "red", "player-blue", "player-red"),
+    }
+    assert roles(deployed("nodes.red.launch=manual"), "one") == {
+        "one": ("vhub", "supervisor", "blue", "player-blue", "player-red"),
+        "red": ("red",),
+    }
+
+
+def test_one_has_a_process_for_each_host() -> None:
+    sets = (
+        "hosts.left={address: 10.0.0.2}",
+        "hosts.right={address: 10.0.0.3}",
+        "nodes.red.host=left",
+        "vhub.host=left",
+    )
+    found = roles(deployed(*sets, "nodes.blue.host=right"), "one")
+    assert found == {"one": ("supervisor", "player-blue", "player-red"), "one-left": ("vhub", "red"), "blue": ("blue",)}
+
+
+def test_the_deployment_says_which_roles_share() -> None:
+    sets = ("supervisor.process=main", "vhub.process=main", "players.player-red.process=main")
+    found = roles(deployed(*sets), "deployed")
+    assert found["main"] == ("vhub", "supervisor", "player-red") and next(iter(found)) == "main"
+    assert found["red"] == ("red",) and found["player-blue"] == ("player-blue",)
+
+
+def test_processes_that_connect_with_several_roles_have_an_identity() -> None:
+    sets = (
+        "hosts.left={address: 10.0.0.2}",
+        "nodes.red.host=left",
+        "nodes.blue.host=left",
+        "players.player-red.host=left",
+    )
+    assert list(joint_processes(deployed(*sets))) == ["one-left"]
+    sets = ("vhub.process=hub", "nodes.red.process=hub", "supervisor.process=main", "nodes.blue.process=main")
+    assert list(joint_processes(deployed(*sets))) == ["hub"], "the supervisor's connects to none"
+
+
+@pytest.mark.parametrize(
+    ("sets", "problem"),
+    [
+        (("nodes.red.process=vhub",), "nodes.red.process: a reserved name"),
+        (("nodes.red.process=player-red",), "nodes.red.process: a name that is also one of players"),
+        (("vhub.process=red",), "vhub.process: a name that is also one of nodes"),
+        (
+            (
+                "hosts.left={address: 10.0.0.2}",
+                "nodes.red.host=left",
+                "nodes.red.process=main",
+                "supervisor.process=main",
+            ),
+            "nodes.red.process: a process whose roles are not all on the same host",
+        ),
+        (
+            ("nodes.red.launch=manual", "nodes.red.process=main"),
+            "nodes.red.process: a process for a node with `launch: manual`, which has its own",
+        ),
+    ],
+)
+def test_what_cannot_share_is_refused_with_its_place(sets: tuple[str, ...], problem: str) -> None:
+    with pytest.raises(DeploymentError) as refused:
+        deployed(*sets)
+    assert problem in str(refused.value)
+
+
+def test_an_unknown_shape_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(BadValue, match="not one of deployed, one, each"):
+        parse_shape("on")
