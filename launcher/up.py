@@ -49,6 +49,8 @@ AWAY_S: Final = 10.0
 """The same for other machines, whose process ends are noticed later."""
 LOST_S: Final = 3.0
 """Time for the supervisor to notice the end of a child; it does not know one that never sent a hello."""
+HANGS_MAX: Final = 2
+"""A process with supervisor and players that has hung so often is given up: a player would make it hang again."""
 ENDED: Final = ("ended", "failed")
 """States of a run that only waits for its vHub to close the capture."""
 
@@ -107,9 +109,12 @@ class Up:
         self._is_resumed = resumed is not None
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
-        with_supervisor = self._roles(self._process_of[SUPERVISOR])
-        has_players = any(role in plan.deployment.players for role in with_supervisor)
-        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines, has_players)
+        declared = plan.deployment.players
+        self._beside = [declared[role] for role in self._roles(self._process_of[SUPERVISOR]) if role in declared]
+        """The players that share the supervisor's process."""
+        self._hangs = 0
+        """How often the supervisor's process was killed because it hung."""
+        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines, has_players=bool(self._beside))
         self._stalled_watch = StalledWatch(plan.deployment.deadlines)
         self._control: Control | None = None
         self._status: dict[str, Any] = {}
@@ -318,6 +323,7 @@ class Up:
             self._supervisor_watch.found()
         why = self._supervisor_watch.why_killed(self._own_time.at(time.monotonic()))
         if why and not self._has_ended and not self._ending_s:
+            self._hangs += not supervisor.killed
             self._kill(supervisor, why)
 
     def _kill(self, child: Child, why: str) -> None:
@@ -330,6 +336,9 @@ class Up:
         over = self._ending_s or self._has_ended or self.folder.result() is not None
         began = self.folder.info() is not None or supervisor.how.is_by_signal
         if over or not began or supervisor.exit_code in (DONE, REFUSED):
+            return False
+        may_restart = all(player.restart for player in self._beside) or not self._has_begun
+        if not may_restart or (self._beside and self._hangs >= HANGS_MAX):
             return False
         if not self._restarts.is_known(supervisor.name):
             self._restart_later(supervisor, now_s)

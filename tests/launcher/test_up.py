@@ -206,6 +206,46 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
     up._launcher.close()
 
 
+def test_a_process_with_players_that_hangs_twice_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may take as long as a player may; what makes it hang is in a player, which would do so again."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE, processes="one")), None, Display(said), "run")
+    up._has_begun = True
+    for again in (True, False):
+        up._launch("one", ["sleep", "100"])
+        process = up._launcher.children["one"]
+        up.folder.write_info(RunInfo("run", "table", str(TABLE), process.process.pid, "", "tcp/127.0.0.1:1"))
+        up._end_stalled_supervisor(process)
+        for _ in range(14):
+            up._supervisor_watch.unanswered()
+        up._end_stalled_supervisor(process)
+        assert process.exit_code is None, "deadlines.lockstep_fast is 10 s"
+        up._supervisor_watch.unanswered()
+        up._end_stalled_supervisor(process)
+        process.process.wait()
+        monkeypatch.setattr(up, "_start_due", lambda now_s: None)
+        assert up._supervisor_comes_back(process, 0.0) == again
+        up._restarts.forget("one")
+    assert "one does not answer any more: it is killed (it had not answered for 15 s)" in said.getvalue()
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(("sets", "comes_back"), [((), True), (("players.player-red.restart=false",), False)])
+def test_a_process_with_a_player_that_must_not_restart_is_not_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sets: tuple[str, ...], comes_back: bool
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE, sets=sets, processes="one")), None, Display(io.StringIO()), "run")
+    up._has_begun = True
+    up._launch("one", ["sh", "-c", "kill -9 $$"])
+    process = up._launcher.children["one"]
+    process.process.wait()
+    monkeypatch.setattr(up, "_start_due", lambda now_s: None)
+    assert up._supervisor_comes_back(process, 0.0) == comes_back
+    up._launcher.close()
+
+
 @pytest.mark.parametrize(
     ("ends", "sets", "begun", "starts", "ends_run"),
     [
