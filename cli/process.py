@@ -55,6 +55,8 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     """
     die_with_parent()
     end_with_stack()
+    if not (run or vhub_listen or node or player):
+        raise BadValue("a role is missing: --run, --vhub-listen, --node or --player", name)
     supervisor = None
     if run is not None:
         folder = open_run(run)
