@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.skipif(bool(sshd.missing()), reason=sshd.missing())
 
-OWN: Final = ("ca.pem", "node.blue.key", "node.blue.pem", "vhub.key", "vhub.pem")
+OWN: Final = (
+    *("ca.pem", "node.blue.key", "node.blue.pem", "process.one-there.key", "process.one-there.pem"),
+    *("vhub.key", "vhub.pem"),
+)
 PLACED: Final = ("nodes.blue.host=there", "vhub.host=there", "players={}", "engine=pure", LONG)
 
 
@@ -83,9 +86,15 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
         assert found["there", *about]["state"] == "fine"
     assert ("there", "certificates", "node.red") not in found and ("here", "certificates", "node.red") in found
 
-    code, out, err = house.end(house.start("foosim-supervisor", "up", *asked, "--for", "20 ms", "--json"))
-    assert code == 0, err
-    assert capture_info(Path(house.folder / last_json(out)["capture"])).finished, "home from the vHub's host"
+    digests = []
+    for shape in ("each", "one"):
+        run = [*asked, "--for", "20 ms", "--json", "--processes", shape]
+        code, out, err = house.end(house.start("foosim-supervisor", "up", *run))
+        assert code == 0, err
+        content = last_json(out)
+        assert capture_info(Path(house.folder / content["capture"])).finished, "home from the vHub's host"
+        digests.append(content["digest"])
+    assert digests[0] == digests[1] and "process one-there has vhub, blue" in err
 
 
 def why_silent(remote: Remote, limit_s: float = LIMIT_S) -> tuple[str, str]:
