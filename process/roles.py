@@ -76,10 +76,8 @@ def run_roles(roles: Roles) -> int:
         supervisor, simulation, credentials = None, None, None
         if roles.supervisor is not None:
             plan, folder = roles.supervisor
-            settings, records = (
-                plan.settings(folder.name, is_launched=True),
-                partial(supervisor_records, folder, plan.options),
-            )
+            settings = plan.settings(folder.name, is_launched=True)
+            records = partial(supervisor_records, folder, plan.options)
             supervised = open_supervisor(process, settings, plan.address, roles.pki, folder, records)
             supervisor = opened.enter_context(supervised)
             simulation = supervisor.session
