@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,7 +15,7 @@ from foosim.runtime.command import PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import die_with_parent, end_with_stack
 from foosim.runtime.run_folder import open_run
-from foosim.vhub.main import HubOptions
+from foosim.vhub.main import CaptureOption, InsecureOption, NoCaptureOption, RunFolderOption, read_options
 
 app = new_app()
 
@@ -31,14 +30,10 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     vhub_listen: Annotated[
         str | None, typer.Option(help="Run the vHub, and listen for clients at this HOST:PORT.")
     ] = None,
-    insecure: Annotated[
-        bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
-    ] = False,
-    capture: Annotated[
-        Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")
-    ] = None,
-    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
-    run_folder: Annotated[Path | None, typer.Option(help="Folder of the vHub's journal; by default RUN.vhub.")] = None,
+    insecure: InsecureOption = False,
+    capture: CaptureOption = None,
+    no_capture: NoCaptureOption = False,
+    run_folder: RunFolderOption = None,
     node: Annotated[list[str] | None, typer.Option(help="Run this node; may be repeated.")] = None,
     player: Annotated[list[str] | None, typer.Option(help="Run this player; may be repeated.")] = None,
     radio: Annotated[str, typer.Option(help="Address of the vHub's radio plane in another process.")] = "",
@@ -69,7 +64,7 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     hub = None
     if vhub_listen is not None:
         address = check_listen(vhub_listen, insecure, secured=pki is not None)
-        hub = HubOptions(capture, not no_capture, run_folder), address
+        hub = read_options(capture, no_capture, run_folder), address
     given = tuple(node or ()), tuple(player or ())
     raise typer.Exit(run_roles(Roles(name, supervisor, hub, *given, connect, radio, pki, progress_file)))
 

@@ -95,9 +95,10 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 ) -> None:
     """Run a deployment, on this machine and its hosts, until Ctrl-C or --for.
 
-    The supervisor, the vHub, each node and each player are processes, each with a log file; they end with this command.
-    Ctrl-C ends the run in order and finishes the capture; a second Ctrl-C kills all processes. Processes on other hosts
-    are started through ssh. For a node with `launch: manual` the command line is printed, and the run waits for it.
+    The supervisor, the vHub, each node and each player are processes, each with a log file, unless roles share one
+    (--processes). They end with this command. Ctrl-C ends the run in order and finishes the capture; a second Ctrl-C
+    kills all processes. Processes on other hosts are started through ssh. For a node with `launch: manual` the command
+    line is printed, and the run waits for it.
 
     --from starts the world with the newest captured frame at or before that time; with @last, or without a time, with
     the last frame. Simulated time continues from that frame, and --for counts from it. The deployment may differ from

@@ -436,6 +436,21 @@ def _radio_session(
         return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, Security(credentials, access, str(path)))
 
 
+InsecureOption = Annotated[bool, typer.Option("--insecure", help="Listen for other machines without certificates.")]
+CaptureOption = Annotated[Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")]
+NoCaptureOption = Annotated[bool, typer.Option("--no-capture", help="Write no capture.")]
+RunFolderOption = Annotated[Path | None, typer.Option(help="Folder of the vHub's journal; by default RUN.vhub.")]
+
+
+def read_options(
+    capture: Path | None, no_capture: bool, run_folder: Path | None, progress: Path | None = None
+) -> HubOptions:
+    """Return the options of a vHub as a command has them. Raises BadValue for a contradiction."""
+    if no_capture and capture is not None:
+        raise BadValue("--no-capture and --capture exclude each other", str(capture))
+    return HubOptions(capture, not no_capture, run_folder, progress)
+
+
 app = new_app()
 
 
@@ -443,14 +458,10 @@ app = new_app()
 def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     listen: Annotated[str, typer.Option(help="Address for clients; port 0 is any free port.")] = LOOPBACK,
-    insecure: Annotated[
-        bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
-    ] = False,
-    capture: Annotated[
-        Path | None, typer.Option(help="The capture to write; by default captures/WORLD-TIME.mcap.")
-    ] = None,
-    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
-    run_folder: Annotated[Path | None, typer.Option(help="Folder of the journal; by default RUN.vhub.")] = None,
+    insecure: InsecureOption = False,
+    capture: CaptureOption = None,
+    no_capture: NoCaptureOption = False,
+    run_folder: RunFolderOption = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
@@ -463,9 +474,7 @@ def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     deployment's `deadlines.orphan` or another failure ended it, 3 when the supervisor refused it.
     """
     die_with_parent()
-    if no_capture and capture is not None:
-        raise BadValue("--no-capture and --capture exclude each other", str(capture))
-    options = HubOptions(capture, not no_capture, run_folder, progress_file)
+    options = read_options(capture, no_capture, run_folder, progress_file)
     raise typer.Exit(run_vhub(connect, listen, insecure, options, pki))
 
 

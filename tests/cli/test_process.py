@@ -19,6 +19,11 @@ from tests.conftest import Typed
             "--radio is missing: the address of the vHub, which players need, 'player-red'",
         ),
         (("--vhub-listen", "0.0.0.0:1", "--connect", "tcp/127.0.0.1:1"), 3, "--insecure"),
+        (
+            ("--vhub-listen", "127.0.0.1:0", "--connect", "tcp/127.0.0.1:1", "--capture", "a.mcap", "--no-capture"),
+            2,
+            "--no-capture and --capture exclude each other, 'a.mcap'",
+        ),
         (("--run", "nope"), 1, "no run 'nope'"),
     ],
 )
