@@ -97,7 +97,7 @@ bench: compiled
 	@.venv-compiled/bin/python -m bench $(ARGS)
 
 compiled: environment
-	@sh tools/compiled.sh
+	@sh tools/compiled.sh $(PACKAGES)
 
 environment:
 	@sh tools/environment.sh

@@ -26,7 +26,7 @@ from foosim.capture.parts import (
 from foosim.capture.rows import ROW_TYPES, row_schema
 from foosim.common.json_text import encode_json
 from foosim.protocol.messages import End
-from foosim.world.initial_state import Origin
+from foosim.world.start import Origin
 
 DEPLOYMENT: Final = "deployment.yaml"
 ASSETS: Final = "assets/"

@@ -69,11 +69,12 @@ from foosim.deployment.loader import load_deployment, load_earlier
 from foosim.deployment.schema import Deployment
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
-from foosim.world.initial_state import Origin, first_chain
+from foosim.world.initial_state import first_chain
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered
 from foosim.world.scene import Body
 from foosim.world.scenes.build import build_scene
+from foosim.world.start import Origin
 
 DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
 """Decodes and checks a row of each topic."""

@@ -15,12 +15,14 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import Scan, chain_at_start, deployment_of, layout_of
 from foosim.capture.rows import FRAME, LAYOUT, TICK, FrameRow, LayoutRow, TickRow
 from foosim.common.errors import BadValue, Malformed, Refused
+from foosim.common.new_run import new_run_text
 from foosim.common.units import format_ns, parse_ns
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, Start, new_run_text, start_with
+from foosim.world.initial_state import start_with
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Outbox
+from foosim.world.start import AddedEntity, Start
 
 LAST: Final = "last"
 """The word for the time of the last captured frame."""

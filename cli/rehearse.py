@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from foosim.cli.options import with_options
+from foosim.cli.run_command import with_options
 from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
@@ -21,6 +21,7 @@ from foosim.deployment.loader import load_deployment, read_deployment_text
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.protocol.run_status import score_text
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
@@ -28,7 +29,6 @@ from foosim.rehearsal.swarm.campaign import Flown, fly
 from foosim.rehearsal.swarm.faults import TICKS
 from foosim.rehearsal.system import Settings
 from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
-from foosim.supervisor.status import score_text
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 

@@ -1,6 +1,7 @@
 """The command `foosim-supervisor`: runs a deployment, and controls a run from another terminal.
 
-Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `control`, `protocol.deployment_file`.
+Each subcommand is a thin shell over a typed function: `launcher.begin`, `supervisor.main.serve`, `client.control`.
+Each imports what it calls, so `--help` and the commands that need little start quickly.
 """
 
 from __future__ import annotations
@@ -9,45 +10,22 @@ import sys
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from foosim.cli.options import with_options
-from foosim.client import control
+from foosim.cli.run_command import with_options
 from foosim.common.errors import BadValue, Refused, read_at
-from foosim.common.json_text import encode_json
-from foosim.common.units import parse_pace
-from foosim.deployment.schema import places
-from foosim.launcher.console_child import Page, page_of
-from foosim.launcher.crash_recovery import recover_leftovers
-from foosim.launcher.detach import detach
-from foosim.launcher.display import Display, render_text
-from foosim.launcher.hosts.install import install, is_root_there, write_units
-from foosim.launcher.hosts.ssh import Remote, unit_name
-from foosim.launcher.hosts.systemd_units import units_of
-from foosim.launcher.journal_check import supervisor_records
-from foosim.launcher.new_capture import check_capture, check_rooms, default_capture
-from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome, refused_result
-from foosim.launcher.pki.hosts import files_for, send_files
-from foosim.launcher.plan import (
-    Plan,
-    check_certificates,
-    check_models_here,
-    check_players_here,
-    make_plan,
-    plan_again,
-)
 from foosim.launcher.run_options import RunOptions
-from foosim.launcher.up import Killed, Up
-from foosim.protocol.channels import VHUB
-from foosim.protocol.messages import Answer
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.process import has_launcher
-from foosim.runtime.run_folder import RunFolder, create_run, open_run, run_exists, runs_folder
 from foosim.runtime.usage import BadUsage
-from foosim.supervisor.main import serve
+
+if TYPE_CHECKING:
+    from foosim.launcher.outcome import Outcome
+    from foosim.launcher.up import Up
+    from foosim.protocol.messages import Answer
 
 app = new_app()
 
@@ -106,6 +84,13 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 
     --resume continues a run whose launcher died, from its last committed frame and with its options.
     """
+    from foosim.launcher.begin import begin, go_on
+    from foosim.launcher.console_child import page_of
+    from foosim.launcher.display import Display
+    from foosim.launcher.outcome import refused_result
+    from foosim.launcher.up import Killed, Up
+    from foosim.runtime.run_folder import open_run
+
     display = Display(sys.stderr if json else sys.stdout)
     begun: Up | Outcome | None = None
     try:
@@ -113,13 +98,13 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         if resumed is not None:
             if given := _given(context, but=BESIDE_RESUME):
                 raise BadValue(f"--resume takes FILE and options from the run, it goes without {', '.join(given)}")
-            begun = _go_on(open_run(resumed), display, page)
+            begun = go_on(open_run(resumed), display, page)
         elif options is None:
             raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
         elif no_capture and capture is not None:
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
-            begun = _begin(options, capture, not no_capture, run, detached, display, page)
+            begun = begin(options, capture, not no_capture, run, detached, display, page)
         outcome = begun.run() if isinstance(begun, Up) else begun
     except Killed as killed:
         print(killed, file=sys.stderr)
@@ -148,57 +133,9 @@ def _given(context: typer.Context, but: Collection[str]) -> list[str]:
 
 def _print_result(result: Mapping[str, Any], json: bool) -> None:
     if json:
+        from foosim.common.json_text import encode_json
+
         print(encode_json(result).decode())
-
-
-def _begin(
-    options: RunOptions,
-    capture: Path | None,
-    captures: bool,
-    run: str | None,
-    detached: bool,
-    display: Display,
-    console: Page | None,
-) -> Up | Outcome:
-    """Return a new run that the caller runs, or start it detached.
-
-    `captures` is whether a capture is written; without a `capture` its path is the default.
-    """
-    plan = make_plan(options)
-    check_models_here(plan)
-    check_players_here(plan)
-    found = capture or default_capture(plan.deployment.world)
-    path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
-    _look_for_room(plan, path, runs_folder(), display)
-    _prepare(plan, display, None)
-    if detached:
-        return detached_outcome(detach(plan, path, run), plan.deployment, path)
-    return Up(plan, path, display, run, console=console)
-
-
-def _go_on(folder: RunFolder, display: Display, console: Page | None) -> Up | Outcome:
-    """Return a run to be resumed, or the outcome of one that has ended."""
-    if folder.result() is not None:
-        recover_leftovers(display.say)
-        return ended_outcome(folder)
-    plan, path = plan_again(folder)
-    check_players_here(plan)
-    _look_for_room(plan, path, folder.path, display)
-    _prepare(plan, display, folder.name)
-    return Up(plan, path, display, None, folder, console)
-
-
-def _look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
-    """Raise Refused where a disk is too full to begin, and warn where it is nearly full."""
-    captured_here = None if VHUB in places(plan.deployment) else capture
-    for warning in check_rooms(plan.deployment.capture, captured_here, runs):
-        display.say(warning)
-
-
-def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
-    for warning in check_certificates(plan):
-        display.say(warning)
-    recover_leftovers(display.say, but=resumed)
 
 
 @app.command("run")
@@ -212,10 +149,20 @@ def run_supervisor(
 
     The vHub, nodes and players are started separately. The run's folder has the run file, logs and journals.
     """
+    from foosim.launcher.journal_check import supervisor_records
+    from foosim.launcher.plan import make_plan
+    from foosim.runtime.process import has_launcher
+    from foosim.runtime.run_folder import create_run, open_run, run_exists
+    from foosim.supervisor.main import serve
+
     plan = make_plan(options)
     is_launched = has_launcher()
     if not is_launched:  # a launcher has checked, and watches the disks
-        _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
+        from foosim.launcher.begin import look_for_room
+        from foosim.launcher.display import Display
+        from foosim.runtime.run_folder import runs_folder
+
+        look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     settings, records = (
         plan.settings(folder.name, is_launched=is_launched),
@@ -227,20 +174,23 @@ def run_supervisor(
 @app.command()
 def status(run: Run = None, json: Json = False) -> None:
     """Show the state of a run: time, lag, nodes, links, score."""
-    content = control.status(run)
+    from foosim.common.json_text import encode_json
+    from foosim.launcher.display import render_text
+
+    content = _control().status(run)
     print(encode_json(content).decode() if json else render_text(content).rstrip())
 
 
 @app.command()
 def pause(run: Run = None, json: Json = False) -> None:
     """Pause simulated time, after the ticks that are released already."""
-    _show(control.pause(run), json)
+    _show(_control().pause(run), json)
 
 
 @app.command()
 def resume(run: Run = None, json: Json = False) -> None:
     """Continue after a pause."""
-    _show(control.resume(run), json)
+    _show(_control().resume(run), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -248,7 +198,7 @@ def step(
     count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1, run: Run = None, json: Json = False
 ) -> None:
     """Simulate a number of ticks, then pause."""
-    _show(control.step(count, run), json)
+    _show(_control().step(count, run), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -258,8 +208,10 @@ def rate(
     json: Json = False,
 ) -> None:
     """Change how fast simulated time passes."""
+    from foosim.common.units import parse_pace
+
     read_at("foosim-supervisor rate PACE", parse_pace, pace)
-    _show(control.rate(pace, run), json)
+    _show(_control().rate(pace, run), json)
 
 
 Numbers = tuple[float, float, float]
@@ -276,7 +228,7 @@ def add(
 ) -> None:
     """Add a ball; by default it rests at the kick-off spot."""
     place = None if position is None else _three("position", "m", position)
-    _show(control.add(name, place, None if velocity is None else _three("velocity", "m/s", velocity), run), json)
+    _show(_control().add(name, place, None if velocity is None else _three("velocity", "m/s", velocity), run), json)
 
 
 @app.command()
@@ -284,7 +236,7 @@ def remove(
     name: Annotated[str, typer.Argument(help="Which ball.", show_default=False)], run: Run = None, json: Json = False
 ) -> None:
     """Remove a ball that was added."""
-    _show(control.remove(name, run), json)
+    _show(_control().remove(name, run), json)
 
 
 @app.command()
@@ -295,13 +247,13 @@ def move(
     json: Json = False,
 ) -> None:
     """Move a robot to another node; the world stays the same."""
-    _show(control.move(robot, node, run), json)
+    _show(_control().move(robot, node, run), json)
 
 
 @app.command()
 def balance(run: Run = None, json: Json = False) -> None:
     """Move robots from busy nodes to idle ones, once; prints the robots and the loads."""
-    _show(control.balance(run), json)
+    _show(_control().balance(run), json)
 
 
 Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
@@ -310,7 +262,7 @@ Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
 @app.command()
 def stop(node: Node, run: Run = None, json: Json = False) -> None:
     """Stop a node, after its robots have moved to the other nodes."""
-    _show(control.stop(node, run), json)
+    _show(_control().stop(node, run), json)
 
 
 @app.command()
@@ -320,7 +272,7 @@ def start(node: Node, run: Run = None, json: Json = False) -> None:
     `up` starts the process of a local node and counts its failures anew. A node with `launch: manual` is started by
     hand.
     """
-    _show(control.start(node, run), json)
+    _show(_control().start(node, run), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -336,7 +288,7 @@ def push(
 
     An impulse of 0.021 N s changes the velocity of a ball of 21 g by 1 m/s.
     """
-    _show(control.push(_three("impulse", "N s", impulse), name, run), json)
+    _show(_control().push(_three("impulse", "N s", impulse), name, run), json)
 
 
 def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
@@ -354,11 +306,20 @@ def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
 @app.command()
 def down(run: Run = None, json: Json = False) -> None:
     """End a run in order."""
-    _show(control.down(run), json)
+    _show(_control().down(run), json)
+
+
+def _control() -> ModuleType:
+    """Return the functions that connect to a run."""
+    from foosim.client import control
+
+    return control
 
 
 def _show(answer: Answer, json: bool) -> None:
     """Print the supervisor's answer."""
+    from foosim.common.json_text import encode_json
+
     print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
 
 
@@ -370,6 +331,9 @@ def validate(options: RunOptions, json: Json = False) -> None:
     Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
     classes of the players on this machine are imported, in a separate process.
     """
+    from foosim.common.json_text import encode_json
+    from foosim.launcher.plan import check_players_here, make_plan
+
     plan = make_plan(options)
     check_players_here(plan)
     deployment = plan.deployment
@@ -405,6 +369,12 @@ def install_units(  # a command's options
     With --pki the units are for runs with certificates. A node reads its certificate from the folder in the host's
     `pki` setting; the files are sent there as by `foosim-pki init --send`.
     """
+    from foosim.launcher.hosts.install import install, is_root_there, write_units
+    from foosim.launcher.hosts.ssh import Remote, unit_name
+    from foosim.launcher.hosts.systemd_units import units_of
+    from foosim.launcher.pki.hosts import files_for, send_files
+    from foosim.launcher.plan import make_plan
+
     plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
     deployment = plan.deployment
     units = units_of(deployment, host, plan.address, user)
@@ -429,6 +399,8 @@ def install_units(  # a command's options
 def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:
     """Print the JSON object of `up --json` when its options are invalid, too."""
     if words[:1] == ["up"]:
+        from foosim.launcher.outcome import refused_result
+
         _print_result(refused_result(None, None, str(problem)), "--json" in words)
 
 

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 from typing import Final
 
-import numpy as np
-
 from foosim.common.finding import Finding
 from foosim.deployment.schema import Deployment
 from foosim.world.islands import line_x_m
@@ -111,6 +109,8 @@ def _parts(shape: Shape, body: _Swept) -> Iterator[tuple[Nearest, Reach]]:
         size = geometry.radius, geometry.length / 2
         yield _in_cylinder(place, orientation, *size), _reach_of_cylinder(place, orientation, *size)
     elif isinstance(geometry, Mesh):
+        import numpy as np  # which no other table needs
+
         turned = np.array([rotate(orientation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))])
         corners = (geometry.vertices @ turned + place)[geometry.triangles]
         is_near = (corners.min(axis=1) < body.high) & (body.low < corners.max(axis=1))

@@ -14,9 +14,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from foosim.protocol.run_status import CLOSING, score_text
 from foosim.runtime.disk import megabytes
-from foosim.supervisor.status import score_text
-from foosim.vhub.recording.disk_watch import CLOSING
 
 LINKS_SHOWN_MAX: Final = 20
 ENTITIES_SHOWN_MAX: Final = 6

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from foosim.capture.start_frame import branch_command
 from foosim.common.errors import Malformed, Refused
 from foosim.launcher.crash_recovery import captured_at
 from foosim.launcher.run_options import RunOptions
@@ -48,6 +47,8 @@ def _checked(
     if damaged is not None:
         tick = _tick(whole, last_tick)
         what = f"{damaged}; {'no tick is' if tick < 0 else f'tick {tick} is the last'} before it"
+    from foosim.capture.start_frame import branch_command  # brings the reader of captures
+
     capture = captured_at(folder)
     if capture is None:
         launch = folder.launch()

@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from foosim.capture.foxglove import LOG
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import first_there, has_end, is_complete, parts_at
-from foosim.capture.reader import Scan
-from foosim.capture.rows import EPOCHS, PACKETS, TICK
 from foosim.deployment.schema import Deployment
 from foosim.launcher.display import recording_text
+from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.runtime.run_folder import RunFolder, open_run, run_exists
-from foosim.supervisor.status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 
 _UNKNOWN: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("run", "world", "seed", "ticks", "first_tick", "tick_ns", "rtf", "lag_ms", "lateness_ms")),
@@ -122,4 +119,8 @@ def with_capture(result: Mapping[str, Any], capture: Path | None) -> dict[str, A
 
 def _rows_in(path: Path) -> int:
     """Return the numbers of ticks, packets, epochs and lines of a capture, as its writer counts them."""
+    from foosim.capture.foxglove import LOG
+    from foosim.capture.reader import Scan
+    from foosim.capture.rows import EPOCHS, PACKETS, TICK
+
     return sum(1 for _ in Scan(path).messages(frozenset({TICK, PACKETS, EPOCHS, LOG})))

@@ -1,13 +1,15 @@
-"""What a run is asked for, and the same checked, before anything is started."""
+"""What a run is asked for, and the same checked, before anything is started.
+
+What only some runs need is imported where they do: the reader of captures, the trial of meshes, numpy.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from foosim.capture.start_frame import Branch, read_branch
-from foosim.client.class_check import player_findings
 from foosim.common import wall_clock
 from foosim.common.addresses import Address, check_listen
 from foosim.common.errors import BadValue, Refused, read_at
@@ -17,17 +19,18 @@ from foosim.deployment.loader import apply_sets, load_deployment, read_deploymen
 from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.table_clearance import clearance_findings
-from foosim.launcher.resumable import check_resumable
 from foosim.launcher.run_options import RunOptions, launched_options
-from foosim.node.engines.mesh_trial import check_models
 from foosim.protocol import identity
 from foosim.protocol.channels import VHUB
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
-from foosim.supervisor.settings import RunSettings
-from foosim.vhub.network.custom_models import check_link_models
-from foosim.world.initial_state import Start
+from foosim.world.scenery import SceneryMesh
 from foosim.world.scenes.hall_start import start_findings
+
+if TYPE_CHECKING:
+    from foosim.capture.start_frame import Branch
+    from foosim.supervisor.settings import RunSettings
+    from foosim.world.start import Start
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +57,8 @@ class Plan:
 
     def settings(self, run: str, *, is_launched: bool = False) -> RunSettings:
         """Return the settings of the supervisor of the run with this name; `is_launched`: `up` starts its processes."""
+        from foosim.supervisor.settings import RunSettings
+
         name, balance = str(self.options.file), self.options.balance
         again = replace(self.options, branch=None).arguments()
         shared = {role: its.name for its in self.processes.values() if len(its.roles) > 1 for role in its.roles}
@@ -82,6 +87,8 @@ def check_certificates(plan: Plan) -> list[str]:
 
 def check_models_here(plan: Plan) -> None:
     """Raise DeploymentError for a link model that cannot be loaded, unless the vHub runs (and checks) elsewhere."""
+    from foosim.vhub.network.custom_models import check_link_models
+
     if VHUB not in places(plan.deployment):
         file, network = plan.options.file, plan.deployment.network
         check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
@@ -89,6 +96,8 @@ def check_models_here(plan: Plan) -> None:
 
 def check_players_here(plan: Plan) -> None:
     """Raise DeploymentError for players' classes that cannot be loaded. Other machines have their own classes."""
+    from foosim.client.class_check import player_findings
+
     deployment, elsewhere = plan.deployment, places(plan.deployment)
     findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
     if findings:
@@ -109,7 +118,10 @@ def make_plan(options: RunOptions) -> Plan:
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
-    check_models(deployment, name, text)
+    if any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values()):
+        from foosim.node.engines.mesh_trial import check_models
+
+        check_models(deployment, name, text)
     check_meshes(deployment, options)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
@@ -119,7 +131,11 @@ def make_plan(options: RunOptions) -> Plan:
         ticks = -(-read_at("--for", parse_ns, options.duration) // deployment.tick_ns)
         if ticks == 0:
             raise BadValue("--for: a run has at least one tick", options.duration)
-    branch = None if options.branch is None else read_branch(options.branch, deployment)
+    branch = None
+    if options.branch is not None:
+        from foosim.capture.start_frame import read_branch
+
+        branch = read_branch(options.branch, deployment)
     shape = "deployed" if options.processes is None else read_at("--processes", parse_shape, options.processes)
     processes = processes_of(deployment, shape)
     return Plan(options, text, deployment, pace, ticks, address, branch, files, processes)
@@ -127,6 +143,8 @@ def make_plan(options: RunOptions) -> Plan:
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
     """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot be resumed."""
+    from foosim.launcher.resumable import check_resumable
+
     if folder.is_live() or not folder.is_left():
         raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
     plan, launch = make_plan(launched_options(folder)), folder.launch()

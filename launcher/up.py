@@ -15,17 +15,18 @@ from typing import Any, Final, TypeVar
 
 from foosim.client.control import Control, NoAnswer
 from foosim.common.errors import Failed, Refused
+from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
+from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
+from foosim.launcher.children.processes import Child, Launcher, command_line, counted_signals
+from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands
 from foosim.launcher.console_child import ConsoleChild, Page
 from foosim.launcher.display import Display, recovery_text
 from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
 from foosim.launcher.hosts.ssh import remotes as remotes_of
-from foosim.launcher.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
 from foosim.launcher.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
 from foosim.launcher.plan import Plan
-from foosim.launcher.processes import Child, Launcher, command_line, counted_signals
-from foosim.launcher.restarts import Restarts
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
@@ -33,9 +34,6 @@ from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError
-from foosim.vhub.links.summary import summaries
-from foosim.vhub.links.summary_text import start_lines
-from foosim.world.initial_state import NEW_RUN
 
 POLL_S: Final = 0.02
 """Polling period while a run starts."""
@@ -154,7 +152,7 @@ class Up:
 
     def _start(self) -> bool:
         """Start each process as soon as it can connect; False when the run was over before all had started."""
-        options, folder, display = self.plan.options, self.folder, self.display
+        folder, display = self.folder, self.display
         first, *others = self.plan.processes.values()
         self._begin(first, None)
         display.say(f"run {folder.name}, logs in {folder.logs}")
@@ -163,8 +161,7 @@ class Up:
         for process in self.plan.processes.values():
             if len(process.roles) > 1:
                 display.say(f"process {process.name} has {', '.join(process.roles)}")
-        for line in start_lines(summaries(self.plan.deployment), str(options.file)):
-            display.say(line)
+        self._show_network()  # while the first process starts
         for needs_radio, ready in ((False, self._own_info), (True, self._info_with_radio)):
             info = self._await(ready)
             if info is None:
@@ -184,6 +181,13 @@ class Up:
             fetch_capture(remote, self.folder.name, self.capture)
         except Failed as failed:
             self._not_home = str(failed)
+
+    def _show_network(self) -> None:
+        from foosim.vhub.links.summary import summaries
+        from foosim.vhub.links.summary_text import start_lines
+
+        for line in start_lines(summaries(self.plan.deployment), str(self.plan.options.file)):
+            self.display.say(line)
 
     def _begin(self, process: Process, info: RunInfo | None) -> None:
         """Start a process, or print the command line of a node that is started by hand."""

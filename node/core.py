@@ -44,10 +44,11 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, initial_frame
+from foosim.world.initial_state import initial_frame
 from foosim.world.islands import Assignment, Share, reach_of
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.robot_packets import Outbox
+from foosim.world.start import AddedEntity
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,9 @@ import msgspec
 
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
+from foosim.node.edited_frame import edit
 from foosim.node.engines.interface import Engine
-from foosim.world.edits import Edit, edit
+from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from foosim.common.struct_types import Counter, Digest, Message, Name, Numbers, Text
-from foosim.world.initial_state import Added
+from foosim.world.start import Added
 
 
 class ResumeState(Message, frozen=True):

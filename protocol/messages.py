@@ -15,8 +15,8 @@ from msgspec import Meta, field
 from foosim.common import limits
 from foosim.common.struct_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
 from foosim.world.edits import Edits
-from foosim.world.initial_state import Added, Origin
 from foosim.world.robot_packets import Delivered, Outboxes, RobotPacket
+from foosim.world.start import Added, Origin
 
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 

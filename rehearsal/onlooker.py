@@ -10,9 +10,9 @@ from collections import Counter
 from typing import Final
 
 from foosim.common.names import TEAMS
+from foosim.protocol.run_status import score_text
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.state import RunState
-from foosim.supervisor.status import score_text
 from foosim.world.frame import Frame
 
 LINE_S: Final = 1.0

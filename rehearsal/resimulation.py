@@ -20,9 +20,10 @@ from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Pr
 from foosim.runtime.roles.bus import Bus
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame
-from foosim.world.initial_state import AddedEntity, Start, first_frame
+from foosim.world.initial_state import first_frame
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered, RobotPacket
+from foosim.world.start import AddedEntity, Start
 
 SOURCE = "capture"
 

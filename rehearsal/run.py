@@ -28,7 +28,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
-from foosim.world.initial_state import Start
+from foosim.world.start import Start
 
 
 @dataclass(slots=True)

@@ -14,7 +14,8 @@ from foosim.node.engines.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.frame import CHAIN_START, Frame
-from foosim.world.initial_state import Start, added_to, start_with
+from foosim.world.initial_state import added_to, start_with
+from foosim.world.start import Start
 
 
 class Between:

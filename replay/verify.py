@@ -18,7 +18,8 @@ from foosim.node.engines.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.frame import Frame, chain_next
-from foosim.world.initial_state import Start, added_to, first_chain, start_with
+from foosim.world.initial_state import added_to, first_chain, start_with
+from foosim.world.start import Start
 
 
 @dataclass(frozen=True, slots=True)

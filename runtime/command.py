@@ -8,7 +8,6 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -29,6 +28,8 @@ PKI_VARIABLE: Final = "FOOSIM_PKI"
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version  # brings the parser of e-mail, which is slow
+
         print(f"foosim {version('foosim')}")
         raise typer.Exit(DONE)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from foosim.common.new_run import new_run_text
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.hub_messages import ResumeState
@@ -20,7 +21,6 @@ from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.progress import ClosingMonitor
 from foosim.supervisor.records import History, close_outages
 from foosim.supervisor.state import RunState
-from foosim.world.initial_state import new_run_text
 
 REJOIN_NS: Final = 1_000_000_000
 """How long, beside the deadline of heartbeats, nodes have to find the supervisor again."""

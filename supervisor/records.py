@@ -24,8 +24,9 @@ from foosim.protocol.kept_answers import KeptAnswers
 from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.edits import Disrupt, Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, Start, first_chain, first_frame
+from foosim.world.initial_state import first_chain, first_frame
 from foosim.world.layout import BALL, Layout, build_layout
+from foosim.world.start import AddedEntity, Start
 
 ANSWERS_KEPT: Final = 1024
 """Answers that are kept for requests that are repeated."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.initial_state import Origin, Start
+from foosim.world.start import Origin, Start
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,8 +42,9 @@ from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, added_to, first_chain, first_frame
+from foosim.world.initial_state import added_to, first_chain, first_frame
 from foosim.world.layout import Layout, build_layout
+from foosim.world.start import AddedEntity
 
 
 class InputBuffer:

@@ -12,6 +12,7 @@ from foosim.common.json_text import decode_json
 from foosim.common.names import TEAMS
 from foosim.deployment.schema import places
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
 from foosim.world.frame import Frame
@@ -33,10 +34,6 @@ class SupervisorStatistics:
 
 DISRUPTIONS_SHOWN: Final = 16
 """The last requested events of the network that a status has."""
-NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
-UNFINISHED: Final = "unfinished"
-"""State of a recording that no vHub has reported as closed: its file has no end, or was closed later."""
-NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
 
 def result(state: RunState) -> dict[str, Any]:
@@ -191,8 +188,3 @@ def _state(state: RunState) -> str:
     if not state.is_open:
         return "recovering" if state.is_resuming else "starting"
     return "paused" if state.pacer.paused else "running"
-
-
-def score_text(status: dict[str, Any]) -> str:
-    """`red 2 : 1 blue`."""
-    return f"red {status['score']['red']} : {status['score']['blue']} blue"

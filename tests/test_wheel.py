@@ -75,7 +75,7 @@ def test_what_make_compiled_copies_has_nothing_of_npm(tmp_path: Path) -> None:
     python.parent.mkdir(parents=True)
     python.write_text('#!/bin/sh\n[ "$2" = venv ] && mkdir .venv-compiled\n')  # it fails to build
     python.chmod(0o755)
-    assert subprocess.run(["sh", script], cwd=tmp_path, capture_output=True, check=False).returncode == 1
+    assert subprocess.run(["sh", script, *PACKAGES], cwd=tmp_path, capture_output=True, check=False).returncode == 1
     copied = tmp_path / ".venv-compiled" / "source" / "console" / "page"
     assert (copied / "src" / "main.js").is_file() and not (copied / "node_modules").exists()
 

@@ -1,11 +1,11 @@
 #!/bin/sh
 # Makes .venv-compiled: foosim as pip installs it, with its hot path compiled (setup.py), beside the packages of .venv.
-# Needs a C compiler. `make compiled` calls it; it returns at once when nothing that goes into the wheel has changed.
+# Needs a C compiler. `make compiled` calls it with the packages; it returns at once when nothing that goes into the wheel has changed.
 set -eu
 cd "$(dirname "$0")/.."
 unset PYTHONPATH PYTHONHOME
 python=$PWD/.venv/bin/python
-folders="analysis capture cli client common console deployment launcher node players protocol rehearsal replay runtime supervisor vhub world"
+folders=$*
 files="setup.py pyproject.toml README.md LICENSE"
 
 key() {

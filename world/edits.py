@@ -1,7 +1,4 @@
-"""The edits of an order: what adds, removes, pushes, freezes and thaws, and how frame k is edited before it is solved.
-
-Pure, and evaluated by every node alike.
-"""
+"""The edits of an order: what adds, removes, pushes, freezes and thaws, and the layout after them. Pure."""
 
 from __future__ import annotations
 
@@ -14,10 +11,7 @@ from msgspec import Meta
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
-from foosim.world.frame import Frame
-from foosim.world.initial_state import place_ball
-from foosim.world.layout import ADDABLE, BALL, ROBOTS, WORLD, Entity, Layout
-from foosim.world.spec import WorldSpec
+from foosim.world.layout import ADDABLE, BALL, ROBOTS, WORLD, Layout
 
 
 class Add(Message, frozen=True):
@@ -107,20 +101,6 @@ def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
     return layout if models == layout.models else Layout(models, layout.sensors)
 
 
-def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, list[float]]:
-    """Return layout and numbers of the edited frame; the order's edits apply in their order."""
-    layout = layout_after(frame.layout, edits)
-    numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
-    for change in fitting_edits(frame.layout, edits) if edits else ():
-        if isinstance(change, Add) and change.name in layout:
-            place_ball(numbers, layout[change.name], change.position, change.velocity)
-        elif isinstance(change, Push) and change.name in layout:
-            _push(numbers, layout, change, spec.table.ball.mass)
-        elif isinstance(change, Freeze | Thaw):
-            _take_out(numbers, layout[change.name], isinstance(change, Freeze))
-    return layout, numbers
-
-
 def check_edits(edits: Sequence[Edit]) -> None:
     """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
     for change in edits:
@@ -131,29 +111,3 @@ def check_edits(edits: Sequence[Edit]) -> None:
             numbers = change.impulse
         if not all(isfinite(number) for number in numbers):
             raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")
-
-
-def _moved(frame: Frame, layout: Layout) -> list[float]:
-    """Return a frame's numbers in another layout; entities that are new there are zero."""
-    numbers = [0.0] * layout.size
-    for entity in layout.entities:
-        if entity.name in frame.layout:
-            old = frame.layout[entity.name]
-            numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
-    return numbers
-
-
-def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None:
-    """Change the velocity by impulse / mass."""
-    start = layout[push.name].offsets["linear_velocity"]
-    for axis, impulse in enumerate(push.impulse):
-        numbers[start + axis] += impulse / mass
-
-
-def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
-    """Mark a robot as out of service or back in it; its set-point is then its present position, or speed 0."""
-    numbers[robot.offsets["down"]] = float(is_down)
-    set_point = robot.offsets.get("set_point")
-    if set_point is not None:
-        position = robot.offsets.get("joint_positions")
-        numbers[set_point : set_point + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]

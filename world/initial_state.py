@@ -6,54 +6,17 @@ frame's tick and the chain up to it, so that equal inputs give equal digests.
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterable, Sequence
-from typing import Annotated, Final
+from collections.abc import Iterable
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
-from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed
-from foosim.common.struct_types import Counter, Digest, Item, Name, Numbers, Text
 from foosim.world.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.robot_packets import Outboxes
 from foosim.world.robots.rover import RoverRobot
 from foosim.world.scene import turn
 from foosim.world.spec import WorldSpec
-
-
-class AddedEntity(Item, frozen=True):
-    """An entity that is in the layout beside those of the deployment."""
-
-    name: Name
-    model: Name
-
-
-Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
-
-
-class Origin(Item, frozen=True):
-    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
-    over all frames up to it."""
-
-    tick: Counter
-    source: Text
-    digest: Digest
-    chain: Digest
-
-
-NEW_RUN: Final = "A new run begins with the last captured frame"
-
-
-def new_run_text(arguments: Sequence[str], capture: str) -> str:
-    """Return in words how a run begins with the last frame of a capture; `arguments` are those of the run before."""
-    if not capture:
-        return "The run has no capture to begin a new one with"
-    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@last"]
-    return f"{NEW_RUN}: {shlex.join(command)}"
+from foosim.world.start import AddedEntity, Origin, Start
 
 
 def place_ball(
@@ -111,19 +74,6 @@ def initial_frame(spec: WorldSpec) -> Frame:
     """Return frame 0."""
     layout = build_layout(spec)
     return Frame(0, layout, np.array(initial_numbers(spec, layout)))
-
-
-class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A frame that a run begins with instead of frame 0, and where it comes from.
-
-    `added` are the entities of its layout beside the deployment's. The frame says all: positions and speeds, score, the
-    memory of rules, actuators and sensors, outboxes.
-    """
-
-    origin: Origin
-    values: Numbers
-    outboxes: Outboxes
-    added: Added
 
 
 def start_with(frame: Frame, source: str, chain: bytes, added: Iterable[AddedEntity]) -> Start:

@@ -170,7 +170,12 @@ def in_pieces(shapes: Iterable[Shape], triangles_max: int) -> Iterator[Shape]:
     """Yield shapes; a mesh of more than so many triangles as several, in the order of its triangles."""
     for shape in shapes:
         mesh = shape.geometry
-        for piece in mesh.pieces(triangles_max) if isinstance(mesh, Mesh) else (mesh,):
+        if not isinstance(mesh, Mesh):
+            yield shape
+            continue
+        from foosim.world.mesh_files import pieces  # brings numpy
+
+        for piece in pieces(mesh, triangles_max):
             yield shape if piece is mesh else replace(shape, geometry=piece)
 
 

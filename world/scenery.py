@@ -19,7 +19,7 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.materials import UNKNOWN, Radio
-from foosim.world.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, is_closed, read_mesh
+from foosim.world.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of
 from foosim.world.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, multiply, turn
 
 PATH_LENGTH_MAX: Final = 200
@@ -57,8 +57,8 @@ def _asset_path(path: str) -> str:
 
 def _mesh_path(path: str) -> str:
     _asset_path(path)
-    if path[path.rfind(".") :] not in MESH_READERS:
-        raise custom_error(BadValue(f"no format of a mesh, there are {', '.join(MESH_READERS)}", path))
+    if path[path.rfind(".") :] not in MESH_SUFFIXES:
+        raise custom_error(BadValue(f"no format of a mesh, there are {', '.join(MESH_SUFFIXES)}", path))
     return path
 
 
@@ -170,9 +170,10 @@ def read_contents(
     meshes: dict[str, Mesh] = {}
     known: dict[tuple[str, float], Mesh] = {}
     triangles = 0
-    for name, thing in sorted(scenery.items()):
-        if not isinstance(thing, SceneryMesh):
-            continue
+    things = {name: thing for name, thing in sorted(scenery.items()) if isinstance(thing, SceneryMesh)}
+    if things:
+        from foosim.world.mesh_files import read_mesh  # brings numpy
+    for name, thing in things.items():
         if thing.file not in files:
             raise AssetError(f"{thing.file}: the file of scenery.{name} is missing")
         if thing.digest is not None:
@@ -204,6 +205,10 @@ def scenery_shape(name: str, thing: SceneryThing, mesh: Mesh | None) -> Shape:
 
 def open_meshes(scenery: Mapping[str, SceneryThing], meshes: Mapping[str, Mesh]) -> list[str]:
     """Return the things whose material needs a way through them that their mesh, which is not closed, does not have."""
+    if not meshes:
+        return []
+    from foosim.world.mesh_files import is_closed
+
     return [
         name
         for name, thing in scenery.items()

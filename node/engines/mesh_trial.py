@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Final
 
+import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.engines import ENGINES

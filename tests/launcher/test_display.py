@@ -18,9 +18,9 @@ from foosim.launcher.display import (
     render_text,
 )
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.run_status import NO_PACKETS
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.status import NO_PACKETS
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 HERE = {"host": "", "lost": False, "stopped": False}

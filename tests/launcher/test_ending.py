@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.launcher import memory, processes
-from foosim.launcher.memory import OomKills, oom_kills
-from foosim.launcher.processes import Child
-from foosim.launcher.restarts import Ending
+from foosim.launcher.children import memory, processes
+from foosim.launcher.children.memory import OomKills, oom_kills
+from foosim.launcher.children.processes import Child
+from foosim.launcher.children.restarts import Ending
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.launcher.liveness import (
+from foosim.launcher.children.liveness import (
     CUT_OFF_S,
     LOOK_S_MAX,
     STALLED_S,

@@ -23,6 +23,7 @@ from foosim.protocol.actions import Journal as JournalAction
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import End
+from foosim.protocol.run_status import UNFINISHED
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.runtime.command import DONE, FAILED, REFUSED
@@ -33,7 +34,6 @@ from foosim.runtime.transport.session import Session
 from foosim.supervisor.main import SupervisorShell
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.records import Record, fold
-from foosim.supervisor.status import UNFINISHED
 from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -12,6 +12,7 @@ from foosim.common.errors import BadValue
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.runtime.run_folder import RunFolder
+from foosim.supervisor import main as supervisor_main
 from foosim.supervisor.settings import RunSettings
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
@@ -65,7 +66,7 @@ def test_the_supervisors_process_makes_the_same_plan(
         served.extend((settings, address, pki, folder.name))
         return 0
 
-    monkeypatch.setattr(supervisor, "serve", serve)
+    monkeypatch.setattr(supervisor_main, "serve", serve)
     with pytest.raises(SystemExit) as ended:
         supervisor.main()
     assert ended.value.code == 0

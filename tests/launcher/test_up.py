@@ -13,19 +13,19 @@ import msgspec
 import pytest
 
 from foosim.client import control
+from foosim.launcher.children.liveness import UNANSWERED_MAX
+from foosim.launcher.children.processes import Child
+from foosim.launcher.children.restarts import WAITS_S
 from foosim.launcher.display import Display
-from foosim.launcher.liveness import UNANSWERED_MAX
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
-from foosim.launcher.processes import Child
-from foosim.launcher.restarts import WAITS_S
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import END_S, Killed, Up
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.run_status import NOT_RECORDED
 from foosim.runtime.command import REFUSED
 from foosim.runtime.run_folder import RESULT_FILE, RunInfo
 from foosim.runtime.transport.session import ConnectError
-from foosim.supervisor.status import NOT_RECORDED
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 

@@ -60,8 +60,8 @@ from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.edits import Edit, Push
-from foosim.world.initial_state import AddedEntity
 from foosim.world.robot_packets import Delivered, RobotPacket
+from foosim.world.start import AddedEntity
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed

@@ -14,8 +14,9 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Build, Prepare, Ready
-from foosim.world.initial_state import AddedEntity, initial_numbers
+from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Layout, build_layout
+from foosim.world.start import AddedEntity
 
 TEXT = (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text()
 DEPLOYMENT = load_deployment(TEXT, "table.yaml")

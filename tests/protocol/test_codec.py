@@ -25,8 +25,8 @@ from foosim.protocol.channels import CHANNELS, Channel
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Done, End, Epoch, Hello, Order, Part, Request, Sent, Up, Want
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw
-from foosim.world.initial_state import AddedEntity
 from foosim.world.robot_packets import Delivered
+from foosim.world.start import AddedEntity
 
 LONG: Final = 5
 """How long lists, texts and bytes of an example are at most; limits have tests of their own."""

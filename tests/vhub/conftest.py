@@ -47,9 +47,10 @@ from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
-from foosim.world.initial_state import AddedEntity, initial_numbers
+from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
+from foosim.world.start import AddedEntity
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -19,7 +19,8 @@ from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_numbers, place_ball
 from foosim.world.layout import Layout, build_layout
 from foosim.world.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
-from foosim.world.mesh import Mesh, read_mesh
+from foosim.world.mesh import Mesh
+from foosim.world.mesh_files import read_mesh
 from foosim.world.scene import (
     UPRIGHT,
     Body,

@@ -12,7 +12,8 @@ import pytest
 
 from foosim.common import limits
 from foosim.common.errors import Refused
-from foosim.world.mesh import AssetError, Mesh, read_mesh
+from foosim.world.mesh import AssetError, Mesh
+from foosim.world.mesh_files import pieces, read_mesh
 
 Point = tuple[float, float, float]
 Triangle = tuple[Point, Point, Point]
@@ -101,10 +102,10 @@ def test_a_zero_has_no_sign_in_a_mesh() -> None:
 
 def test_pieces_are_the_mesh_together() -> None:
     mesh = read_mesh("cube.obj", CUBE.encode())
-    pieces = list(mesh.pieces(5))
-    assert [len(piece.triangles) for piece in pieces] == [5, 5, 2]
-    assert set().union(*map(surface, pieces)) == surface(mesh)
-    assert list(mesh.pieces(12)) == [mesh]
+    parts = list(pieces(mesh, 5))
+    assert [len(piece.triangles) for piece in parts] == [5, 5, 2]
+    assert set().union(*map(surface, parts)) == surface(mesh)
+    assert list(pieces(mesh, 12)) == [mesh]
 
 
 # --- what is refused -------------------------------------------------------------------------------------------------

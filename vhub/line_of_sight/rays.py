@@ -19,7 +19,8 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.mesh import Mesh, is_closed
+from foosim.world.mesh import Mesh
+from foosim.world.mesh_files import is_closed
 from foosim.world.scene import Vector
 
 Span = tuple[float, float]

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Final, Literal, NamedTuple, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, NoReturn, Protocol
 
 from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
@@ -21,6 +20,9 @@ from foosim.deployment.loader import refuse_findings
 from foosim.deployment.network.impairments import OwnModel
 from foosim.deployment.network.rules import Network
 from foosim.world.scene import Vector
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP: Final = "foosim.link_models"
 VERSION_KEY: Final = "link model "
@@ -105,6 +107,8 @@ class ModelError(Refused):
 
 def installed() -> dict[str, list[EntryPoint]]:
     """Return the models that are installed here, by name; more than one where packages give the same name."""
+    from importlib.metadata import entry_points  # brings the parser of e-mail
+
     found: dict[str, list[EntryPoint]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, giver_of(entry))):
         found.setdefault(entry.name, []).append(entry)

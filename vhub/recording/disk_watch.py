@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from foosim.protocol.run_status import CLOSING, NOT_RECORDED
 from foosim.runtime.disk import Level, room_on_disk
 from foosim.vhub.recording.disk_progress import DiskProgress
 from foosim.vhub.recording.writer import CaptureState, CaptureWriter
@@ -15,8 +16,6 @@ from foosim.vhub.recording.writer import CaptureState, CaptureWriter
 LOOK_NS: Final = 1_000_000_000
 """How often the journal's disk is checked."""
 _STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
-CLOSING: Final = "closing"
-NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
 
 
 class RoomWatch:

@@ -12,8 +12,9 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Commit
 from foosim.world.edits import layout_after
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import AddedEntity, added_to
+from foosim.world.initial_state import added_to
 from foosim.world.layout import Layout
+from foosim.world.start import AddedEntity
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as received, decoded, and its frame."""

@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Final
 
 from foosim.common.errors import Failed
+from foosim.launcher.children.memory import OomKills, oom_kills
+from foosim.launcher.children.restarts import Ending
 from foosim.launcher.hosts.ssh import Remote
-from foosim.launcher.memory import OomKills, oom_kills
-from foosim.launcher.restarts import Ending
 from foosim.runtime.children import GRACE_S, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
 

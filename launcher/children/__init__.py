@@ -1,0 +1,1 @@
+"""The processes that a launcher starts: their start and end, their restarts, and signs that one hangs."""

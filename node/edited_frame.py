@@ -1,0 +1,51 @@
+"""How a frame is edited before it is solved. Pure, and evaluated by every node alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after
+from foosim.world.frame import Frame
+from foosim.world.initial_state import place_ball
+from foosim.world.layout import Entity, Layout
+from foosim.world.spec import WorldSpec
+
+
+def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, list[float]]:
+    """Return layout and numbers of the edited frame; the order's edits apply in their order."""
+    layout = layout_after(frame.layout, edits)
+    numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
+    for change in fitting_edits(frame.layout, edits) if edits else ():
+        if isinstance(change, Add) and change.name in layout:
+            place_ball(numbers, layout[change.name], change.position, change.velocity)
+        elif isinstance(change, Push) and change.name in layout:
+            _push(numbers, layout, change, spec.table.ball.mass)
+        elif isinstance(change, Freeze | Thaw):
+            _take_out(numbers, layout[change.name], isinstance(change, Freeze))
+    return layout, numbers
+
+
+def _moved(frame: Frame, layout: Layout) -> list[float]:
+    """Return a frame's numbers in another layout; entities that are new there are zero."""
+    numbers = [0.0] * layout.size
+    for entity in layout.entities:
+        if entity.name in frame.layout:
+            old = frame.layout[entity.name]
+            numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
+    return numbers
+
+
+def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None:
+    """Change the velocity by impulse / mass."""
+    start = layout[push.name].offsets["linear_velocity"]
+    for axis, impulse in enumerate(push.impulse):
+        numbers[start + axis] += impulse / mass
+
+
+def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
+    """Mark a robot as out of service or back in it; its set-point is then its present position, or speed 0."""
+    numbers[robot.offsets["down"]] = float(is_down)
+    set_point = robot.offsets.get("set_point")
+    if set_point is not None:
+        position = robot.offsets.get("joint_positions")
+        numbers[set_point : set_point + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]

@@ -1,0 +1,45 @@
+"""Where a run begins, as a value that messages and files carry: frame 0, or the frame of another run."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from foosim.common import limits
+from foosim.common.struct_types import Counter, Digest, Item, Name, Numbers, Text
+from foosim.world.robot_packets import Outboxes
+
+
+class AddedEntity(Item, frozen=True):
+    """An entity that is in the layout beside those of the deployment."""
+
+    name: Name
+    model: Name
+
+
+Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class Origin(Item, frozen=True):
+    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
+    over all frames up to it."""
+
+    tick: Counter
+    source: Text
+    digest: Digest
+    chain: Digest
+
+
+class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A frame that a run begins with instead of frame 0, and where it comes from.
+
+    `added` are the entities of its layout beside the deployment's. The frame says all: positions and speeds, score, the
+    memory of rules, actuators and sensors, outboxes.
+    """
+
+    origin: Origin
+    values: Numbers
+    outboxes: Outboxes
+    added: Added
