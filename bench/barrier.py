@@ -72,6 +72,7 @@ WAYS: Final = (
     Way("Zenoh's own threads", router_runtime=ZENOHS_OWN, client_runtime=ZENOHS_OWN),
     Way("both of Zenoh's", waits="threads", router_runtime=ZENOHS_OWN, client_runtime=ZENOHS_OWN),
     Way("the client's threads in the router", router_runtime=CLIENT_RUNTIME),
+    Way("another thread watches the router's sockets", router_runtime="(rx: (worker_threads: 8))"),
 )
 
 

@@ -186,10 +186,10 @@ with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator,
     while True:  # a thread gives itself its name when it first runs
         names = [open(f"/proc/self/task/{task}/comm").read().strip() for task in os.listdir("/proc/self/task")]
         receiving = sorted(name for name in names if name.startswith("rx"))
-        if receiving == wanted or len(receiving) > len(wanted):
+        if set(receiving) >= set(wanted):  # a further one may wait for what blocks, such as the resolver of names
             break
         time.sleep(0.01)
-print(receiving, os.environ.get("ZENOH_RUNTIME"))
+print(receiving[: len(wanted)] if wanted else receiving, os.environ.get("ZENOH_RUNTIME"))
 try:
     use_client_runtime()
 except AssertionError:
