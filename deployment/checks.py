@@ -166,6 +166,9 @@ def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:
         launch = view.get(*role, "launch")
         if role[0] == "nodes" and launch in ("manual", "systemd"):
             yield Finding(location, f"a process for a node with `launch: {launch}`, which has its own", process)
+        is_apart = process == view.get("supervisor", "process") != view.get("vhub", "process")
+        if role[0] == "players" and is_apart:  # it would start before it is known where to connect
+            yield Finding(location, "a player shares the supervisor's process only together with the vHub", process)
 
 
 def _hosts(view: View) -> Iterator[Finding]:

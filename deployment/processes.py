@@ -17,6 +17,8 @@ Shape = Literal["deployed", "one", "each"]
 SHAPES: Final[tuple[str, ...]] = get_args(Shape)
 ONE: Final = "one"
 """The process of `one` on the supervisor's machine; on a host `one-HOST`."""
+ONE_PLAYERS: Final = "one-players"
+"""That of the players beside the supervisor where the vHub is on a host: it starts when the vHub listens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +52,15 @@ def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str,
     """
     hosts, roles = places(deployment), [VHUB, SUPERVISOR, *sorted(deployment.nodes), *sorted(deployment.players)]
     declared = deployment.declared_processes()
+    fleets = {*declared.values()} - {name for role, name in declared.items() if role not in deployment.players}
     groups: dict[str, list[str]] = {}
     for role in roles:
         is_ours = role not in deployment.nodes or deployment.nodes[role].launch == "local"
         if shape == "one" and is_ours:
             name = f"{ONE}-{hosts[role]}" if role in hosts else ONE
-        elif shape == "each" and role not in deployment.players:
+            if role in deployment.players and role not in hosts and VHUB in hosts:
+                name = ONE_PLAYERS
+        elif shape == "each" and declared.get(role) not in fleets:
             name = role
         else:
             name = declared.get(role, role)

@@ -62,10 +62,15 @@ class Ending:
 
     @property
     def last_words(self) -> str:
-        """The last line of its log, without time and name; it may have the reason."""
-        line = self.log[-1].strip() if self.log else ""
-        head, found, words = line.partition(": ")
-        return (words if found and head[:4].isdigit() and "Z " in head else line)[:WORDS_MAX]
+        """The last error in its log, without time and name, or the last line; it may have the reason."""
+        words = ""
+        for line in reversed(self.log):
+            head, found, text = line.strip().partition(": ")
+            is_dated = bool(found) and head[:4].isdigit() and "Z " in head
+            words = words or (text if is_dated else line.strip())
+            if not is_dated or " ERROR " in head:  # roles that share the process may log warnings as they leave
+                return (text if is_dated else line.strip())[:WORDS_MAX]
+        return words[:WORDS_MAX]
 
     @property
     def _lacked_memory(self) -> bool:

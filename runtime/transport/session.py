@@ -45,7 +45,7 @@ BELL: Final = "-"
 """Last chunk of a bell's key, which is no valid name."""
 
 ROUTER_RUNTIME: Final = f"(rx: (worker_threads: {ROUTER_THREADS}), acc: (handover: rx))"
-"""The threads that receive also watch the sockets: a message that arrives wakes one of them, not one and then another."""
+"""The threads that receive also watch the sockets, so a message wakes one thread instead of two."""
 CLIENT_RUNTIME: Final = "(rx: (handover: app), acc: (handover: app))"
 _RUNTIME_VARIABLE: Final = "ZENOH_RUNTIME"
 _runtime = ROUTER_RUNTIME

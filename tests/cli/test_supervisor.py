@@ -19,6 +19,7 @@ from foosim.node.main import main as run_node
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.run_folder import runs_folder
+from tests.apart import apart
 from tests.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
@@ -77,7 +78,7 @@ def test_all_problems_of_a_file_are_shown_with_their_places(command: Command, tm
 def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_other_machines(
     command: Command, tmp_path: Path
 ) -> None:
-    path, text = tmp_path / "own.yaml", TABLE.read_text()
+    path, text = tmp_path / "own.yaml", apart()
     assert text.count("class: foosim.players.football:Team") == 2
     path.write_text(text.replace("class: foosim.players.football:Team", "class: own_team:Team"))
     done = command("validate", path)
@@ -285,7 +286,7 @@ def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Comman
     assert done.code == 3 and "node.blue.key: cannot be read, No such file" in done.err
     (folder / "node.blue.pem").unlink()
     certificates.issue(folder, ["node.blue"])
-    done = command("up", TABLE, "--pki", folder)
+    done = command("up", TABLE, "--pki", folder, "--processes", "each")
     assert done.code == 3 and f"{folder} has no certificate of client.player-red; it has: " in done.err
     done = command("up", TABLE, "--pki", folder, "--insecure")
     assert done.code == 2 and "--insecure and --pki exclude each other" in done.err

@@ -10,12 +10,14 @@ from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import joint_processes, parse_shape, processes_of
 from foosim.deployment.schema import Deployment
+from tests.apart import apart
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
 
 def deployed(*sets: str, file: str = "table.yaml") -> Deployment:
-    return load_deployment(apply_sets((DEPLOY / file).read_text(), file, sets), file)
+    text = apart() if file == "table.yaml" else (DEPLOY / file).read_text()
+    return load_deployment(apply_sets(text, file, sets), file)
 
 
 def roles(deployment: Deployment, shape: str) -> dict[str, tuple[str, ...]]:
@@ -51,7 +53,12 @@ def test_one_has_a_process_for_each_host() -> None:
         "vhub.host=left",
     )
     found = roles(deployed(*sets, "nodes.blue.host=right"), "one")
-    assert found == {"one": ("supervisor", "player-blue", "player-red"), "one-left": ("vhub", "red"), "blue": ("blue",)}
+    assert found == {
+        "supervisor": ("supervisor",),
+        "one-left": ("vhub", "red"),
+        "blue": ("blue",),
+        "one-players": ("player-blue", "player-red"),
+    }
 
 
 def test_the_deployment_says_which_roles_share() -> None:
@@ -89,6 +96,10 @@ def test_processes_that_connect_with_several_roles_have_an_identity() -> None:
             "nodes.red.process: a process whose roles are not all on the same host",
         ),
         (
+            ("supervisor.process=main", "players.player-red.process=main"),
+            "players.player-red.process: a player shares the supervisor's process only together with the vHub",
+        ),
+        (
             ("nodes.red.launch=manual", "nodes.red.process=main"),
             "nodes.red.process: a process for a node with `launch: manual`, which has its own",
         ),
@@ -103,3 +114,13 @@ def test_what_cannot_share_is_refused_with_its_place(sets: tuple[str, ...], prob
 def test_an_unknown_shape_is_refused_with_the_known_ones() -> None:
     with pytest.raises(BadValue, match="not one of deployed, one, each"):
         parse_shape("on")
+
+
+def test_the_table_has_three_processes_of_which_two_are_nodes() -> None:
+    table = load_deployment((DEPLOY / "table.yaml").read_text(), "table.yaml")
+    assert roles(table, "deployed") == {
+        "main": ("vhub", "supervisor", "player-blue", "player-red"),
+        "blue": ("blue",),
+        "red": ("red",),
+    }
+    assert all(len(process) == 1 for process in roles(table, "each").values())

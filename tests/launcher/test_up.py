@@ -35,7 +35,7 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
     (tmp_path / "node").write_text('#!/bin/sh\necho started >>"$0.log"\nexit 1\n')
     (tmp_path / "node").chmod(0o755)
     up._launch("red", [str(tmp_path / "node")])
@@ -83,7 +83,7 @@ def test_what_follows_when_a_node_ends(
     """Before the first tick one that something else has ended is started again; one that is refused never is."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
     (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
     (tmp_path / "node").chmod(0o755)
     up._launch("red", [str(tmp_path / "node")])
@@ -114,7 +114,7 @@ def test_what_follows_when_the_supervisor_ends(
 ) -> None:
     """Whatever becomes of it, there is a result, of the shape of any other."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sh", "-c", ends])
     supervisor = up._launcher.children[SUPERVISOR]
     supervisor.process.wait()
@@ -153,7 +153,7 @@ def test_the_console_ends_last_when_it_is_known_how_the_run_ended(
         return False
 
     monkeypatch.setattr(Up, "_start", start)
-    outcome = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run").run()
+    outcome = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run").run()
     told = msgspec.json.decode(seen.read_bytes())
     assert told["reason"] == outcome.result["reason"] == "lost red: it ended with exit code 1"
 
@@ -174,7 +174,7 @@ def test_the_log_of_the_process_that_the_reason_names_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, ends_by: str, reason: str, line: str
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     up._has_begun = True
     for child, command in ((SUPERVISOR, "true"), (name, ends_by)):
         up._launch(child, [command])
@@ -188,7 +188,7 @@ def test_the_log_of_the_process_that_the_reason_names_is_shown(
 def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
     supervisor = up._launcher.children[SUPERVISOR]
     for _ in range(3 * UNANSWERED_MAX):
@@ -269,7 +269,7 @@ def test_a_player_is_started_again_when_a_signal_has_ended_it(
     first tick `restart: false` says nothing: the player has not acted."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, sets=sets)), None, Display(said), "run")
+    up = Up(make_plan(RunOptions(TABLE, sets=sets, processes="each")), None, Display(said), "run")
     (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
     (tmp_path / "player").chmod(0o755)
     up._launch("player-red", [str(tmp_path / "player")])
@@ -301,7 +301,7 @@ def test_a_node_that_is_started_before_it_has_ended_starts_again(
 ) -> None:
     """It was stopped, which its process hears as a refusal, and somebody was quick."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     waits = 'while [ ! -e "$0.go" ]; do sleep 0.01; done'
     (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{waits}\nexit {REFUSED}\n')
     (tmp_path / "node").chmod(0o755)
@@ -321,7 +321,7 @@ def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["true"])
     supervisor = up._launcher.children[SUPERVISOR]
     up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
@@ -335,7 +335,7 @@ def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
 def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(control, "CONNECT_S", 0.0)
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
     with ExitStack() as stack:
         up.folder.write_info(RunInfo("run", "table", str(TABLE), 0, "", "tcp/127.0.0.1:1"))
@@ -363,7 +363,7 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
     recording = {**NOT_RECORDED, "state": "closing", "offered": 9, "written": 4, "bytes": 1_000_000}
     told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": recording}
@@ -393,6 +393,6 @@ class Fails(Up):
 def test_where_the_run_can_be_resumed_nobody_is_told_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Who is told so finishes what it has; who is killed leaves it as it is."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Fails(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up = Fails(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
     assert up.run().failed
     assert up.folder.log(VHUB).read_text() == "ready\n"

@@ -90,13 +90,16 @@ class House:
         self.started.append(process)
         return process
 
-    def up(self, *arguments: str | Path, players: bool = False) -> subprocess.Popen[str]:
-        """Start a run of the table, without its players unless they are asked for.
+    def up(self, *arguments: str | Path, players: bool = False, each: bool = False) -> subprocess.Popen[str]:
+        """Start a run of the table, without its players unless they are asked for; `each`: no roles share a process.
 
         It is slow unless another pace is asked for: while a test waits for processes, each tick only costs.
         """
         bare = () if players else ("--set", "players={}")
-        return self.start("foosim-supervisor", "up", TABLE, "--set", LONG, "--pace", SLOW, *bare, *arguments)
+        apart = ("--processes", "each") if each else ()
+        return self.start(
+            "foosim-supervisor", "up", self.table, "--set", LONG, "--pace", SLOW, *bare, *apart, *arguments
+        )
 
     def run(self, name: str, *arguments: str | Path) -> tuple[int, str, str]:
         """Run a command to its end; return exit code, output and errors."""

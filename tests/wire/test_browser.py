@@ -246,7 +246,7 @@ def end_the_run(page: Page) -> str:
 
 def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House) -> None:
     page, players = browser, f"players={json.dumps({LINK[1]: PLAYER})}"
-    up = house.up("--console", "--json", "--engine", "pure", "--set", players, players=True)
+    up = house.up("--console", "--json", "--engine", "pure", "--set", players, players=True, each=True)
     addresses = addresses_of(house)
     with looking(page, addresses["view"]):
         look_only(page)

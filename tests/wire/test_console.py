@@ -116,7 +116,7 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     rows = [f"{at},ball,0.1,0,0" for at in range(2001)]
     table.write_text("\n".join(["time,entity,x,y,z", *rows]))
     beside = ("--second", "walk.csv", "--offset", "2 s")
-    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
+    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", each=True)
     house.ticking()
     path = house.live().path / "console.json"
     addresses = addresses_of(house)

@@ -18,8 +18,9 @@ from foosim.launcher.doctor import remote as doctor_remote
 from foosim.launcher.doctor.checks import findings_of
 from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
 from foosim.launcher.hosts.ssh import Remote
+from tests.apart import apart
 from tests.wire import sshd
-from tests.wire.conftest import LONG, TABLE
+from tests.wire.conftest import LONG
 from tests.wire.test_run import last_json
 from tests.wire.test_secured_run import certificates
 from tests.wire.test_ssh import There, free_port
@@ -44,7 +45,7 @@ def other(tmp_path: Path) -> Iterator[There]:
 
 
 def deployed(path: Path, hosts: dict[str, Any]) -> Path:
-    path.write_text(apply_sets(TABLE.read_text(), "table.yaml", [f"hosts={json.dumps(hosts)}", *PLACED]))
+    path.write_text(apply_sets(apart(), "table.yaml", [f"hosts={json.dumps(hosts)}", *PLACED]))
     return path
 
 

@@ -88,7 +88,7 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
     again.mkdir()
     split = "capture.split_time=200 ms"
     sets = [word for setting in (*SETS, *scribes(written), split) for word in ("--set", setting)]
-    up = house.up("--json", *sets, players=True)
+    up = house.up("--json", *sets, players=True, each=True)
     info = house.info()
     with (
         Control(info.simulation) as control,
@@ -133,7 +133,7 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
 
 def test_a_run_whose_vhub_cannot_go_on_ends_in_order_and_says_why(house: House) -> None:
     """Its journal cannot be read any more: however often it was started again, it would not come back."""
-    up = house.up("--json", *NO_CAPTURE_TO_CLOSE)
+    up = house.up("--json", *NO_CAPTURE_TO_CLOSE, each=True)
     house.ticking(5)
     for journal in house.live().journals.glob("vhub-*.journal"):
         journal.write_bytes(b"nothing of a journal")

@@ -18,6 +18,7 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.rehearsal.run import rehearse
+from tests.apart import apart
 from tests.wire import namespaces
 from tests.wire.conftest import LONG, command_path
 from tests.wire.namespaces import Machine, Machines
@@ -46,6 +47,8 @@ class Cluster:
 
     def __init__(self, house: House, machines: Machines) -> None:
         self.house = house
+        house.table = house.folder / "table.yaml"
+        house.table.write_text(apart())
         self.machines = machines
         self.sup, self.hub, self.left, self.right = (machines[name] for name in ("sup", "hub", "left", "right"))
         self.desk: subprocess.Popen[str] | None = None

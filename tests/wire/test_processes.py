@@ -12,6 +12,7 @@ from foosim.common.units import parse_pace
 from foosim.launcher.pki import certificates
 from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
+from tests.apart import apart
 from tests.replay.test_verify import messages_of
 from tests.wire.test_run import last_json
 
@@ -24,6 +25,13 @@ SHAPES: Final[dict[str, tuple[str, ...] | list[str]]] = {
     "one": ["--processes", "one"],
     "vhub and a node, players and a node": ("vhub", "nodes.red"),
 }
+
+
+@pytest.fixture(autouse=True)
+def table(house: House) -> None:
+    """Each role has its own process, and the tests put some together."""
+    house.table = house.folder / "table.yaml"
+    house.table.write_text(apart())
 
 
 def shape(roles: tuple[str, ...] | list[str], process: str = "main") -> list[str]:

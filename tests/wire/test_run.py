@@ -50,7 +50,7 @@ def assert_finished(house: House, content: dict[str, Any]) -> None:
 def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(house: House) -> None:
     """It listens where it is told, the radio plane one port higher; its processes stand in groups of their own."""
     port = free_port()
-    up = house.up("--listen", f"127.0.0.1:{port}", "--set", "clients={}")
+    up = house.up("--listen", f"127.0.0.1:{port}", "--set", "clients={}", each=True)
     info = house.info()
     assert info.simulation.endswith(f":{port}")
     assert info.radio.endswith(f":{port + 1}")
@@ -122,7 +122,7 @@ def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
 
 
 def test_ctrl_c_before_the_supervisor_listens_ends_it_in_order(house: House) -> None:
-    up = house.up("--json")
+    up = house.up("--json", each=True)
     house.read_until(up.stderr, "run table-")
     up.send_signal(signal.SIGINT)
     code, out, err = house.end(up)
@@ -131,7 +131,7 @@ def test_ctrl_c_before_the_supervisor_listens_ends_it_in_order(house: House) -> 
 
 
 def test_a_second_ctrl_c_kills_everything(house: House) -> None:
-    up = house.up("--pace", "fast")
+    up = house.up("--pace", "fast", each=True)
     house.ticking()
     info = house.info()
     house.kill("vhub", signal.SIGSTOP)  # so that the run cannot end in order
@@ -169,7 +169,7 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
     wire = house.folder / "wire"
     player = f"players.player-red.parameters={{team: red, wire: {wire}}}"
     own = "--set", "players.player-red.class=own_trips:Trips", "--set", player
-    up = house.up("--json", "--pace", "fast", *own, players=True)
+    up = house.up("--json", "--pace", "fast", *own, players=True, each=True)
     house.ticking(50)
     house.kill("player-blue")
     entry = house.wait_for("a player that is back", lambda: next(iter(house.ticking()["recoveries"]), None))
@@ -204,7 +204,7 @@ def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House, monk
     """Its class is there when `up` looks; in the player's own process the module cannot be imported."""
     (house.folder / "fails.py").write_text(FAILS)
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
-    up = house.up("--set", "players.player-red.class=fails:Team", players=True)
+    up = house.up("--set", "players.player-red.class=fails:Team", players=True, each=True)
     code, out, err = house.end(up)
     assert code == 1, err
     assert "player-red ended with exit code" in out
@@ -216,7 +216,7 @@ def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> N
         port = free_port()
         taken.bind(("127.0.0.1", port + 1))
         taken.listen()
-        code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, "--listen", f"127.0.0.1:{port}"))
+        code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, "--listen", f"127.0.0.1:{port}", each=True))
     content = last_json(out)
     assert code == 1
     assert (content["reason"], content["failed"]) == ("lost vhub: it ended with exit code 1", True)
@@ -340,7 +340,7 @@ def assert_it_sleeps(house: House) -> None:
     """
     info, red = house.info(), house.pid_of("red")
     pids = [info.pid, *house.processes_with(f"--connect {info.simulation}"), *house.processes_with(info.radio)]
-    assert len(pids) == 6
+    assert len(pids) == 3, "main, with supervisor, vHub and players, and the nodes"
 
     def rounds(pid: int) -> int:
         return int((house.folder / f"{pid}.rounds").read_bytes())

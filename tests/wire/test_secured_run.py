@@ -32,7 +32,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     stranger = house.folder / "stranger"
     pki.init(stranger)
     pki.issue(stranger, ["node.red"])
-    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS)
+    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS, each=True)
     house.ticking()
     info = house.info()
     assert info.simulation.startswith("tls/127.0.0.1:") and info.radio.startswith("tls/127.0.0.1:")
@@ -64,7 +64,7 @@ def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: H
     certificates. The world is the one that would have been."""
     folder = certificates(house.folder / "certs")
     pki.issue(folder, ["client.player-red", "client.player-blue"])
-    up = house.up("--json", "--engine", "pure", "--pki", folder, players=True)
+    up = house.up("--json", "--engine", "pure", "--pki", folder, players=True, each=True)
     house.ticking(5)
     with Control(house.info().simulation, operator_credentials(folder)) as desk:
         house.kill("red")

@@ -34,7 +34,7 @@ def is_back(control: Control, times: int) -> dict[str, Any] | None:
 
 
 def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: House) -> None:
-    up = house.up("--json", "--engine", "pure", players=True)
+    up = house.up("--json", "--engine", "pure", players=True, each=True)
     house.ticking(5)
     with Control(house.info().simulation) as control:
         house.kill("supervisor")
