@@ -151,7 +151,7 @@ def tabs_are_filled(page: Page) -> None:
     page.click("#tab-machines")
     for node in ("red", "blue"):
         page.until(f"document.querySelector('[data-node={node}] .robots').textContent.includes('{node}.goal')")
-    page.until(f"{ROWS % 'machines'}.some((row) => row.startsWith('vhubvhub'))")
+    page.until(f"{ROWS % 'machines'}.some((row) => row.startsWith('vhubvhubmain'))")
     page.click("#tab-log")
     page.until(f"{ROWS % 'log'}[0] === 'None so far.'")
 
@@ -245,8 +245,10 @@ def end_the_run(page: Page) -> str:
 
 
 def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House) -> None:
-    page, players = browser, f"players={json.dumps({LINK[1]: PLAYER})}"
-    up = house.up("--console", "--json", "--engine", "pure", "--set", players, players=True, each=True)
+    page, player = browser, {**PLAYER, "process": "main"}
+    players = f"players={json.dumps({LINK[1]: player})}"
+    alone = ("--set", "supervisor.process=null")  # so that it can be killed without the vHub
+    up = house.up("--console", "--json", "--engine", "pure", "--set", players, *alone, players=True)
     addresses = addresses_of(house)
     with looking(page, addresses["view"]):
         look_only(page)

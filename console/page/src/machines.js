@@ -39,11 +39,11 @@ export class Machines {
     this.recoveries = h("ol", { class: "recoveries", "aria-label": "Recoveries" });
     const lag = h("div");
     this.chart = timeChart(lag, { unit: "lag (ms)", height: 140 });
-    const columns = ["Process", "Role", "Load", "Waits for"].map((name) => h("th", { scope: "col", class: "left" }, name));
+    const columns = ["Name", "Role", "Process", "Load", "Waits for"].map((name) => h("th", { scope: "col", class: "left" }, name));
     byId("panel-machines").append(
       h("section", {}, h("div", { class: "row" }, h("h2", {}, "Nodes"), this.balance), this.head, this.nodes),
       h("section", {}, h("h2", {}, "Lag of ticks"), lag),
-      h("section", {}, h("h2", {}, "Other processes"), h("table", {}, h("thead", {}, h("tr", {}, ...columns)), this.others)),
+      h("section", {}, h("h2", {}, "Other roles"), h("table", {}, h("thead", {}, h("tr", {}, ...columns)), this.others)),
       h("section", {}, h("h2", {}, "Recoveries"), this.recoveries),
     );
     store.on("status", (source) => {
@@ -68,8 +68,8 @@ export class Machines {
     this.balance.hidden = !source.may("balance") || nodes.length < 2;
     this.balance.disabled = !this.desk.may("balance");
     const others = Object.entries(status.processes ?? {}).filter(([name]) => !(name in (status.nodes ?? {})));
-    keyed(this.others, others, ([name]) => name, () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td"), h("td", { class: "left" })), (row, [name, process]) => {
-      [name, process.role, percent(process.busy, 0), doing(process)].forEach((text, index) => setText(row.children[index], text));
+    keyed(this.others, others, ([name]) => name, () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td", { class: "left" }), h("td"), h("td", { class: "left" })), (row, [name, process]) => {
+      [name, process.role, status.shared?.[name] ?? name, percent(process.busy, 0), doing(process)].forEach((text, index) => setText(row.children[index], text));
     });
     const recoveries = [...(status.recoveries ?? [])].reverse().slice(0, RECOVERIES_SHOWN);
     keyed(this.recoveries, recoveries, (entry) => JSON.stringify(entry), (entry) => h("li", {}, h("b", {}, `${source.seconds(entry.tick).toFixed(3)} s`), ` tick ${entry.tick}: ${recoveryText(entry)}`));
@@ -105,10 +105,12 @@ export class Machines {
     setText(toggle, gone ? "Start" : "Stop …");
     toggle.className = gone ? "" : "danger";
     toggle.hidden = !this.store.main?.may(gone ? "start" : "stop");
-    toggle.disabled = !this.desk.may(gone ? "start" : "stop");
+    const shared = status.shared?.[name];
+    toggle.disabled = !this.desk.may(gone ? "start" : "stop") || (shared && !gone);
+    toggle.title = shared && !gone ? `${name} shares process ${shared}, so it cannot be stopped alone` : "";
     const busy = process?.busy ?? 0;
     load.style.setProperty("--share", String(Math.min(1, busy)));
-    setText(load.children[1], `load ${percent(busy, 0)}, ${counted(node.owned.length, "robot")}${process?.host ? `, on ${process.host}` : ""}`);
+    setText(load.children[1], `load ${percent(busy, 0)}, ${counted(node.owned.length, "robot")}${shared ? `, process ${shared}` : ""}${process?.host ? `, on ${process.host}` : ""}`);
     const mayMove = this.desk.may("move");
     keyed(robots, node.owned.slice(0, ROBOTS_SHOWN_MAX), (/** @type {string} */ robot) => robot, (/** @type {string} */ robot) => this._chip(robot), (chip) => chip.classList.toggle("movable", mayMove));
     const hidden = node.owned.length - ROBOTS_SHOWN_MAX;
