@@ -36,7 +36,16 @@ PAGES: Final = [*FRONT, *sorted((ROOT / "docs").rglob("*.md"))]
 FIRST_PLAYER: Final = ROOT / "docs" / "tutorials" / "first_player.md"
 PYPROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES: Final = tuple(PYPROJECT["tool"]["setuptools"]["package-dir"].values())
-OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only", "--slow-start", "--load"}
+OTHER_OPTIONS: Final = {
+    "--help",
+    "--version",
+    "--strict",
+    "--hypothesis-profile",
+    "--only",
+    "--slow-start",
+    "--load",
+    "--before",
+}
 """Options that belong to no command of ours, or to all."""
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

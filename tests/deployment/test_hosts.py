@@ -9,9 +9,10 @@ import pytest
 from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment, places
+from tests.apart import apart
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
-TEXT = (DEPLOY / "table.yaml").read_text()
+TEXT = apart()
 LABELS = {"c": "x", "a": "x, y", "b": "x"}
 HOSTS = f"hosts={{{', '.join(f'{name}: {{address: {name}.lan, labels: [{them}]}}' for name, them in LABELS.items())}}}"
 

@@ -333,7 +333,9 @@ def test_a_vhub_on_another_machine_has_its_own(tmp_path: Path) -> None:
     file.write_text(network("model: {name: fog}"))
     with pytest.raises(DeploymentError, match="there are none"):
         linted(file, [])
-    found, _ = linted(file, ["hosts={far: {address: far.example}}", "vhub.host=far"])
+    found, _ = linted(
+        file, ["hosts={far: {address: far.example}}", "vhub={host: far}", "supervisor.process=null", "players={}"]
+    )
     assert any(meaning.model == "fog" for meaning in found)
 
 
