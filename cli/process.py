@@ -26,7 +26,7 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     run: Annotated[
         str | None, typer.Option("--run", help="Run the supervisor of this run, as it was launched.")
     ] = None,
-    connect: Annotated[str, typer.Option(help="Address of the supervisor in another process: tcp/HOST:PORT.")] = "",
+    connect: Annotated[str, typer.Option(help="Address of the supervisor elsewhere: tcp/HOST:PORT or run:NAME.")] = "",
     vhub_listen: Annotated[
         str | None, typer.Option(help="Run the vHub, and listen for clients at this HOST:PORT.")
     ] = None,
@@ -36,7 +36,7 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     run_folder: RunFolderOption = None,
     node: Annotated[list[str] | None, typer.Option(help="Run this node; may be repeated.")] = None,
     player: Annotated[list[str] | None, typer.Option(help="Run this player; may be repeated.")] = None,
-    radio: Annotated[str, typer.Option(help="Address of the vHub's radio plane in another process.")] = "",
+    radio: Annotated[str, typer.Option(help="Address of the vHub's radio plane elsewhere, or run:NAME.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,

@@ -19,7 +19,6 @@ from foosim.client.errors import PlayerError
 from foosim.client.failing import report_failure
 from foosim.client.loading import load_player
 from foosim.client.player import PlayerLoop
-from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity
@@ -114,8 +113,8 @@ def run_players(
         links: list[tuple[Session, Credentials | None]] = []
         for name in names:
             if pki is not None or not links:  # a session has one certificate
-                who, limit = identity.client(name), limits.RADIO_MESSAGE_BYTES_MAX
-                link = client_session(connect, who, pki, stop, limit, sets_runtime=not links)
+                who = identity.client(name)
+                link = client_session(connect, who, pki, stop, Plane.RADIO, sets_runtime=not links)
                 links.append(stack.enter_context(link))
             session, credentials = links[-1]
             process.add(PlayerShell(process, name, session, world, credentials))
@@ -129,7 +128,7 @@ app = new_app()
 @app.command()
 def player(
     name: Annotated[list[str], typer.Option(help="Name of a player in the deployment; may be repeated.")],
-    connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
+    connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT, or run:NAME.")],
     world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,

@@ -14,6 +14,7 @@ from foosim.deployment.processes import Process
 from foosim.launcher.hosts.ssh import CAPTURE, Remote
 from foosim.launcher.plan import Plan
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.runtime.roles.shell import RUN
 from foosim.runtime.run_folder import RunFolder, RunInfo
 
 PROCESS: Final = "foosim-process"
@@ -32,40 +33,46 @@ class Commands:
         return VHUB not in process.roles and any(role in self._plan.deployment.players for role in process.roles)
 
     def of(self, process: Process, info: RunInfo | None, remote: Remote | None = None) -> list[str]:
-        """Return the command line of a process; without `info` that of the supervisor's."""
+        """Return the command line of a process.
+
+        Without `info`, the run's addresses, a process on this machine waits for them (`run:NAME`).
+        """
         if process.is_shared:
             return self._shared(process, info, remote)
         role, pki = process.name, self._pki(remote)
         if role == SUPERVISOR:
             return ["foosim-supervisor", "run", *self._plan.options.arguments(), "--run", self._folder.name]
-        assert info is not None
+        simulation, radio = self._addresses(info)
         if role == VHUB:
             insecure = ["--insecure"] if self._plan.options.insecure else []
             address = ["--listen", self._radio_address(info, remote)]
-            return ["foosim-vhub", "--connect", info.simulation, *address, *insecure, *pki, *self._records(remote)]
+            return ["foosim-vhub", "--connect", simulation, *address, *insecure, *pki, *self._records(remote)]
         if role in self._plan.deployment.nodes:
-            return ["foosim-node", "--name", role, "--connect", info.simulation, *pki]
-        return ["foosim-player", "--name", role, "--connect", info.radio, *pki]
+            return ["foosim-node", "--name", role, "--connect", simulation, *pki]
+        return ["foosim-player", "--name", role, "--connect", radio, *pki]
 
     def _shared(self, process: Process, info: RunInfo | None, remote: Remote | None) -> list[str]:
         deployment, roles = self._plan.deployment, process.roles
+        simulation, radio = self._addresses(info)
         if all(role in deployment.players for role in roles):
-            assert info is not None
             words = [word for role in roles for word in ("--name", role)]
-            return ["foosim-player", *words, "--connect", info.radio, *self._pki(remote)]
+            return ["foosim-player", *words, "--connect", radio, *self._pki(remote)]
         command = [PROCESS, process.name]
         if SUPERVISOR in roles:
             command += ["--run", self._folder.name]
         else:
-            assert info is not None
-            command += ["--connect", info.simulation, *self._pki(remote)]
-            command += ["--radio", info.radio] if self.needs_radio(process) else []
+            command += ["--connect", simulation, *self._pki(remote)]
+            command += ["--radio", radio] if self.needs_radio(process) else []
         if VHUB in roles:
             command += ["--vhub-listen", self._radio_address(info, remote), *self._records(remote)]
             command += ["--insecure"] if self._plan.options.insecure else []
         for option, declared in (("--node", set(deployment.nodes)), ("--player", set(deployment.players))):
             command += [word for role in roles if role in declared for word in (option, role)]
         return command
+
+    def _addresses(self, info: RunInfo | None) -> tuple[str, str]:
+        """Return where the routers of both planes listen."""
+        return (RUN + self._folder.name,) * 2 if info is None else (info.simulation, info.radio)
 
     def _radio_address(self, info: RunInfo | None, remote: Remote | None) -> str:
         """Return where the vHub listens: at the address that clients know, once it has listened."""

@@ -130,8 +130,11 @@ class Up:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
         with counted_signals(self._count), self.display, self._console:  # its pages show the end of the run
             try:
-                if self._start():
+                is_started = self._start()
+                if is_started:
                     self._watch()
+                if not is_started and self._supervisor.exit_code is not None:
+                    self._launcher.stop()  # processes that wait for its address
                 if self._can_resume:
                     self._launcher.kill()  # a process that ends in order would finish the capture
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
@@ -151,10 +154,17 @@ class Up:
     # --- starting ----------------------------------------------------------------------------------------------------
 
     def _start(self) -> bool:
-        """Start each process as soon as it can connect; False when the run was over before all had started."""
+        """Start all processes; False when the run was over before all had started.
+
+        Those on this machine start at once and wait for the addresses of the planes. Others, and all when a run
+        resumes, whose folder has the addresses of before, are started with these.
+        """
         folder, display = self.folder, self.display
         first, *others = self.plan.processes.values()
         self._begin(first, None)
+        early = [] if self._is_resumed else [process for process in others if self._starts_early(process)]
+        for process in early:
+            self._begin(process, None)
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
@@ -167,7 +177,7 @@ class Up:
             if info is None:
                 return False
             for process in others:
-                if self._commands.needs_radio(process) == needs_radio:
+                if process not in early and self._commands.needs_radio(process) == needs_radio:
                     self._begin(process, info)
         return True
 
@@ -181,6 +191,10 @@ class Up:
             fetch_capture(remote, self.folder.name, self.capture)
         except Failed as failed:
             self._not_home = str(failed)
+
+    def _starts_early(self, process: Process) -> bool:
+        node = self.plan.deployment.nodes.get(process.name)
+        return process.name not in self._launcher.remotes and (node is None or node.launch == "local")
 
     def _show_network(self) -> None:
         from foosim.vhub.links.summary import summaries

@@ -135,7 +135,7 @@ app = new_app()
 @app.command()
 def node(
     name: Annotated[str, typer.Option(help="Name of the node in the deployment.")],
-    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
+    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT, or run:NAME.")],
     world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,

@@ -13,13 +13,12 @@ from functools import partial
 from pathlib import Path
 
 from foosim.client.main import PlayerShell
-from foosim.common import limits
 from foosim.common.addresses import Address
 from foosim.launcher.journal_check import supervisor_records
 from foosim.launcher.plan import Plan
 from foosim.node.main import NodeShell
 from foosim.protocol import identity
-from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.runtime.command import DONE
 from foosim.runtime.journal import remove_journal
 from foosim.runtime.process import Stop
@@ -71,7 +70,7 @@ def run_roles(roles: Roles) -> int:
                 process.add(PlayerShell(process, name, radio, credentials=credentials))
 
         def radio_link(name: str) -> AbstractContextManager[tuple[Session, Credentials | None]]:
-            return client_session(roles.radio, identity.client(name), roles.pki, stop, limits.RADIO_MESSAGE_BYTES_MAX)
+            return client_session(roles.radio, identity.client(name), roles.pki, stop, Plane.RADIO)
 
         supervisor, simulation, credentials = None, None, None
         if roles.supervisor is not None:

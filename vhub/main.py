@@ -456,7 +456,7 @@ app = new_app()
 
 @app.command()
 def vhub(  # noqa: PLR0913, PLR0917  # a command's options
-    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
+    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT, or run:NAME.")],
     listen: Annotated[str, typer.Option(help="Address for clients; port 0 is any free port.")] = LOOPBACK,
     insecure: InsecureOption = False,
     capture: CaptureOption = None,

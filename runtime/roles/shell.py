@@ -19,16 +19,21 @@ from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.loop import Loop
 from foosim.runtime.roles.role import Core, Role
 from foosim.runtime.roles.wire import Wire
+from foosim.runtime.run_folder import open_run
 from foosim.runtime.systemd import Notify
 from foosim.runtime.transport.admission import Admission
 from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
 from foosim.runtime.transport.inbox import Inbox
 from foosim.runtime.transport.open_plane_warning import Exposure
-from foosim.runtime.transport.session import Session, use_client_runtime
+from foosim.runtime.transport.session import ConnectError, Session, use_client_runtime
 from foosim.runtime.transport.settings import Security
 
 CONNECT_S: Final = 60.0
 """How long a process tries to reach its router."""
+RUN: Final = "run:"
+"""Before the name of a run, instead of an address."""
+LOOK_S: Final = 0.02
+"""How often a process looks for the address of its run."""
 
 
 class RoleShell:
@@ -182,18 +187,38 @@ def client_session(
     identity: str,
     pki: Path | None,
     stop: Stop,
-    bytes_max: int = limits.MESSAGE_BYTES_MAX,
+    plane: Plane = Plane.SIMULATION,
     *,
     sets_runtime: bool = False,
 ) -> Iterator[tuple[Session, Credentials | None]]:
-    """Connect to the router at `connect`, with the certificate of `identity` where `pki` names a folder.
+    """Connect to the router of a plane at `connect`, with the certificate of `identity` where `pki` names a folder.
 
+    `connect` is an address, or `run:NAME` for a run of this user on this machine, whose address is waited for.
     `sets_runtime`: the first session of a process that is no router, which chooses Zenoh's client runtime.
-    Raises CertificateError, ConnectError after `CONNECT_S` or when `stop` is set.
+    Raises NoRun, CertificateError, ConnectError after `CONNECT_S` or when `stop` is set.
     """
     credentials = load_credentials(pki, identity)
     security = None if credentials is None else Security(credentials)
     if sets_runtime:
         use_client_runtime()
-    with Session.client(connect, CONNECT_S, bytes_max, stop.is_set, security) as session:
+    address = address_of(connect.removeprefix(RUN), plane, stop.is_set) if connect.startswith(RUN) else connect
+    bytes_max = limits.RADIO_MESSAGE_BYTES_MAX if plane is Plane.RADIO else limits.MESSAGE_BYTES_MAX
+    with Session.client(address, CONNECT_S, bytes_max, stop.is_set, security) as session:
         yield session, credentials
+
+
+def address_of(run: str, plane: Plane, give_up: Callable[[], bool]) -> str:
+    """Return where the plane's router of a run listens, as soon as that is known.
+
+    Raises NoRun, ConnectError for a run that has ended or when `give_up` says so.
+    """
+    folder = open_run(run)
+    while not give_up():
+        info = folder.info()
+        address = "" if info is None else info.radio if plane is Plane.RADIO else info.simulation
+        if address:
+            return address
+        if folder.result() is not None:
+            raise ConnectError(f"run {run} has ended")
+        time.sleep(LOOK_S)
+    raise ConnectError(f"told to end before run {run} had an address")

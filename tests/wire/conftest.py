@@ -173,17 +173,15 @@ class House:
         info = self.info()
         if process == "supervisor":
             return info.pid
+        addresses = [f"--connect {address}" for address in (info.simulation, f"run:{info.run}", info.radio)]
         shared = processes_with(f"foosim-process {process} ")
         for pid, line in shared.items():
-            if f"--run {info.run} " in line or f"--connect {info.simulation} " in line:
+            if any(f"{mark} " in line for mark in (f"--run {info.run}", *addresses[:2])):
                 return pid
         marks = {"vhub": "foosim-vhub"}
         mark = marks.get(process, f"--name {process}")
         (pid,) = [
-            pid
-            for address in (info.simulation, info.radio)
-            for pid, line in processes_with(f"--connect {address}").items()
-            if f"{mark} " in f"{line} "
+            pid for address in addresses for pid, line in processes_with(address).items() if f"{mark} " in f"{line} "
         ]
         return pid
 

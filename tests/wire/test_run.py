@@ -55,7 +55,7 @@ def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(hous
     assert info.simulation.endswith(f":{port}")
     assert info.radio.endswith(f":{port + 1}")
     before = house.ticking(5)["ticks"]
-    lines = house.processes_with(info.simulation)
+    lines = house.processes_with(f"--connect run:{info.run}")
     assert any("foosim-node --name red --connect" in line for line in lines.values()), lines
     assert any("foosim-vhub --connect" in line for line in lines.values()), lines
     pids = [info.pid, *lines]
@@ -141,7 +141,7 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     code, _, err = house.end(up)
     (capture,) = (house.folder / "captures").iterdir()
     assert (code, err) == (130, f"killed\ncapture captures/{capture.name} (unfinished)\n")
-    assert house.processes_with(info.simulation) == {}
+    assert house.processes_with(f"run:{info.run}") == {}
 
 
 TRIPS = """
@@ -339,7 +339,7 @@ def assert_it_sleeps(house: House) -> None:
     Rounds are counted by the clock of these deadlines, so that a slow machine makes them fewer, never more.
     """
     info, red = house.info(), house.pid_of("red")
-    pids = [info.pid, *house.processes_with(f"--connect {info.simulation}"), *house.processes_with(info.radio)]
+    pids = [info.pid, *house.processes_with(f"--connect run:{info.run}")]
     assert len(pids) == 3, "main, with supervisor, vHub and players, and the nodes"
 
     def rounds(pid: int) -> int:

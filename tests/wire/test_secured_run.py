@@ -100,7 +100,7 @@ def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: H
 def assert_it_is_stopped_and_started_from_another_terminal(house: House, desk: Control) -> None:
     code, out, err = house.ask("foosim-supervisor", "stop", "red")
     assert (code, err) == (0, "") and out.startswith("red stopped at tick "), err
-    red = f"--name red --connect {house.info().simulation}"  # and no other run's on this machine
+    red = f"--name red --connect run:{house.info().run}"  # and no other run's on this machine
     house.wait_for("red to be gone", lambda: not house.processes_with(red))
     status = desk.status()
     assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
