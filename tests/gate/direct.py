@@ -18,6 +18,8 @@ from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
+from foosim.runtime.roles.bus import Bus
+from foosim.runtime.roles.loop import Loop
 from foosim.supervisor.failover import Failover
 from foosim.supervisor.state import RunState
 from foosim.vhub.sessions import Sessions
@@ -86,6 +88,30 @@ def _any_welcome(planting: Planting) -> None:
     before: Any = planting.swap(ClientCore, "_on_welcome", on_welcome)
 
 
+def _other_order(planting: Planting) -> None:
+    def add(self: Any, role: Any) -> None:
+        before(self, role)
+        self.roles.insert(0, self.roles.pop())
+
+    before: Any = planting.swap(Loop, "add", add)
+
+
+def _work_first(planting: Planting) -> None:
+    def turn_all(self: Any, items: Any, bus: Any, now_ns: int) -> None:
+        for role in self.roles:
+            role.do_work(now_ns)
+        before(self, items, bus, now_ns)
+
+    before: Any = planting.swap(Loop, "_turn_all", turn_all)
+
+
+def _heard_again(planting: Planting) -> None:
+    def put(self: Any, sender: str, *message: Any) -> None:
+        before(self, "", *message)
+
+    before: Any = planting.swap(Bus, "put", put)
+
+
 DIRECT: Final = (
     DirectMutant(
         "node goes back to an old epoch",
@@ -110,5 +136,26 @@ DIRECT: Final = (
         "a welcome answers one hello",
         "tests/client/test_return.py::test_the_answer_to_a_hello_of_before_is_none",
         _any_welcome,
+    ),
+    DirectMutant(
+        "roles take turns in another order",
+        "the roles of a process take their turns in the order in which they were added",
+        "tests/runtime/test_loop.py::"
+        "test_roles_of_a_process_get_each_others_messages_in_a_fixed_order_and_the_network_gets_them_too",
+        _other_order,
+    ),
+    DirectMutant(
+        "engine before messages",
+        "a role's long work begins when no message is left on the bus",
+        "tests/runtime/test_loop.py::"
+        "test_a_loop_with_messages_between_its_roles_does_not_sleep_and_works_when_none_is_left",
+        _work_first,
+    ),
+    DirectMutant(
+        "a role hears itself",
+        "the bus hands a message to all readers but its sender",
+        "tests/runtime/test_loop.py::"
+        "test_roles_of_a_process_get_each_others_messages_in_a_fixed_order_and_the_network_gets_them_too",
+        _heard_again,
     ),
 )
