@@ -121,6 +121,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "the recovery of a lost process that lives; then it is killed",
     ),
     ("launcher.children.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
+    ("runtime.roles.shell", "LOOK_S"): ("node, player, vHub", "the run file, between two looks at it"),
     ("launcher.children.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; a longer pause is a standstill"),
     ("launcher.children.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, in this order"),
     ("launcher.children.restarts", "AWAY_S"): ("`up`", "the same if the machine could not be reached"),

@@ -133,10 +133,10 @@ class Up:
                 is_started = self._start()
                 if is_started:
                     self._watch()
-                if not is_started and self._supervisor.exit_code is not None:
-                    self._launcher.stop()  # processes that wait for its address
                 if self._can_resume:
                     self._launcher.kill()  # a process that ends in order would finish the capture
+                elif not is_started and self._supervisor.exit_code is not None:
+                    self._launcher.stop()  # processes that wait for its address
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:

@@ -65,8 +65,8 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         assert [entity["name"] for entity in compared["entities"]] == ["ball"]
         assert compared["covers"] == [-1000, 999_000]
         await browser.say(type="plot", series=[{"id": "x", "reading": ["camera", "ball"], "index": 0}])
-        await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("plotted"))["series"][0]["id"] == "x"
+        await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("watched"))["drops"] == []
         added = await answered(browser, 1, "add", position=[0.1, 0.0, 0.05])
         assert added["accepted"], added

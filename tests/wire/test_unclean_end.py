@@ -30,10 +30,10 @@ def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(hou
     split = ("--set", "capture.split_time=40 ms", "--set", slow)
     up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", *split, players=True)
     run = house.info()
-    house.ticking(50)
+    house.ticking(100)
     up.kill()
     house.end(up)
-    house.wait_for("an end of all of them", lambda: not house.processes_with(run.simulation))
+    house.wait_for("an end of all of them", lambda: not house.processes_with(run.run))
     path = house.folder / "run.mcap"
     had = open_capture(path)
     assert not had.finished
