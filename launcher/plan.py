@@ -17,11 +17,10 @@ from foosim.common.units import Pace, parse_ns, parse_pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text, refuse_findings
 from foosim.deployment.processes import Process, parse_shape, processes_of
-from foosim.deployment.schema import Deployment, places
+from foosim.deployment.schema import VHUB, Deployment, places
 from foosim.deployment.table_clearance import clearance_findings
 from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.protocol import identity
-from foosim.protocol.channels import VHUB
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
 from foosim.world.scenery import SceneryMesh

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import atan2, sin, sqrt
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.player import Commands, Samples
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.names import TEAMS
@@ -21,6 +20,9 @@ from foosim.players.ball_filter import Ball, BallTrack, moved
 from foosim.world.payloads import BallPosition, Command, RodPosition
 from foosim.world.robots.foosball_rod import RodRobot, RodSensor
 from foosim.world.robots.overhead_camera import BallSensor
+
+if TYPE_CHECKING:
+    from foosim.client.player import Commands, Samples
 
 LATENCY_S: Final = 0.003
 """Delay from a decision to the rod's motion: the command's link and the next tick."""

@@ -12,8 +12,7 @@ from typing import Final
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.deployment.processes import Process, is_joint, joint_processes
-from foosim.deployment.schema import Deployment
-from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.deployment.schema import SUPERVISOR, VHUB, Deployment
 
 ROLES: Final = ("node", "client", "process", "operator", "viewer")
 """Roles of which there are several, distinguished by name."""
