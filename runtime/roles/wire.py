@@ -15,6 +15,8 @@ from foosim.runtime.transport.session import Publisher, Session
 
 _BY_KEY: Final = {channel.key.removesuffix("/{name}"): channel for channel in CHANNELS}
 _NAMED: Final = "/{name}"
+_STEM: Final = {plane: ALIVE[plane].partition("/alive/")[0] for plane in Plane}
+"""What all keys of a plane begin with."""
 
 
 class Wire:
@@ -38,6 +40,9 @@ class Wire:
         here = [(channel, own) for channel, own in reads if channel.plane is self.plane]
         if self._bus is not None:
             self._bus.subscribe(self.name, here)
+            if self.session.is_router and self.plane is Plane.SIMULATION:
+                self._receive_plane()
+                return
         mine = {channel.key for channel, own in here if own}
         wanted = {channel.key for channel, _ in here}
 
@@ -53,6 +58,16 @@ class Wire:
                 self.session.receive(key, channel.key, read_key, self._inbox)
             else:
                 self.session.subscribe(key, channel.key, self._inbox)
+
+    def _receive_plane(self) -> None:
+        """Let the reader of the process wait for all that others publish on the plane, once for all of its roles.
+
+        What comes to the plane's router is nearly all for the roles beside it. A thread for each channel, which hands
+        over to the reader, costs another wake-up a message.
+        """
+        stem = _STEM[self.plane]
+        if not self._inbox.has(stem):
+            self.session.receive(stem, stem, _read_key, self._inbox)
 
     def put(self, channel: Channel, name: str, payload: bytes) -> None:
         """Publish on a channel; `name` is the sender, or the receiver where one is addressed."""
@@ -81,6 +96,11 @@ class Wire:
 def presence_channel(plane: Plane, watcher: str) -> str:
     """Return the inbox's channel of the presence of roles on a plane, as one role watches it."""
     return f"{ALIVE[plane]} {watcher}"
+
+
+def _read_key(key: str) -> tuple[str, str] | None:
+    known = channel_of(key)
+    return None if known is None else (known[0].key, known[1])
 
 
 def channel_of(key: str) -> tuple[Channel, str] | None:

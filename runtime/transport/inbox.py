@@ -121,6 +121,10 @@ class Inbox:
             self._alarm = _Alarm(self._ring)
         self._sources[channel] = source
 
+    def has(self, channel: str) -> bool:
+        """Whether there is a source of this channel."""
+        return channel in self._sources
+
     def detach(self) -> None:
         """Remove the sources, since their session closes; offered items stay."""
         self._sources = {}

@@ -17,6 +17,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from foosim.protocol import channels
+from foosim.runtime.roles.bus import Bus
+from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import Publisher, Session
 
@@ -79,6 +82,34 @@ def read_key(key: str) -> tuple[str, str] | None:
     _, channel, name = key.split("/")
     assert channel != "wrong", "a key that the table does not have"
     return None if channel == "bad" else (channel, name)
+
+
+def test_roles_beside_the_router_wait_in_one_queue_for_all_that_others_publish(plane: Plane, inbox: Inbox) -> None:
+    """In the order of arrival, over all channels; what one of these roles publishes does not come back."""
+    bus = Bus()
+    supervisor, hub = (
+        Wire(plane.router, channels.Plane.SIMULATION, inbox, name, bus) for name in ("supervisor", "vhub")
+    )
+    supervisor.read(channels.SUPERVISOR_READS)
+    hub.read(channels.VHUB_READS)
+    assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("receive")]
+    node = plane.client()
+    part, samples = (
+        node.publisher(channel.key_for("red"), True, True) for channel in (channels.PART, channels.SAMPLES)
+    )
+    put_until_heard(part, inbox)
+    samples.put(b"samples")
+    part.put(b"part")
+    node.publisher("foosim/simulation/nothing/red", True, True).put(b"unknown")
+    hub.put(channels.DELIVERIES, "vhub", b"deliveries")
+    samples.put(b"more")
+    assert take_all(inbox, 3) == [
+        (channels.SAMPLES.key, "red", b"samples"),
+        (channels.PART.key, "red", b"part"),
+        (channels.SAMPLES.key, "red", b"more"),
+    ]
+    assert plane.router.statistics().refused == 1
+    assert bus.pop()[2:4] == ("supervisor", channels.DELIVERIES)
 
 
 def test_a_message_comes_with_its_channel_and_the_name_in_its_key(plane: Plane, inbox: Inbox) -> None:
