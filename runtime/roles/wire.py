@@ -40,7 +40,7 @@ class Wire:
         here = [(channel, own) for channel, own in reads if channel.plane is self.plane]
         if self._bus is not None:
             self._bus.subscribe(self.name, here)
-            if self.session.is_router and self.plane is Plane.SIMULATION:
+            if self.session.is_open_router and self.plane is Plane.SIMULATION:
                 self._receive_plane()
                 return
         mine = {channel.key for channel, own in here if own}

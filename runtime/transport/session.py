@@ -103,10 +103,12 @@ class Publisher:
 class Session:
     """One session of a process. Use it in `with`; what it declares lives as long as it does."""
 
-    def __init__(self, session: zenoh.Session, locator: str, *, is_router: bool = False) -> None:
+    def __init__(self, session: zenoh.Session, locator: str, *, is_open_router: bool = False) -> None:
         self.locator: Final = locator
         """Where this router listens, or where this client dials: `tcp/HOST:PORT`."""
-        self.is_router: Final = is_router
+        self.is_open_router: Final = is_open_router
+        """Whether it is a router without certificates. With them clients learn of no subscriber to a whole plane, since
+        Zenoh passes on to each only declarations within its grants."""
         self._session = session
         self.pid: Final = os.getpid()
         self._closed = False
@@ -135,7 +137,7 @@ class Session:
         if not locators:
             session.close()  # type: ignore[no-untyped-call]
             raise ListenError(f"cannot listen on {address}: no answer about the port that was chosen")
-        return cls(session, reachable(locators, address), is_router=True)
+        return cls(session, reachable(locators, address), is_open_router=security is None)
 
     @classmethod
     def client(

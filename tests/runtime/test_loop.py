@@ -196,7 +196,7 @@ class Speaker(Script):
 class Far:
     """Stands where a session is: nobody is connected to it."""
 
-    is_router = False
+    is_open_router = False
 
     def __init__(self) -> None:
         self.did: list[tuple[str, str]] = []
