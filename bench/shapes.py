@@ -27,6 +27,7 @@ from bench.runs import ROOT, BenchError
 LOOK_S: Final = 0.5
 MIDDLE: Final = (0.4, 0.8)
 """The part of a command's duration in which its processes are looked at: they run, and none starts or ends."""
+LOOKS_MIN: Final = 4
 MEMORY_LOOK: Final = 8
 """At which look memory is read: once, since that holds the processes up for some milliseconds."""
 SEEDS: Final = 30
@@ -162,7 +163,7 @@ def _run_in(place: str, checkout: Path, command: list[str]) -> Ran:
     result = json.loads(output.splitlines()[-1]) if is_run else {}
     first, last = (round(len(looks) * share) for share in MIDDLE)
     cores = (_used_by_ended_s() - used_before_s) / wall_s
-    if last > first:
+    if last - first >= LOOKS_MIN:  # else of the whole command
         cores = (looks[last][1] - looks[first][1]) / (looks[last][0] - looks[first][0])
     return Ran(result, wall_s, cores, memory_mb)
 
