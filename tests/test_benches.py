@@ -1,6 +1,6 @@
 """What benches decide themselves, without a run."""
 
-from bench import hot
+from bench import hot, shapes
 from bench.vhub_loss import CALM_S, KILLS, Killer
 
 
@@ -25,3 +25,10 @@ def test_the_table_of_hot_modules_says_what_is_left_to_the_interpreter() -> None
     _, *rows, left = (line.split() for line in hot.lines(shares, 0.3, listed))
     assert rows == [["capture/rows", "39.90", "100.00"], ["*", "vhub/state/hub_state", "60.00", "0.00"]]
     assert left[-2:] == ["40.00", "100.00"]
+
+
+def test_two_checkouts_are_compared_by_the_ratios_of_their_rounds() -> None:
+    by = {"now": shapes.Found({"tick b": [2.0, 3.0, 4.0]}), "before": shapes.Found({"tick b": [4.0, 4.0, 4.0]})}
+    assert shapes.with_ratio(by)["ratio"] == {"tick b": [0.5, 0.75, 1.0]}
+    assert "ratio" not in shapes.with_ratio({"now": by["now"]})
+    assert shapes.spread([3.0, 1.0, 2.0]) == [2.0, 1.0, 3.0] and shapes.spread([]) == []

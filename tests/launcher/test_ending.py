@@ -16,6 +16,11 @@ from foosim.launcher.children.restarts import Ending
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 
 
+ERROR = "2026-11-23T18:22:43.352Z ERROR   supervisor: the run does not go on"
+WARNING = "2026-11-23T18:22:43.354Z WARNING vhub: leaves its capture run.mcap unfinished"
+"""Of two roles of one process, the one that was refused and one that leaves with it."""
+
+
 @pytest.mark.parametrize(
     ("ending", "text"),
     [
@@ -39,6 +44,7 @@ REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the superviso
             "ended with exit code 3, refused: refused by the supervisor: a node red is already here",
         ),
         (Ending(3, "", ["a.mcap: exists already"]), "ended with exit code 3, refused: a.mcap: exists already"),
+        (Ending(3, "", [ERROR, WARNING]), "ended with exit code 3, refused: the run does not go on"),
         (Ending(3), "ended with exit code 3"),
     ],
 )
