@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from contextlib import redirect_stdout
+from contextlib import closing, redirect_stdout
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,8 +25,9 @@ from foosim.protocol.run_status import score_text
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.swarm.campaign import Flown, fly
+from foosim.rehearsal.swarm.campaign import Flown
 from foosim.rehearsal.swarm.faults import TICKS
+from foosim.rehearsal.swarm.workers import fly_seeds
 from foosim.rehearsal.system import Settings
 from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.vhub.links.summary import summaries
@@ -42,6 +43,9 @@ def foosim_rehearse(
     nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN, each with its own engine.")] = 1,
     swarm: Annotated[bool, typer.Option("--swarm", help="Inject random faults, drawn from --seed.")] = False,
     seeds: Annotated[int, typer.Option(help="With --swarm: the number of seeds, from --seed (or 1) on.", min=1)] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(help="With --swarm: number of processes; by default that of the processors.", min=1)
+    ] = None,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
     version: VersionOption = False,
@@ -66,7 +70,7 @@ def foosim_rehearse(
     second Ctrl-C.
     """
     if swarm:
-        raise typer.Exit(_swarm(options, seeds, json))
+        raise typer.Exit(_swarm(options, seeds, jobs or os.cpu_count() or 1, json))
     if options.duration is None:
         raise BadValue("--for is missing: the simulated time, e.g. --for 20s")
     if not 1 <= nodes <= limits.NODES_MAX:
@@ -141,7 +145,7 @@ def _told(result: dict[str, Any]) -> str:
     )
 
 
-def _swarm(options: RunOptions, count: int, json: bool) -> int:
+def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
     """Rehearse under the faults of some seeds; return the exit code."""
     file, duration, first = options.file, options.duration, 1 if options.seed is None else options.seed
     text = read_deployment_text(file)
@@ -152,21 +156,22 @@ def _swarm(options: RunOptions, count: int, json: bool) -> int:
     longer = "" if duration is None else f" --for {duration}"
     flown: list[Flown] = []
     told_s = time.monotonic()
-    for seed in range(first, first + count):
-        if time.monotonic() >= told_s + LINE_S:
-            told_s = time.monotonic()
-            _note(f"{len(flown)} of {count} seeds, {sum(bool(flight.broken) for flight in flown)} broke a law")
+    seeds = range(first, first + count)
+    with closing(fly_seeds(text, str(file), seeds, ticks, min(jobs, count))) as flights:
         try:
-            flight = fly(text, str(file), seed, ticks=ticks)
+            for flight in flights:
+                flown.append(flight)
+                if flight.broken:
+                    typer.echo(f"seed {flight.seed}: {flight.broken}", err=True)
+                    typer.echo(f"  foosim-rehearse {file} --swarm{longer} --seed {flight.seed}", err=True)
+                    for fault in flight.faults:
+                        typer.echo(f"  {fault}", err=True)
+                if time.monotonic() >= told_s + LINE_S:
+                    told_s = time.monotonic()
+                    _note(f"{len(flown)} of {count} seeds, {sum(bool(flight.broken) for flight in flown)} broke a law")
         except KeyboardInterrupt:
-            _note(f"interrupted at seed {seed}, after {len(flown)} of {count} seeds")
+            _note(f"interrupted at seed {first + len(flown)}, after {len(flown)} of {count} seeds")
             raise
-        flown.append(flight)
-        if flight.broken:
-            typer.echo(f"seed {seed}: {flight.broken}", err=True)
-            typer.echo(f"  foosim-rehearse {file} --swarm{longer} --seed {seed}", err=True)
-            for fault in flight.faults:
-                typer.echo(f"  {fault}", err=True)
     broken = [flight.seed for flight in flown if flight.broken]
     if json:
         typer.echo(encode_json({"seeds": [asdict(flight) for flight in flown], "broken": broken}).decode())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from dataclasses import asdict, replace
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from foosim.cli.rehearse import app
+from foosim.common.errors import Failed
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.node.tick import Work
@@ -30,6 +33,7 @@ from foosim.rehearsal.swarm.faults import (
     loses_players,
 )
 from foosim.rehearsal.swarm.packet_invariants import PacketLaws
+from foosim.rehearsal.swarm.workers import fly_seeds
 from foosim.rehearsal.system import Settings
 from foosim.runtime.roles.bus import CALM
 from foosim.vhub.state.records import TickRecord
@@ -51,6 +55,20 @@ def test_the_laws_hold_under_random_faults_and_a_seed_flies_equally_each_time() 
     assert {flown["ticks"] for flown in told["seeds"]} == {TICKS}
     lost = next(flown for flown in told["seeds"] if flown["losses"])
     assert asdict(fly(TABLE.read_text(), TABLE.name, lost["seed"])) == lost
+
+
+def test_processes_fly_seeds_as_one_does_and_a_killed_one_is_named() -> None:
+    """Each ends with the iterator, also amid a seed."""
+    text, seeds = TABLE.read_text(), range(FIRST, FIRST + 6)
+    with closing(fly_seeds(text, TABLE.name, seeds, TICKS, jobs=2)) as flights:
+        assert [next(flights) for _ in seeds[:2]] == [fly(text, TABLE.name, seed) for seed in seeds[:2]]
+    assert active_children() == []
+    flights = fly_seeds(text, TABLE.name, range(FIRST, FIRST + 100), TICKS, jobs=2)
+    next(flights)
+    active_children()[0].kill()
+    with pytest.raises(Failed, match="a process of the swarm was killed; fewer than --jobs 2 need less memory"):
+        list(flights)
+    assert active_children() == []
 
 
 def test_the_laws_hold_where_links_make_copies() -> None:
