@@ -26,7 +26,6 @@ from setuptools.errors import BaseError, CCompilerError
 COMPILED: Final = {
     "capture/mcap/writer": "each message and chunk of a capture",
     "client/player": "each packet of a player",
-    "common/exact_math": "powers and decibels of each radio packet",
     "common/keyed_random": "each random number",
     "common/limits": "the project's limits: compiled modules read them",
     "node/core": "a node's tick: what came, what is due, what is sent",
@@ -73,6 +72,7 @@ COMPILED: Final = {
     "vhub/network/jitter": "the delay of each packet",
     "vhub/network/link_budget": "the power that each radio packet is received with",
     "vhub/network/packet": "each packet on its way",
+    "vhub/network/series_math": "exponential times and tables of links",
     "vhub/network/turns": "whose turn it is on a shared medium, for each radio packet",
     "vhub/radio/contention": "who may send on a shared medium, for each packet",
     "vhub/radio/errors": "the odds of each radio frame",

@@ -13,7 +13,6 @@ from heapq import heappop, heappush
 from pathlib import Path
 from typing import Final
 
-from foosim.common.exact_math import ln
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
@@ -21,6 +20,7 @@ from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.series_math import ln
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame

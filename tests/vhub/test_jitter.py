@@ -13,10 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.common import exact_math
 from foosim.common.keyed_random import Slot, draw_key, draw_words
 from foosim.deployment.network.impairments import ParetoJitter
-from foosim.vhub.network import jitter
+from foosim.vhub.network import jitter, series_math
 from foosim.vhub.network.jitter import (
     CELLS,
     HALF_CELLS,
@@ -198,7 +197,7 @@ def test_drawn_jitter_has_the_distribution() -> None:
 
 def test_nothing_of_the_mathematical_library_decides() -> None:
     """Its last bits differ between machines: only exact operations (and splitting a float) may be used."""
-    trees = [ast.parse(inspect.getsource(module)) for module in (jitter, exact_math)]
+    trees = [ast.parse(inspect.getsource(module)) for module in (jitter, series_math)]
     used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
     assert used & set(dir(__import__("math"))) == {"frexp", "inf", "sqrt"}
     assert "**" not in inspect.getsource(jitter._Gamma) and "pow" not in used

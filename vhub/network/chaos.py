@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from foosim.common.exact_math import exponential_ns, ln
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.network.impairments import Impairments
+from foosim.vhub.network.series_math import exponential_ns, ln
 
 TICK_NS: Final = 10_000_000
 STABILITY_TICKS: Final = 10

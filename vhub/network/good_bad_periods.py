@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from foosim.common.exact_math import exponential_ns, power
 from foosim.common.keyed_random import draw_words, unit_interval
 from foosim.deployment.network.impairments import Burst, Outages, ParetoDwell
+from foosim.vhub.network.series_math import exponential_ns, power
 
 KEPT: Final = 8
 """Times that a link has at hand: those of its bursts and outages, under settings that come and go."""

@@ -18,7 +18,6 @@ from typing import Final
 
 from pydantic import TypeAdapter
 
-from foosim.common.exact_math import exp, ln, ln_gamma, power
 from foosim.common.keyed_random import UNIT, gaussian
 from foosim.deployment.network.impairments import (
     GammaJitter,
@@ -30,6 +29,7 @@ from foosim.deployment.network.impairments import (
     TableJitter,
     UniformJitter,
 )
+from foosim.vhub.network.series_math import exp, ln, ln_gamma, power
 
 CELLS: Final = 4096
 TAIL_CELL: Final = CELLS - CELLS // 16

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from foosim.common.exact_math import exponential_ns
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.rules import REST, Event, Network, selects
 from foosim.vhub.network.chaos import chaos_settings, clogs_of_chaos, partitions_of_chaos
+from foosim.vhub.network.series_math import exponential_ns
 
 FOREVER_NS: Final = 2**62
 HEALED: Final = ("partitions", "clogs", "chaos", "settings")

@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
-from foosim.common.exact_math import exp, ln, ln_gamma
 from foosim.common.keyed_random import UNIT, Slot, chance_threshold
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.series_math import exp, ln, ln_gamma
 from foosim.vhub.stages.stage import Stage
 
 CRC_FAIL: Final = "crc_fail"

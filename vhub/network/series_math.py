@@ -1,7 +1,9 @@
-"""Elementary functions from IEEE arithmetic alone: the same on every machine, whatever its mathematical library.
+"""Logarithm, exponential and gamma function by series: what tables and times of the network are computed with.
 
-For what is computed once a link or an episode, not once a packet. Sources: Abramowitz and Stegun, Handbook of
-Mathematical Functions, 4.1.27 (logarithm), 4.2.1 (exponential), 6.1.41 (Stirling's series of ln gamma).
+Their last bits decide delays and fates of captured packets, so they never change. They use IEEE arithmetic alone and
+are the same on every machine. They are slow and, for large arguments, less accurate than `foosim.common.exact_math`,
+which everything else uses. Sources: Abramowitz and Stegun, Handbook of Mathematical Functions, 4.1.27 (logarithm),
+4.2.1 (exponential), 6.1.41 (Stirling's series of ln gamma).
 """
 
 from __future__ import annotations
