@@ -22,6 +22,7 @@ from bench import (
     hub,
     lateness,
     machine,
+    noise,
     packets,
     rays,
     realtime,
@@ -99,6 +100,7 @@ BENCHES: Final = (
     ),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
+    Bench("noise", "normal numbers of noise, in batches and by themselves", with_default(noise.noise), noise.lines),
     Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
     Bench(
