@@ -97,14 +97,14 @@ COMPILED: Final = {
     "vhub/state/members": "a client's part of the vHub's state, at each tick",
     "vhub/state/receive_limit": "room for what is on its way, for each packet",
     "vhub/state/send_order": "each broadcast's one sending",
-    "world/actuators/__init__": "the class that actuators derive from",
-    "world/actuators/differential_drive": "each command of a rover's wheels",
-    "world/actuators/joint_position": "the torque of each rod, at each substep",
+    "world/components/fitted": "each command that a robot takes, and what it asks of the motors",
+    "world/components/sensing": "samples that are due, at each tick",
+    "world/components/view": "what components see, at each tick",
+    "world/forms/payloads": "each sample is decoded here, each command encoded",
     "world/frame": "reads and digests each frame",
     "world/islands": "islands and who solves them, at each tick",
     "world/kinematics": "where each link of a body is, for radio and sensors",
     "world/layout": "the places in a frame of each body: compiled modules read them",
-    "world/payloads": "each sample is decoded here, each command encoded",
     "world/rules/football": "goals and the ball's return, at each tick",
     "world/sampling": "which sensor is due, at each tick",
     "world/scene": "where each body is, for radio and sensors",
@@ -112,9 +112,6 @@ COMPILED: Final = {
     "world/scenes/obstacles": "distances from what stands in the hall",
     "world/scenes/table_world": "commands of each rod, at each tick",
     "world/scenes/worlds": "the class that worlds derive from",
-    "world/sensors/__init__": "samples that are due, at each tick; the class that sensors derive from",
-    "world/sensors/encoder": "each sample of a rod or wheel",
-    "world/sensors/proximity": "the rays of each rover's sensors",
 }
 """Modules by path, each with what it does so often that it is compiled.
 

@@ -22,9 +22,10 @@ from foosim.capture.rows import PACKETS, ROW_TYPES, PacketRow, Row
 from foosim.common.errors import BadValue, Malformed, UnknownName, show
 from foosim.common.json_text import encode_json
 from foosim.common.names import nearest_name
-from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
-from foosim.world.payloads import COMMAND_KINDS, decode_payload, value_fields
+from foosim.world.forms.payloads import PayloadCodec, as_mapping
+from foosim.world.forms.per_field import codec_of
 
 Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
 POSES_TABLE: Final = "poses"
@@ -98,7 +99,7 @@ def table_of(name: str, deployment: Deployment) -> Table:
     if name == POSES_TABLE:
         return Table(name, POSES, _POSE_COLUMNS, _pose_rows)
     if name == COMMANDS_TABLE:
-        return Table(name, PACKETS, _command_columns(), _Commands(deployment).rows)
+        return Table(name, PACKETS, _command_columns(deployment), _Commands(deployment).rows)
     topic = f"/{name}"
     if topic == PACKETS:
         return Table(name, topic, (*_columns(PacketRow), Column("value", "json")), _PacketRows(deployment).rows)
@@ -162,28 +163,24 @@ class _Decoded:
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
-        self._kinds: dict[tuple[str, str], str] = {}
+        self._codecs: dict[tuple[str, str], PayloadCodec | None] = {}
 
-    def kind(self, robot: str, channel: str) -> str:
-        """Return the kind of a robot's channel, empty when it has no such one."""
+    def codec(self, robot: str, channel: str) -> PayloadCodec | None:
+        """Return the codec of a robot's channel; None when it has no such one, or one of bytes."""
         pair = robot, channel
-        if pair not in self._kinds:
+        if pair not in self._codecs:
             try:
-                known = robot in self._deployment.robots
-                self._kinds[pair] = channel_kind(self._deployment, robot, channel) if known else ""
+                self._codecs[pair] = channel_codec(self._deployment, robot, channel)
             except UnknownName:
-                self._kinds[pair] = ""
-        return self._kinds[pair]
+                self._codecs[pair] = None
+        return self._codecs[pair]
 
-    def numbers(self, kind: str, payload: bytes) -> dict[str, Any]:
+    def numbers(self, codec: PayloadCodec | None, payload: bytes) -> dict[str, Any]:
         """Return the values of a payload by name; none for plain bytes and for an invalid payload."""
-        if not kind:
-            return {}
         try:
-            value = decode_payload(kind, payload)
+            return {} if codec is None else as_mapping(codec.decode(payload))
         except Malformed:
             return {}
-        return {} if isinstance(value, bytes) else value._asdict()
 
 
 class _PacketRows(_Decoded):
@@ -194,8 +191,8 @@ class _PacketRows(_Decoded):
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
-        kind = self.kind(row.source, row.channel) or self.kind(row.destination, row.channel)
-        numbers = self.numbers(kind, row.payload)
+        codec = self.codec(row.source, row.channel) or self.codec(row.destination, row.channel)
+        numbers = self.numbers(codec, row.payload)
         yield (*_values(row, self._json), encode_json(numbers).decode() if numbers else None)
 
 
@@ -205,13 +202,16 @@ _COMMAND_FIELDS: Final = (
 )
 
 
-def _command_numbers() -> list[str]:
-    return list(dict.fromkeys(name for kind in COMMAND_KINDS for name in value_fields(kind)))
+def _command_units(deployment: Deployment) -> dict[str, str]:
+    """Return the numbers of all commands of a deployment's robots, in the order of their kinds, with their units."""
+    kinds = {settings.kind for robot in deployment.robots.values() for settings in robot.actuators.values()}
+    fields = [field for kind in sorted(kinds) for field in codec_of(kind, "actuator").fields]
+    return {field.name: field.unit for field in fields if field.is_number}
 
 
-def _command_columns() -> tuple[Column, ...]:
+def _command_columns(deployment: Deployment) -> tuple[Column, ...]:
     known = {column.name: column for column in _columns(PacketRow)}
-    numbers = (Column(name, "number", unit_of(name)) for name in _command_numbers())
+    numbers = (Column(name, "number", unit) for name, unit in _command_units(deployment).items())
     return (*(known[name] for name in _COMMAND_FIELDS), *numbers)
 
 
@@ -220,13 +220,16 @@ class _Commands(_Decoded):
 
     _decoder = msgspec.json.Decoder(PacketRow)
     _fields = attrgetter(*_COMMAND_FIELDS)
-    _numbers = tuple(_command_numbers())
+
+    def __init__(self, deployment: Deployment) -> None:
+        super().__init__(deployment)
+        self._numbers = tuple(_command_units(deployment))
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
-        kind = self.kind(row.destination, row.channel)
-        if kind in COMMAND_KINDS:
-            numbers = self.numbers(kind, row.payload)
+        robot = self._deployment.robots.get(row.destination)
+        if robot is not None and row.channel in robot.actuators:
+            numbers = self.numbers(self.codec(row.destination, row.channel), row.payload)
             yield (*self._fields(row), *(numbers.get(name) for name in self._numbers))
 
 

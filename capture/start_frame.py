@@ -146,7 +146,8 @@ def _seconds(at_ns: int | None) -> str | None:
 
 def _differences(layout: Layout, deployment: Deployment, added: list[AddedEntity]) -> list[str]:
     """Return in words where a captured layout is not that of the deployment with what was added."""
-    wanted = dict(build_layout(deployment).models)
+    ours = build_layout(deployment)
+    wanted = dict(ours.models)
     differing = [
         f"{a.name} was added, the deployment has a {wanted[a.name]} of that name" for a in added if a.name in wanted
     ]
@@ -159,8 +160,8 @@ def _differences(layout: Layout, deployment: Deployment, added: list[AddedEntity
         elif wanted[name] != layout.models[name]:
             differing.append(f"{name} is a {layout.models[name]} in the capture, a {wanted[name]} in the deployment")
         elif name in deployment.robots:
-            have, want = layout.sensors.get(name, ()), tuple(sorted(deployment.robots[name].sensors))
+            have, want = layout.components(name), ours.components(name)
             if have != want:
                 have_text, want_text = ", ".join(have) or "none", ", ".join(want) or "none"
-                differing.append(f"sensors of {name} are {have_text} in the capture, {want_text} in the deployment")
+                differing.append(f"components of {name} are {have_text} in the capture, {want_text} in the deployment")
     return differing

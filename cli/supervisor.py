@@ -347,6 +347,42 @@ def validate(options: RunOptions, json: Json = False) -> None:
     print(encode_json(content).decode() if json else f"{options.file}: valid, world {deployment.world}, {described}")
 
 
+@app.command()
+def components(
+    form: Annotated[str | None, typer.Argument(metavar="FORM", help="sensor, actuator or modifier.")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="One of them, or module:Class.")] = None,
+    json: Json = False,
+) -> None:
+    """Show the sensors, actuators and modifiers that a deployment can name on this machine.
+
+    They are foosim's own and those of installed packages (entry points of the group `foosim.world`). With a name:
+    settings with their units, limits and defaults, the fields of its readings or commands, and what it remembers.
+    """
+    from foosim.cli.components import as_json, chosen, line, lines
+    from foosim.common.json_text import encode_json
+
+    found = chosen(form, name)
+    if json:
+        print(encode_json([as_json(component) for component in found]).decode())
+        return
+    for component in found:
+        print(*([line(component)] if name is None else lines(component)), sep="\n")
+
+
+@app.command()
+def schema(
+    own: Annotated[bool, typer.Option("--own", help="Leave out what other packages bring.")] = False,
+) -> None:
+    """Print the JSON Schema of deployment files, with the components of all installed packages.
+
+    Editors that know JSON Schema complete and check a file whose first line names it:
+    `# yaml-language-server: $schema=FILE`.
+    """
+    from foosim.deployment.json_schema import deployment_schema_text
+
+    print(deployment_schema_text(installed=not own), end="")
+
+
 @app.command("install")
 def install_units(  # a command's options
     host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],

@@ -24,23 +24,24 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
 
+from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded
 from foosim.client.packets import Outgoing, check_packet, check_subscription
 from foosim.client.player import NS_PER_S, Newest, Sample
 from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed, UnknownName
-from foosim.common.names import CHANNEL_DRIVE, CHANNEL_POSITION, is_name
-from foosim.deployment.channel_kinds import channel_kind
+from foosim.common.names import is_name
+from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.channels import VHUB, Plane
 from foosim.protocol.messages import Received
 from foosim.runtime.process import new_boot
 from foosim.runtime.transport.inbox import Inbox
-from foosim.world.payloads import Command, Drive, Value, command_channels, decode_payload, encode_command
+from foosim.world.forms.payloads import Field, Value
 
 if TYPE_CHECKING:
     from foosim.runtime.transport.session import Session
@@ -93,33 +94,29 @@ class Named(Generic[T]):
 
 
 class Actuator:
-    """The position loop of a rod."""
+    """An actuator of a robot."""
 
-    def __init__(self, client: Client, robot: str) -> None:
+    def __init__(self, client: Client, robot: str, channel: str) -> None:
         self._client = client
         self._robot = robot
+        self._channel = channel
 
-    def set(self, slide: float, spin: float) -> None:
-        """Log where the rod shall go: `slide` in m along world +y from its middle, `spin` in rad about +y, 0 feet down.
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The numbers of its commands, in their order, with their units."""
+        return self._client._encoder.codec(self._robot, self._channel).fields
 
-        In lockstep it is sent at the tick's end, and of several the last one counts; after `listen` it is sent at once.
-        The rod keeps its last command. Raises BadValue for what is out of its reach or not finite, NotJoined, RunEnded.
+    def set(self, *numbers: float, **named: float) -> None:
+        """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
+
+        A rod's `position` takes `slide` in m along world +y from its middle and `spin` in rad about +y, 0 feet down; a
+        rover's `drive` the speeds of the rims of its `left` and `right` wheel in m/s. In lockstep a command is sent at
+        the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps its last
+        command. Raises BadValue for numbers that are out of bounds, not finite, or not those of a command; NotJoined,
+        RunEnded.
         """
-        payload = encode_command(self._client.deployment, self._robot, Command(float(slide), float(spin)))
-        self._client._command(self._robot, payload, CHANNEL_POSITION)
-
-
-class DriveActuator:
-    """The two wheels of a rover."""
-
-    def __init__(self, client: Client, robot: str) -> None:
-        self._client = client
-        self._robot = robot
-
-    def set(self, left: float, right: float) -> None:
-        """Log how fast the wheels shall roll, in m/s; the rover keeps its last command. Otherwise as for a rod."""
-        payload = encode_command(self._client.deployment, self._robot, Drive(float(left), float(right)))
-        self._client._command(self._robot, payload, CHANNEL_DRIVE)
+        payload = self._client._encoder.encode_numbers(self._robot, self._channel, numbers, named)
+        self._client._command(self._robot, self._channel, payload)
 
 
 class Robot:
@@ -133,16 +130,12 @@ class Robot:
         def sensor(channel: str) -> Sample | None:
             return client._sample(name, channel)
 
-        makes = {CHANNEL_POSITION: Actuator, CHANNEL_DRIVE: DriveActuator}
-
-        def actuator(channel: str) -> Any:
-            return makes[channel](client, name)
+        def actuator(channel: str) -> Actuator:
+            return Actuator(client, name, channel)
 
         self.sensors: Final[Named[Sample | None]] = Named(f"{name} has no such sensor", robot.sensors, sensor)
-        """The newest sample of each, None until one has come; its `value` is of the channel's kind (`payloads`)."""
-        moved = command_channels(robot)
-        self.actuators: Final[Named[Any]] = Named(f"{name} has no such actuator", moved, actuator)
-        """A rod's `position` is an Actuator, a rover's `drive` a DriveActuator."""
+        """The newest sample of each, None until one has come; its `value` is a reading of the sensor's kind."""
+        self.actuators: Final[Named[Actuator]] = Named(f"{name} has no such actuator", robot.actuators, actuator)
 
     def send(self, channel: str, payload: bytes) -> None:
         """Send a packet to the robot; see `Client.send`."""
@@ -232,7 +225,9 @@ class Client:
         self._period: int | None = None
         self._turns: Turns = (0, 0, ())
         """As it has joined."""
-        self._commands: dict[str, Outgoing] = {}
+        self._commands: dict[tuple[str, str], Outgoing] = {}
+        """By robot and channel."""
+        self._encoder = CommandEncoder(deployment)
         self._outgoing: deque[Outgoing] = deque()
 
     # --- what it is --------------------------------------------------------------------------------------------------
@@ -393,15 +388,15 @@ class Client:
         period, offset, arrivals = turns
         self._subscriptions.update(arrivals)
         pairs = sorted(self._subscriptions)
-        self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in pairs})
+        self._newest = Newest({pair: channel_codec(self.deployment, *pair) for pair in pairs})
         self._core.join(period, pairs, offset, arrivals)
         self._period, self._turns = period, turns
         self._link.perform()
 
-    def _command(self, robot: str, payload: bytes, channel: str) -> None:
+    def _command(self, robot: str, channel: str, payload: bytes) -> None:
         if self._period:
             self._check_sending()
-            self._commands[robot] = Outgoing(robot, channel, payload)
+            self._commands[robot, channel] = Outgoing(robot, channel, payload)
         else:
             self.send(robot, channel, payload)
 
@@ -428,8 +423,8 @@ class Client:
         value: Value | None = packet.payload
         if packet.source in self.deployment.robots:
             try:
-                kind = channel_kind(self.deployment, packet.source, packet.channel)
-                value = decode_payload(kind, packet.payload)
+                codec = channel_codec(self.deployment, packet.source, packet.channel)
+                value = packet.payload if codec is None else codec.decode(packet.payload)
             except (UnknownName, Malformed):
                 value = None
         return Packet(

@@ -11,17 +11,20 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Protocol
 
+from msgspec import Struct
+
+from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError
 from foosim.client.failing import Unanswered, failed
 from foosim.client.loading import load_player
 from foosim.client.packets import Outgoing, check_packet
 from foosim.common.errors import Malformed, Refused, UnknownName
-from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
-from foosim.world.payloads import Command, Drive, Value, command_channel, decode_payload, encode_command
+from foosim.world.forms.payloads import PayloadCodec, Value
 
 NS_PER_S: Final = 1_000_000_000
 
@@ -39,10 +42,8 @@ class Sample(NamedTuple):
 
 Samples = Mapping[tuple[str, str], Sample]
 """The newest sample of each (endpoint, channel) so far; a channel without one is absent."""
-Commands = Mapping[str, Command]
-"""Commands by robot name; a robot without one keeps its last command."""
-Drives = Mapping[str, Drive]
-"""The same for rovers."""
+Commands = Mapping[str, Struct]
+"""Commands by robot name, of the type that the robot's actuator takes; a robot without one keeps its last command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,14 +53,14 @@ class Turn:
     A packet without a destination is a broadcast to all subscribers of the player's channel.
     """
 
-    commands: Commands | Drives
+    commands: Commands
     packets: Sequence[Outgoing] = ()
 
 
 class Player(Protocol):
     """A controller. It sees packets only: samples are as old as the network made them, and some never come."""
 
-    def act(self, tick: int, samples: Samples) -> Commands | Drives | Turn:
+    def act(self, tick: int, samples: Samples) -> Commands | Turn:
         """Return commands at `tick`, or a Turn that has packets, too.
 
         Equal calls in equal order must give equal results: use no clock, no dice.
@@ -73,23 +74,23 @@ PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
 class Newest:
     """Keeps the newest sample of each channel by sending time; packets may arrive out of order."""
 
-    def __init__(self, kinds: Mapping[tuple[str, str], str]) -> None:
-        """`kinds` is the payload kind of each (endpoint, channel); packets of others are ignored."""
+    def __init__(self, codecs: Mapping[tuple[str, str], PayloadCodec | None]) -> None:
+        """`codecs` are those of each (endpoint, channel), None for bytes; packets of others are ignored."""
         self.samples: dict[tuple[str, str], Sample] = {}
         self.malformed = 0
         """Samples that did not fit their channel."""
-        self._kinds = kinds
+        self._codecs = codecs
 
     def take(self, packets: Iterable[Received]) -> None:
         """Take packets in order of arrival."""
         for packet in packets:
             pair = (packet.source, packet.channel)
-            kind = self._kinds.get(pair)
             known = self.samples.get(pair)
-            if kind is None or (known is not None and known.sequence >= packet.sequence):
+            if pair not in self._codecs or (known is not None and known.sequence >= packet.sequence):
                 continue
+            codec = self._codecs[pair]
             try:
-                value = decode_payload(kind, packet.payload)
+                value = packet.payload if codec is None else codec.decode(packet.payload)
             except Malformed:
                 self.malformed += 1
                 continue
@@ -105,6 +106,7 @@ class PlayerLoop:
         self._load = load
         self._declaration: Declaration | None = None
         self._player: Player | None = None
+        self._encoder: CommandEncoder | None = None
         self._beat_ns = NEVER_NS
         self._period_ns = 0
 
@@ -143,8 +145,9 @@ class PlayerLoop:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
         declared = self._declaration = deployment.players[name]
         self._player = self._make(deployment)
+        self._encoder = CommandEncoder(deployment)
         pairs = deployment.heard_by(name)
-        self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in pairs})
+        self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in pairs})
         if declared.lockstep:
             period, offset = deployment.turns(declared)
             self.core.join(period, pairs, offset, deployment.arrivals_of(name))
@@ -213,8 +216,8 @@ class PlayerLoop:
 
     def _commands(self, commands: object, where: str) -> list[Outgoing]:
         """Return a player's commands as packets, in the robots' name order."""
-        deployment, declared = self.core.deployment, self._declaration
-        assert deployment is not None and declared is not None
+        declared, encoder = self._declaration, self._encoder
+        assert declared is not None and encoder is not None
         if not isinstance(commands, Mapping):
             kind = type(commands).__name__
             raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to Commands")
@@ -222,11 +225,10 @@ class PlayerLoop:
         for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:
                 raise PlayerError(f"{where}: {UnknownName('not one of its robots', robot, declared.robots)}")
-            if not isinstance(command, Command | Drive):
-                raise PlayerError(f"{where}: {robot} gets a {type(command).__name__}, not a Command")
+            if not isinstance(command, Struct):
+                raise PlayerError(f"{where}: {robot} gets a {type(command).__name__}, not a command")
             try:
-                payload = encode_command(deployment, robot, command)
-                packets.append(Outgoing(robot, command_channel(deployment, robot, command), payload))
+                packets.append(Outgoing(robot, *encoder.encode(robot, command)))
             except Refused as error:
                 raise PlayerError(f"{where}: {error}") from error
         return packets

@@ -24,7 +24,7 @@ from foosim.client.errors import ConnectionFailed
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused, UnknownName
 from foosim.common.json_text import decode_json, encode_json
-from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -34,7 +34,7 @@ from foosim.protocol.messages import Answer, Request
 from foosim.protocol.replay_messages import CLOCK, STREAMS, Played, PlayedPacket, ReplayClock
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.inbox import Inbox
-from foosim.world.payloads import Value, decode_payload
+from foosim.world.forms.payloads import Value
 
 if TYPE_CHECKING:
     from foosim.runtime.transport.session import Session
@@ -111,7 +111,8 @@ class Replay:
             robot = self._old_names.get(name, name)
             if robot in self.deployment.robots:
                 try:
-                    return decode_payload(channel_kind(self.deployment, robot, channel), packet.payload)
+                    codec = channel_codec(self.deployment, robot, channel)
+                    return packet.payload if codec is None else codec.decode(packet.payload)
                 except (UnknownName, Malformed):
                     continue
         return None

@@ -31,11 +31,8 @@ TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
 # and clients.
 ENTITY_NAMES_RESERVED: Final = ("ball", "world")
 PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
-# Channels that every robot, every rod, or every rover has; no sensor may have these names.
 CHANNEL_ECHO: Final = "echo"
-CHANNEL_POSITION: Final = "position"
-CHANNEL_DRIVE: Final = "drive"
-CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION, CHANNEL_DRIVE)
+"""The channel that every robot has; no component may have this name."""
 
 SIMILAR: Final = 0.6
 """Similarity from which a name is suggested: 0 is nothing in common, 1 is equal but for capitals."""

@@ -80,6 +80,7 @@ LEVEL: Final = Dimension("level", _sizes(dB="1"))
 ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e6"))
 POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
 VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
+CURRENT: Final = Dimension("current", _sizes(A="1", mA="1e-3"))
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)}, usual="%")
 FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
 BITRATE: Final = Dimension(

@@ -1,23 +1,26 @@
-"""The payload kinds of the channels of a deployment's endpoints."""
+"""The readings and commands of the channels of a deployment's endpoints."""
 
 from __future__ import annotations
 
 from foosim.common.errors import UnknownName
 from foosim.common.names import CHANNEL_ECHO
 from foosim.deployment.schema import Deployment
-from foosim.world.payloads import command_channels
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.per_field import codec_of
 
 
-def channel_kind(deployment: Deployment, robot: str, channel: str) -> str:
-    """Return the kind of an endpoint's channel, bytes for players and clients; raises UnknownName."""
-    if robot in deployment.players or robot in deployment.clients:
-        return CHANNEL_ECHO
-    if robot not in deployment.robots:
-        raise UnknownName("unknown robot", robot, deployment.robots)
-    settings = deployment.robots[robot]
-    built_in = [CHANNEL_ECHO, *command_channels(settings)]
-    if channel in built_in:
-        return channel
-    if channel not in settings.sensors:
-        raise UnknownName(f"{robot} has no such channel", channel, [*settings.sensors, *built_in])
-    return settings.sensors[channel].kind
+def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> PayloadCodec | None:
+    """Return what a channel of an endpoint carries: None for bytes, as on `echo`, and of players and clients.
+
+    Raises UnknownName.
+    """
+    robot = deployment.robots.get(endpoint)
+    if robot is None and endpoint not in deployment.players and endpoint not in deployment.clients:
+        raise UnknownName("unknown robot", endpoint, deployment.robots)
+    if robot is None or channel == CHANNEL_ECHO:
+        return None
+    if channel in robot.sensors:
+        return codec_of(robot.sensors[channel].kind, "sensor")
+    if channel in robot.actuators:
+        return codec_of(robot.actuators[channel].kind, "actuator")
+    raise UnknownName(f"{endpoint} has no such channel", channel, [*robot.sensors, CHANNEL_ECHO, *robot.actuators])

@@ -16,6 +16,7 @@ from foosim.common import names, units
 from foosim.common.errors import BadValue, show
 from foosim.common.finding import Finding, Location
 from foosim.common.names import LINE_NAMES, nearest_name
+from foosim.world.forms.models import MODELS
 
 # Bounds of the checks; the schema refuses larger values.
 TEXTS_MAX: Final = 4096
@@ -189,13 +190,11 @@ def _hosts(view: View) -> Iterator[Finding]:
 
 
 def _robots(view: View) -> Iterator[Finding]:
-    """Lines exist and have one rod a team; channels are not called like built-in ones."""
+    """Lines exist and have one rod a team; channels have names of their own."""
     rods: dict[tuple[str, str], str] = {}
     lines = view.get("table", "lines")
     for name in view.robots:
-        for channel in view.mapping("robots", name, "sensors"):
-            if channel in names.CHANNEL_NAMES_RESERVED:
-                yield Finding(("robots", name, "sensors", channel), "a reserved name", channel, at="key")
+        yield from _channels(view, name)
         team, line = view.get("robots", name, "team"), view.get("robots", name, "line")
         if not (isinstance(team, str) and isinstance(line, str)):
             continue
@@ -204,6 +203,21 @@ def _robots(view: View) -> Iterator[Finding]:
         first = rods.setdefault((team, line), name)
         if first != name:
             yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
+
+
+def _channels(view: View, robot: str) -> Iterator[Finding]:
+    """The components of a robot have names of their own, and none is called like the channel that every robot has."""
+    model = view.get("robots", robot, "model")
+    actuators = view.mapping("robots", robot, "actuators")
+    if view.get("robots", robot, "actuators") is None and isinstance(model, str) and model in MODELS:
+        actuators = MODELS[model].actuators
+    for section, others in (("sensors", actuators), ("actuators", {})):
+        for channel in view.mapping("robots", robot, section):
+            location = ("robots", robot, section, channel)
+            if channel == names.CHANNEL_ECHO:
+                yield Finding(location, "a reserved name", channel, at="key")
+            elif channel in others:
+                yield Finding(location, f"a name that is also one of {robot}'s actuators", channel, at="key")
 
 
 def _nodes(view: View) -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
 from foosim.deployment.checks import check_references, path_text
+from foosim.deployment.components import read_components
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network_checks import check_network, check_network_alone
 from foosim.deployment.overrides import place_sets
@@ -29,12 +30,13 @@ from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
 from foosim.deployment.table_clearance import clearance_findings
-from foosim.deployment.timing_checks import check_timing
-from foosim.deployment.yaml import (
+from foosim.deployment.text.earlier_format import upgrade
+from foosim.deployment.text.yaml import (
     DEPTH_MAX,
     NODES_MAX,
     Fields,
     Items,
+    Locate,
     Place,
     Problem,
     Tree,
@@ -45,6 +47,7 @@ from foosim.deployment.yaml import (
     read_tree,
     write_yaml,
 )
+from foosim.deployment.timing_checks import check_timing
 from foosim.world.scenes.hall_start import start_findings
 
 PROBLEMS_MAX: Final = 100
@@ -61,6 +64,13 @@ _kept: dict[tuple[str, str], Deployment] = {}
 """By text and name, the least recently used first."""
 
 
+def _read_tree(text: str, locate: Locate) -> tuple[Tree | None, list[Problem]]:
+    """The result of `read_tree`, of a file of an earlier format as one of today's."""
+    tree, problems = read_tree(text, locate)
+    upgrade(tree)
+    return tree, problems
+
+
 def load_deployment(text: str, name: str) -> Deployment:
     """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems.
 
@@ -72,12 +82,12 @@ def load_deployment(text: str, name: str) -> Deployment:
 
 def read_deployment(text: str, name: str) -> Deployment:
     """The result of `load_deployment`, without the cache."""
-    return _check(*read_tree(text, locate_in(name)))
+    return _check(*_read_tree(text, locate_in(name)))
 
 
 def load_earlier(text: str, name: str) -> Deployment:
     """What `load_deployment` returns of a text with settings that an earlier version had; they are left out."""
-    tree, problems = read_tree(text, locate_in(name))
+    tree, problems = _read_tree(text, locate_in(name))
     for section, key in EARLIER_SETTINGS:
         fields = tree.values.get(section) if isinstance(tree, Fields) else None
         if isinstance(fields, Fields):
@@ -96,7 +106,7 @@ def _keep(text: str, name: str, deployment: Deployment) -> Deployment:
 @lru_cache(maxsize=TREES_KEPT)
 def _tree_of(text: str, name: str) -> tuple[Tree | None, list[Problem]]:
     """The result of `read_tree`; it is not changed."""
-    return read_tree(text, locate_in(name))
+    return _read_tree(text, locate_in(name))
 
 
 def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
@@ -132,7 +142,7 @@ def load_network(text: str, name: str, sets: Sequence[str] = ()) -> Network | No
 
     Raises DeploymentError with all problems of the section. The matches of its selectors are not checked.
     """
-    tree, problems = read_tree(text, locate_in(name))
+    tree, problems = _read_tree(text, locate_in(name))
     if not isinstance(tree, Fields) or set(tree.values) != {"network"}:
         return None
     tree, set_problems = place_sets(tree, sets)
@@ -171,7 +181,7 @@ def refuse_findings(text: str, name: str, findings: Sequence[Finding], sets: Seq
     `text`, `name` and `sets` are what it was loaded from.
     """
     if findings:
-        tree, _ = read_tree(text, locate_in(name))
+        tree, _ = _read_tree(text, locate_in(name))
         assert tree is not None, "it was loaded"
         tree, _ = place_sets(tree, sets)
         raise DeploymentError(_report([_problem(tree, finding) for finding in findings]))
@@ -183,9 +193,9 @@ def with_network(text: str, name: str, other: tuple[str, str] | None, sets: Sequ
     `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
     Raises DeploymentError with all problems, each in its file.
     """
-    tree, problems = read_tree(text, locate_in(name))
+    tree, problems = _read_tree(text, locate_in(name))
     if other is not None and isinstance(tree, Fields):
-        there, there_problems = read_tree(other[0], locate_in(other[1]))
+        there, there_problems = _read_tree(other[0], locate_in(other[1]))
         problems = [*problems, *there_problems]
         if isinstance(there, Fields) and "network" in there.values:
             tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
@@ -230,6 +240,8 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
         data = plain(tree)
         found_first = chain(check_references(data), check_timing(data), check_network(data))
         findings = list(islice(found_first, PROBLEMS_MAX + 1))
+        data, component_findings = read_components(data)
+        findings += component_findings[: PROBLEMS_MAX + 1]
         try:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:

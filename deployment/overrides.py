@@ -13,7 +13,7 @@ from typing import Any, Final
 from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
-from foosim.deployment.yaml import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
+from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
 
 ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256

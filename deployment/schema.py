@@ -6,10 +6,9 @@ by references.py. Quantities are strings with units in the file and SI numbers h
 whose names end in `_ns` (see units.py). The table's parameters are in table.py, a hall's in hall.py.
 """
 
-import json
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 
@@ -144,9 +143,9 @@ class Deadlines(SpecBase):
 
 
 def _int_only(value: object) -> object:
-    """Literal[1] alone would take `true` and `1.0` for 1."""
+    """Literal[2] alone would take `2.0` for 2."""
     if type(value) is not int:
-        raise custom_error(BadValue("not one of 1", value))
+        raise custom_error(BadValue("not one of 1, 2", value))
     return value
 
 
@@ -156,7 +155,7 @@ class Deployment(WorldSpec):
     The world is a football table or a hall with mobile robots: one of `table` and `hall` is given.
     """
 
-    format: Annotated[Literal[1], BeforeValidator(_int_only, json_schema_input_type=Literal[1])]
+    format: Annotated[Literal[2], BeforeValidator(_int_only, json_schema_input_type=Literal[2])]
     pace: PaceField
     mixed_cpu: bool = False
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
@@ -247,14 +246,3 @@ def places(deployment: Deployment) -> dict[str, str]:
             found[name] = min(fitting, key=lambda host: sum(taken == host for taken in found.values()))
     found |= {role: found[process] for role, process in declared.items() if process in found}
     return dict(sorted(found.items()))
-
-
-def deployment_schema() -> dict[str, Any]:
-    """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text."""
-    schema = Deployment.model_json_schema(by_alias=True, mode="validation")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}
-
-
-def deployment_schema_text() -> str:
-    """What deploy/deployment.schema.json holds."""
-    return json.dumps(deployment_schema(), indent=2) + "\n"

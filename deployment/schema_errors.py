@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from foosim.common import names
@@ -18,7 +18,7 @@ from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.deployment import hosts
 from foosim.deployment.checks import quoted
-from foosim.deployment.schema import deployment_schema
+from foosim.deployment.json_schema import deployment_schema
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {
@@ -52,15 +52,28 @@ def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Fi
     `under` is the location in the deployment of the checked part.
     """
     details = error.errors(include_url=False)
-    return (_finding(detail, under) for detail in details if detail["type"] not in _CONSEQUENCES)
+    root = _deployment()
+    return (_finding(detail, (*under, *detail["loc"]), root) for detail in details if _is_cause(detail))
 
 
-def _finding(detail: ErrorDetails, under: Location) -> Finding:
+def settings_findings(error: ValidationError, settings: type[BaseModel], under: Location) -> Iterator[Finding]:
+    """One finding for each of pydantic's errors about the settings of a component, which are at `under`."""
+    root = _Schema(settings.model_json_schema(by_alias=True))
+    for detail in error.errors(include_url=False):
+        if _is_cause(detail):
+            finding = _finding(detail, detail["loc"], root)
+            yield replace(finding, location=(*under, *finding.location))
+
+
+def _is_cause(detail: ErrorDetails) -> bool:
+    return detail["type"] not in _CONSEQUENCES
+
+
+def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    path = (*under, *detail["loc"])
-    location, schema, is_key = _follow(path)
+    location, schema, is_key = root.follow(path)
     if kind == "extra_forbidden":
-        return _unknown(location, _follow(path[:-1])[1])
+        return _unknown(location, root.follow(path[:-1])[1])
     translate = _TRANSLATIONS.get(kind)
     if translate is not None:
         finding = translate(location, schema, value, context)
@@ -131,51 +144,55 @@ _TRANSLATIONS: Final[dict[str, Callable[[Location, Mapping[str, Any], object, Ma
 }
 
 
-@cache
-def _root() -> Mapping[str, Any]:
-    return deployment_schema()
+class _Schema:
+    """A JSON Schema that the paths of errors are followed through."""
 
+    def __init__(self, root: Mapping[str, Any]) -> None:
+        self._root = root
 
-def _follow(path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], bool]:
-    """The location in the data of a path through the models, its schema, and whether the key there is meant.
+    def follow(self, path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], bool]:
+        """The location in the data of a path through the models, its schema, and whether the key there is meant.
 
-    Of a key that is meant, the schema is that of keys.
-    """
-    location: list[str | int] = []
-    keys: Mapping[str, Any] = {}
-    schema = _resolve(_root())
-    for step in path:
-        if step == "[key]":
-            return tuple(location), _resolve(keys), True
-        if "discriminator" in schema and step in schema["discriminator"]["mapping"]:
-            schema = _resolve({"$ref": schema["discriminator"]["mapping"][step]})
-            continue
-        location.append(step)
-        keys = schema.get("propertyNames", {})
-        schema = _child(schema, step)
-    return tuple(location), schema, False
+        Of a key that is meant, the schema is that of keys.
+        """
+        location: list[str | int] = []
+        keys: Mapping[str, Any] = {}
+        schema = self._resolve(self._root)
+        for step in path:
+            if step == "[key]":
+                return tuple(location), self._resolve(keys), True
+            if "discriminator" in schema and step in schema["discriminator"]["mapping"]:
+                schema = self._resolve({"$ref": schema["discriminator"]["mapping"][step]})
+                continue
+            location.append(step)
+            keys = schema.get("propertyNames", {})
+            schema = self._child(schema, step)
+        return tuple(location), schema, False
 
-
-def _child(schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
-    if isinstance(step, int):
-        several = schema.get("prefixItems", ())
-        found = several[step] if step < len(several) else schema.get("items", {})
-    else:
-        named, patterns = schema.get("properties", {}), schema.get("patternProperties", {})
-        found = named.get(step) or next(iter(patterns.values()), schema.get("additionalProperties"))
-    return _resolve(found if isinstance(found, dict) else {})
-
-
-def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The schema itself behind references, and behind `or null` and `or a list of them`."""
-    while True:
-        if "$ref" in schema:
-            schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
-        elif "anyOf" in schema:
-            inner = [s for s in schema["anyOf"] if _has_parts(s)]
-            schema = next(iter(inner or [s for s in schema["anyOf"] if s.get("type") != "null"]), {})
+    def _child(self, schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
+        if isinstance(step, int):
+            several = schema.get("prefixItems", ())
+            found = several[step] if step < len(several) else schema.get("items", {})
         else:
-            return schema
+            named, patterns = schema.get("properties", {}), schema.get("patternProperties", {})
+            found = named.get(step) or next(iter(patterns.values()), schema.get("additionalProperties"))
+        return self._resolve(found if isinstance(found, dict) else {})
+
+    def _resolve(self, schema: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The schema itself behind references, and behind `or null` and `or a list of them`."""
+        while True:
+            if "$ref" in schema:
+                schema = self._root["$defs"][schema["$ref"].removeprefix("#/$defs/")]
+            elif "anyOf" in schema:
+                inner = [s for s in schema["anyOf"] if _has_parts(s)]
+                schema = next(iter(inner or [s for s in schema["anyOf"] if s.get("type") != "null"]), {})
+            else:
+                return schema
+
+
+@cache
+def _deployment() -> _Schema:
+    return _Schema(deployment_schema())
 
 
 def _has_parts(schema: Mapping[str, Any]) -> bool:

@@ -27,7 +27,7 @@ from foosim.cli.supervisor import app as supervisor_app
 from foosim.client.main import app as player_app
 from foosim.common import limits, units
 from foosim.console.main import app as console_app
-from foosim.deployment.schema import deployment_schema, deployment_schema_text
+from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.node.main import app as node_app
 from foosim.protocol.channels import CHANNELS
 from foosim.runtime.health import app as probe_app
@@ -189,6 +189,10 @@ def write_deployment() -> Iterator[str]:
     while waiting:
         name = waiting.pop(0)
         part = schema if name == "the file" else definitions[name]
+        for found in re.findall(r"#/\$defs/(\w+)", "" if "properties" in part else str(part)):
+            if found not in met:
+                met.add(found)
+                waiting.append(found)
         if "properties" not in part:
             continue
         yield f"### {name[0].upper() + name[1:]}\n\n{part['description']}\n\n| key | value | default |\n|---|---|---|\n"
@@ -213,7 +217,7 @@ def _value(value: Mapping[str, Any]) -> str:  # noqa: PLR0911  # a line for each
         name = value["$ref"].rpartition("/")[2]
         return "anything" if name == "JsonValue" else f"see {name}"
     for choice in ("anyOf", "oneOf"):
-        if choice in value:
+        if choice in value and "description" not in value:
             return " or ".join(_value(one) for one in value[choice] if one.get("type") != "null")
     if "patternProperties" in value:
         return f"names, each with: {_value(next(iter(value['patternProperties'].values())))}"

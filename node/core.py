@@ -7,6 +7,8 @@ else in the system sees committed frames only.
 
 from __future__ import annotations
 
+import traceback
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +21,7 @@ from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.node.inputs import Inputs, PendingEpochMessages, check_near
-from foosim.node.tick import Stepper, Work, moved_counters
+from foosim.node.tick import Stepper, Work, moved_slots
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
@@ -43,6 +45,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
+from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.initial_state import initial_frame
 from foosim.world.islands import Assignment, Share, reach_of
@@ -83,6 +86,8 @@ class NodeCore:
         self.actions: list[Action] = []
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.work: Work | None = None
+        self.failure = ""
+        """Why no run can continue here: a component has raised."""
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
         self.deployment: Deployment | None = None
@@ -101,11 +106,14 @@ class NodeCore:
         self._unsampled: set[int] = set()
         """Ticks at which samples are wanted of frames that are not here."""
         self._pending = PendingEpochMessages()
-        self._counters: list[int] = []
+        self._remembered: dict[int, float] = {}
+        """What the sensors of this node remember of the present frame: numbers of the next one, by place."""
         self._barrier: Barrier | None = None
         self._input_digest = b""
         self._sensed = False
         self._patience = Patience(now_ns)
+        self._not_finite: set[str] = set()
+        """Whose readings have been said not to be finite."""
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
         self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
             channels.ORDER.name: self._on_order,
@@ -138,14 +146,29 @@ class NodeCore:
 
     def advance(self, now_ns: int) -> None:
         """Advance as far as the inputs allow; `work` is set when the engine has to solve."""
-        while self.frame is not None and self._term is not None and self.work is None and self.ended is None:
-            if not self._sensed:
-                self._sense()
-            if self._barrier is None:
-                if not self._begin():
+        try:
+            while self.frame is not None and self._term is not None and self.work is None and self._computes:
+                if not self._sensed:
+                    self._sense()
+                if self._barrier is None:
+                    if not self._begin():
+                        return
+                elif not self._collect(now_ns):
                     return
-            elif not self._collect(now_ns):
-                return
+        except ComponentError as error:
+            self.fail(error)
+
+    @property
+    def _computes(self) -> bool:
+        return self.ended is None and not self.failure
+
+    def fail(self, error: ComponentError) -> None:
+        """A component has raised: compute no more, and have the run end, since the next owner would meet it, too."""
+        self.failure = str(error)[: limits.TEXT_LENGTH_MAX]
+        self.work = None
+        trace = "".join(traceback.format_exception(error.cause))
+        self.actions.append(Log("error", f"{error}\n{trace}"))
+        self.actions.append(Publish(channels.HEARTBEAT, self.name, encode(self._heartbeat())))
 
     def solved(self, work: Work) -> None:
         """Accept the solved work, and publish this node's part of the next frame."""
@@ -154,8 +177,8 @@ class NodeCore:
         self.work = None
         if work.islands:
             self._solved_ticks += 1
-        for slot in self._counters:
-            work.numbers[slot] += 1.0
+        for place, number in self._remembered.items():
+            work.numbers[place] = number
         values = np.array(work.numbers)
         slots = self._barrier.slots
         part = Part(
@@ -238,16 +261,20 @@ class NodeCore:
         assert frame is not None and term is not None
         self._sensed = True
         if term.stepper.sampling.is_silent(frame):
-            self._counters = []
+            self._remembered = {}
             return
-        self._counters = self._say_samples(frame, term.mine)
+        self._remembered = self._say_samples(frame, term.mine)
 
-    def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> list[int]:
-        """Log what these robots send at a frame; return the counters of the sensors that sampled."""
-        packets, counters = self.stepper(frame.layout).sense(frame, robots)
+    def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
+        """Publish what these robots send at a frame; return what their sensors remember."""
+        stepper = self.stepper(frame.layout)
+        packets, remembered = stepper.sense(frame, robots)
+        for name in stepper.not_finite.keys() - self._not_finite:
+            self._not_finite.add(name)
+            self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite, and not sent"))
         samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in robots], packets)
         self.actions.append(Publish(channels.SAMPLES, self.name, encode(samples)))
-        return counters
+        return remembered
 
     def _begin(self) -> bool:
         """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
@@ -260,11 +287,11 @@ class NodeCore:
         raw, deliveries = delivered
         layout, numbers = self._term.stepper.edited(frame, edits)
         if layout is not frame.layout:
-            self._counters = moved_counters(self._counters, frame.layout, layout)
+            self._remembered = moved_slots(self._remembered, frame.layout, layout)
             self._term = self._make_term(layout)
         term = self._term
         share: Share = term.assignment.shares(numbers)[self.name]
-        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers)
+        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         entities = layout.entities
@@ -495,5 +522,7 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        report = encode_json({"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender()})
-        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)
+        not_finite = sum((stepper.not_finite for stepper in self._steppers.values()), Counter[str]())
+        counts = {"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender(), "not_finite": not_finite}
+        report = encode_json(counts)
+        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, self.failure, self.busy, report)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from foosim.world.components.fitted import actuators_of
+from foosim.world.components.view import WritableView
 from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after
 from foosim.world.frame import Frame
 from foosim.world.initial_state import place_ball
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Layout
 from foosim.world.spec import WorldSpec
 
 
@@ -21,7 +23,7 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, 
         elif isinstance(change, Push) and change.name in layout:
             _push(numbers, layout, change, spec.table.ball.mass)
         elif isinstance(change, Freeze | Thaw):
-            _take_out(numbers, layout[change.name], isinstance(change, Freeze))
+            _take_out(WritableView(frame.tick, numbers), numbers, spec, layout, change)
     return layout, numbers
 
 
@@ -42,10 +44,12 @@ def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None
         numbers[start + axis] += impulse / mass
 
 
-def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
-    """Mark a robot as out of service or back in it; its set-point is then its present position, or speed 0."""
-    numbers[robot.offsets["down"]] = float(is_down)
-    set_point = robot.offsets.get("set_point")
-    if set_point is not None:
-        position = robot.offsets.get("joint_positions")
-        numbers[set_point : set_point + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]
+def _take_out(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, change: Freeze | Thaw) -> None:
+    """Mark a robot as out of service or back in it; its actuators hold it where it is."""
+    robot = layout[change.name]
+    numbers[robot.offsets["down"]] = float(isinstance(change, Freeze))
+    for one in actuators_of(spec, layout, robot):
+        one.actuator.hold(view)
+        for field, at in robot.offsets.items():
+            if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
+                numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

@@ -16,6 +16,7 @@ from foosim.node.core import NodeCore
 from foosim.node.engines import build_in_steps, make_engine, prepare_spares
 from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.tick import Stepper, Work
+from foosim.world.components.view import ComponentError
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Layout, build_layout
 from foosim.world.mesh import Mesh
@@ -81,9 +82,14 @@ class Solver:
     def _take(self, layout: Layout, engine: Engine) -> None:
         """Keep a new engine and report it to the core."""
         self._engines[layout.digest] = engine
-        if not self.fingerprint:
-            self.fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
         self._told += 1
+        try:
+            stepper = self._core.stepper(layout)
+            if not self.fingerprint:
+                self.fingerprint = engine_fingerprint(engine, stepper)
+        except ComponentError as error:
+            self._core.fail(error)
+            return
         self._core.engine_ready(layout, self.fingerprint)
 
     def rebuild(self) -> None:
@@ -110,8 +116,12 @@ class Solver:
 
     def solve(self, work: Work) -> None:
         """Solve a tick's work and give it back to the core."""
-        self._core.stepper(work.layout).solve(self.engine_for(work.layout), work)
-        self._core.solved(work)
+        try:
+            self._core.stepper(work.layout).solve(self.engine_for(work.layout), work)
+        except ComponentError as error:
+            self._core.fail(error)
+        else:
+            self._core.solved(work)
 
     def close(self) -> None:
         for engine in self._engines.values():

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -15,14 +16,15 @@ from foosim.common import limits
 from foosim.deployment.schema import Deployment
 from foosim.node.edited_frame import edit
 from foosim.node.engines.interface import Engine
+from foosim.world.components.fitted import FittedActuator, sensors_of
+from foosim.world.components.sensing import Sensing
+from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
 from foosim.world.scenes.worlds import world_of
-from foosim.world.sensors import Sensor, make_sensor, sample_all
-from foosim.world.spec import Sensor as SensorSpec
 
 ECHO = "echo"
 
@@ -50,35 +52,37 @@ class Stepper:
         self.layout = layout
         self.world = world_of(deployment, layout)
         self.substeps = deployment.substeps
-        self._sensors: dict[str, list[tuple[str, tuple[int, int], int, Sensor]]] = {}
-        for robot in layout.robots:
-            self._sensors[robot.name] = [
-                (
-                    channel,
-                    deployment.turns(settings),
-                    robot.offsets[f"sampled.{channel}"],
-                    make_sensor(settings, deployment, layout, robot, channel),
-                )
-                for channel, settings in _sensors_of(deployment, robot.name)
-            ]
+        self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
+        self._sensing = Sensing()
+        self._waiting = [
+            (layout.entities[index], one)
+            for index, actuators in sorted(self.world.actuators.items())
+            for one in actuators
+            if one.has_waiting
+        ]
+        """Robots and those of their actuators whose commands may wait for their tick."""
         self.sampling = Sampling(deployment)
+        self.not_finite: Counter[str] = Counter()
+        """Readings with a number that is not finite, which are not sent, by robot and channel."""
 
-    def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], list[int]]:
-        """Return what these robots send at the frame's tick, and the counters of the sensors that sampled."""
+    def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
+        """Return what these robots send at the frame's tick, and what their sensors remember.
+
+        That is numbers of the next frame, by place. Raises ComponentError.
+        """
         packets: list[RobotPacket] = []
-        counters: list[int] = []
-        tick, outboxes = frame.tick, frame.outboxes
-        awake = [robot for robot in robots if frame.numbers[robot.offsets["down"]] == 0.0]
-        due = {
-            robot.name: [sensor for sensor in self._sensors[robot.name] if tick % sensor[1][0] == sensor[1][1]]
-            for robot in awake
-        }
-        payloads = iter(sample_all([sensor[3] for sensors in due.values() for sensor in sensors], frame.numbers, tick))
+        tick, outboxes, numbers = frame.tick, frame.outboxes, frame.numbers
+        awake = [robot for robot in robots if numbers[robot.offsets["down"]] == 0.0]
+        due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick)] for robot in awake}
+        view = SensingView(tick, numbers, frame.values)
+        payloads = iter(self._sensing.sample([one for sensors in due.values() for one in sensors], view))
         for robot in awake:
             sends: list[tuple[str, str, bytes]] = []
-            for channel, _, slot, _ in due[robot.name]:
-                sends.append((channel, "", next(payloads)))
-                counters.append(slot)
+            for one in due[robot.name]:
+                payload = next(payloads)
+                view.written[one.samples_at] = numbers[one.samples_at] + 1.0
+                if payload is not None:
+                    sends.append((one.channel, "", payload))
             waiting = outboxes.get(robot.index)
             if waiting:
                 sends += [
@@ -89,7 +93,8 @@ class Stepper:
                 RobotPacket(robot.name, index, destination, channel, payload)
                 for index, (channel, destination, payload) in enumerate(sends)
             ]
-        return packets, counters
+        self.not_finite.update(f"{one.robot} {one.channel}" for one in view.not_finite)
+        return packets, view.written
 
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
@@ -97,23 +102,33 @@ class Stepper:
         self.world.apply_rules(numbers, layout)
         return layout, numbers
 
-    def deliver(self, packets: Sequence[Delivered], solved: Sequence[int], numbers: list[float]) -> dict[int, bytes]:
+    def deliver(
+        self, packets: Sequence[Delivered], solved: Sequence[int], numbers: list[float], tick: int
+    ) -> dict[int, bytes]:
         """Apply what reached these robots, in order; return the outboxes that it filled."""
         outboxes: dict[int, list[OutboxPacket]] = {}
+        view = WritableView(tick, numbers)
+        for entity, one in self._waiting:
+            if entity.index in solved and numbers[entity.offsets["down"]] == 0.0:
+                one.take_due(view)
+        counts: Counter[tuple[str, str]] = Counter()
         for packet in packets:
             if packet.destination not in self.layout:
                 continue
             entity = self.layout[packet.destination]
             if entity.index not in solved or not entity.is_robot:
                 continue
-            if not self._take(packet, entity, numbers, outboxes):
+            way = packet.destination, packet.channel
+            view.count = counts[way]
+            counts[way] += 1
+            if not self._take(packet, entity, view, outboxes):
                 numbers[entity.offsets["refused"]] += 1.0
         return {index: _outbox_encoder.encode(waiting) for index, waiting in sorted(outboxes.items())}
 
     def _take(
-        self, packet: Delivered, entity: Entity, numbers: list[float], outboxes: dict[int, list[OutboxPacket]]
+        self, packet: Delivered, entity: Entity, view: WritableView, outboxes: dict[int, list[OutboxPacket]]
     ) -> bool:
-        if numbers[entity.offsets["down"]] != 0.0:
+        if view.numbers[entity.offsets["down"]] != 0.0:
             return False
         if packet.channel == ECHO:
             waiting = outboxes.get(entity.index, [])
@@ -124,8 +139,10 @@ class Stepper:
                 return False
             outboxes[entity.index] = waiting
             return True
-        actuator = self.world.actuators.get(entity.index)
-        return actuator is not None and packet.channel == actuator.channel and actuator.accept(packet.payload, numbers)
+        for one in self.world.actuators.get(entity.index, ()):
+            if one.channel == packet.channel:
+                return one.accept(packet.payload, view)
+        return False
 
     def solve(self, engine: Engine, work: Work) -> None:
         """Load, command, step, read: write the next state of every body of `work` into its numbers."""
@@ -138,10 +155,10 @@ class Stepper:
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
         if not bodies:
             return
-        actuators = self.world.actuators
+        actuators, view = self.world.actuators, View(work.tick, numbers)
         driven = [entity for entity in bodies if entity.index in actuators]
         engine.load(bodies, numbers)
-        engine.command(driven, [actuators[entity.index].command(numbers) for entity in driven])
+        engine.command(driven, [_motors(actuators[entity.index], view) for entity in driven])
         engine.step(self.substeps)
         before = numbers.copy()
         engine.read(bodies, numbers)
@@ -173,6 +190,13 @@ class Stepper:
                 numbers[entity.offsets["quarantined"]] = 1.0
 
 
+def _motors(fitted: Sequence[FittedActuator], view: View) -> tuple[tuple[float, float], ...]:
+    """Return what the actuators of a robot ask of its motors, in the order of their channels."""
+    if len(fitted) == 1:
+        return fitted[0].command(view)
+    return tuple([motor for one in fitted for motor in one.command(view)])
+
+
 def _clear_log(entity: Entity, numbers: list[float]) -> None:
     """Empty the contact log of a body that was not solved: a contact happens once."""
     start = entity.offsets.get("contacts")
@@ -180,16 +204,11 @@ def _clear_log(entity: Entity, numbers: list[float]) -> None:
         numbers[start : start + 3] = (0.0, 0.0, -1.0)
 
 
-def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, SensorSpec]]:
-    """Return (channel, settings) of a robot's sensors, in channel order."""
-    return sorted(deployment.robots[robot].sensors.items(), key=lambda item: item[0])
-
-
-def moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:
-    """Return the positions of the same counters in another layout."""
-    moved = []
+def moved_slots(written: dict[int, float], old: Layout, new: Layout) -> dict[int, float]:
+    """Return numbers of owners' slots, by place, at their places in another layout."""
+    moved: dict[int, float] = {}
     for entity in old.robots:
-        for field, slot in entity.offsets.items():
-            if slot in counters and slot >= entity.split and entity.name in new:
-                moved.append(new[entity.name].offsets[field])
+        if entity.name in new:
+            shift = new[entity.name].split - entity.split
+            moved |= {at + shift: number for at, number in written.items() if entity.split <= at < entity.stop}
     return moved

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from foosim.deployment.schema import Deployment
-from foosim.world.payloads import BallPosition
+from foosim.world.sensors.ball import BallPosition
 
 ALPHA: Final = 0.6
 BETA: Final = 0.3
@@ -58,7 +58,7 @@ class BallTrack:
         self._measured = (x, y)
 
     def _corrected(self, dt: float, seen: BallPosition) -> Ball:
-        x, y, z = seen
+        x, y, z = seen.x, seen.y, seen.z
         expected = self._moved(dt)
         dx, dy = x - expected.x, y - expected.y
         if dx * dx + dy * dy < JUMP_M * JUMP_M:

@@ -17,9 +17,10 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.names import TEAMS
 from foosim.deployment.schema import Deployment
 from foosim.players.ball_filter import Ball, BallTrack, moved
-from foosim.world.payloads import BallPosition, Command, RodPosition
-from foosim.world.robots.foosball_rod import RodRobot, RodSensor
-from foosim.world.robots.overhead_camera import BallSensor
+from foosim.world.actuators.joint_position import Command
+from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.sensors.ball import BallPosition, BallSettings
+from foosim.world.sensors.encoder import EncoderSettings, RodPosition
 
 if TYPE_CHECKING:
     from foosim.client.player import Commands, Samples
@@ -224,13 +225,13 @@ class Team:
             (rod.name, channel): rod
             for rod in rods.values()
             for channel, sensor in deployment.robots[rod.name].sensors.items()
-            if isinstance(sensor, RodSensor)
+            if isinstance(sensor, EncoderSettings)
         }
         self._cameras = [
             (name, channel)
             for name, robot in sorted(deployment.robots.items())
             for channel, sensor in sorted(robot.sensors.items())
-            if isinstance(sensor, BallSensor)
+            if isinstance(sensor, BallSettings)
         ]
 
     def act(self, tick: int, samples: Samples) -> Commands:

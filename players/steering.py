@@ -5,8 +5,10 @@ from __future__ import annotations
 from math import atan2, cos, hypot, pi, sin
 from typing import Final
 
+from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.kits.hall import Rover
-from foosim.world.payloads import Drive, Pose, WheelTravel
+from foosim.world.sensors.odometry import WheelTravel
+from foosim.world.sensors.pose import Pose
 
 TRUST: Final = 0.5
 """The share of the difference that a new pose corrects: 20 mm of noise become 12, slip does not add up."""

@@ -34,9 +34,13 @@ from foosim.players.beacons import (
 )
 from foosim.players.roadmap import roadmap_of
 from foosim.players.steering import Estimate, Steering, wrapped
-from foosim.world.payloads import Battery, Drive, Pose, Ranges, WheelTravel
+from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.robots.rover import RoverRobot, StationRobot
 from foosim.world.scenes.obstacles import obstacles_of
+from foosim.world.sensors.battery import Battery
+from foosim.world.sensors.odometry import WheelTravel
+from foosim.world.sensors.pose import Pose
+from foosim.world.sensors.proximity import Ranges
 
 ARRIVED_M: Final = 0.35
 """So near to a spot it counts as visited."""

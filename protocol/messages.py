@@ -120,7 +120,8 @@ the run has ended and that the vHub closes the capture."""
 
 class Heartbeat(Message, frozen=True):
     """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` is the reason why the
-    run cannot continue (vHub), `busy` is its load (0 to 1), `report` is JSON for display.
+    run cannot continue (a client is lost, a component has raised), `busy` is its load (0 to 1), `report` is JSON for
+    display.
 
     The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 

@@ -481,7 +481,7 @@ class SupervisorCore:
             state.publish_epoch()
             if is_hub:
                 state.publish_tempo()
-        if heartbeat.lost and is_hub and state.end is None:
+        if heartbeat.lost and state.end is None:
             self.fail(heartbeat.lost)
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:

@@ -174,6 +174,7 @@ def _processes(state: RunState, waiting_for: str, refused: Mapping[str, Any]) ->
             "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
             "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,
             "refused": process.report.get("refused", {}),
+            "not_finite": process.report.get("not_finite", {}),
         }
         for name, process in sorted(state.roster.by_name.items())
     }

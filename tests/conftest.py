@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from foosim.deployment.loader import apply_sets
-from foosim.deployment.yaml import locate_in, plain, read_tree, write_yaml
+from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime.roles.loop import GC_THRESHOLDS
 from tests.meter import Burden, Meter
 

@@ -23,12 +23,13 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
-from foosim.world.payloads import Command, decode_payload
+from foosim.world.actuators.joint_position import Command
+from foosim.world.forms.per_field import codec_of
 
 ROOT: Final = Path(__file__).parents[1]
 FRONT: Final = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
@@ -132,8 +133,8 @@ def test_the_readmes_player_plays(house: Path) -> None:
     sent = capture.packets.where(capture.packets.source == "player-red")
     rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
     assert set(sent.destination) == set(rods)
-    commands = [decode_payload("position", payload) for payload in sent.payload]
-    assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
+    commands: list[Command] = [codec_of("joint_position", "actuator").decode(payload) for payload in sent.payload]
+    assert {command.spin for command in commands} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
     assert len(capture.frame_blocks) == 3, "something was added, and removed again"
 

@@ -103,6 +103,7 @@ SHELLS = {
     "replay/address_file.py",
     "replay/terminal.py",
     "rehearsal/run.py",
+    "rehearsal/swarm/workers.py",
     "cli/rehearse.py",
     "cli/replay.py",
     "cli/replay_report.py",

@@ -11,7 +11,8 @@ from msgspec import Meta
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
-from foosim.world.layout import ADDABLE, BALL, ROBOTS, WORLD, Layout
+from foosim.world.forms.models import MODELS
+from foosim.world.layout import ADDABLE, BALL, WORLD, Layout
 
 
 class Add(Message, frozen=True):
@@ -66,7 +67,7 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
     function of the order alone, the same for all who read it.
     """
     models = dict(layout.models)
-    addable = ADDABLE if WORLD in layout else frozenset[str]()
+    addable = ADDABLE if WORLD in layout else ()
     fitting: list[Edit] = []
     for edit in edits:
         if isinstance(edit, Disrupt):
@@ -80,7 +81,7 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
                 continue
             del models[edit.name]
         elif isinstance(edit, Freeze | Thaw):
-            if models.get(edit.name) not in ROBOTS:
+            if edit.name not in models or not MODELS[models[edit.name]].is_robot:
                 continue
         elif models.get(edit.name) not in ADDABLE:
             continue
@@ -98,7 +99,7 @@ def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
             models[edit.name] = edit.model
         elif isinstance(edit, Remove):
             del models[edit.name]
-    return layout if models == layout.models else Layout(models, layout.sensors)
+    return layout if models == layout.models else Layout(models, layout.carried)
 
 
 def check_edits(edits: Sequence[Edit]) -> None:

@@ -14,52 +14,20 @@ from hashlib import blake2b
 from typing import Final
 
 from foosim.common.errors import Malformed
-from foosim.world.spec import WorldSpec
+from foosim.world.forms import registry
+from foosim.world.forms.models import MODELS
+from foosim.world.forms.per_field import Numbers, numbers_of
+from foosim.world.forms.registry import Carrier, Component
+from foosim.world.forms.settings import ComponentSettings, ModifierSettings
+from foosim.world.spec import Robot, WorldSpec
 
 WORLD: Final = "world"
 """Name of a table's entity that has no body: score and the rules' memory."""
 
-_BODY = (("position", 3), ("orientation", 4), ("linear_velocity", 3), ("angular_velocity", 3))
-_CONTACTS = ("contacts", 3)
-_SOLVER_FIELDS: Final[Mapping[str, tuple[tuple[str, int], ...]]] = {
-    "ball": (*_BODY, ("quarantined", 1), _CONTACTS, ("still_ticks", 1), ("out_ticks", 1), ("wait_ticks", 1)),
-    "rod": (
-        ("joint_positions", 2),
-        ("joint_velocities", 2),
-        ("quarantined", 1),
-        ("down", 1),
-        _CONTACTS,
-        ("set_point", 2),
-        ("refused", 1),
-    ),
-    "camera": (("down", 1), ("refused", 1)),
-    "world": (("score", 2), ("kickoffs", 1)),
-    "rover": (
-        ("position", 3),
-        ("orientation", 4),
-        ("heading", 1),
-        ("wheel_speeds", 2),
-        ("wheel_travel", 2),
-        ("blocked", 1),
-        ("quarantined", 1),
-        ("down", 1),
-        ("set_point", 2),
-        ("charge", 1),
-        ("refused", 1),
-    ),
-    "station": (("down", 1), ("refused", 1)),
-}
-"""The slots that the solver writes, by model. `contacts` is (count, impulse in N s, last substep or -1) of the tick;
-`set_point` is the actuator's (a rod's slide in m and spin in rad; rim speeds of a rover's left and right wheel in m/s);
-`refused` counts packets that the robot refused; `still_ticks`, `out_ticks` and `wait_ticks` are the memory of the rules
-about dead balls, balls off the table and kick-off. `wheel_speeds` are rim speeds (m/s), `wheel_travel` how far the
-wheels have turned (m), `blocked` whether an obstacle stopped it in the tick, `charge` its energy in J. Orientations
-are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
-
-BODIES: Final = frozenset({"ball", "rod", "rover"})
-ROBOTS: Final = frozenset({"rod", "camera", "rover", "station"})
-ADDABLE: Final = frozenset({"ball"})
+ADDABLE: Final = tuple(name for name, model in MODELS.items() if model.is_addable)
 """Models of which a running world can have more."""
+SAMPLES: Final = "samples"
+"""The slot of each sensor that counts what it has sampled."""
 BALL: Final = "ball"
 """Name of the ball that every table has, and no hall; further ones have other names and can be removed again."""
 
@@ -75,39 +43,54 @@ class Entity:
     split: int
     stop: int
     offsets: Mapping[str, int]
+    counts: Mapping[str, int]
+    """The place of the first number of each field, and how many it has."""
 
     @property
     def has_body(self) -> bool:
-        return self.model in BODIES
+        return MODELS[self.model].has_body
 
     @property
     def is_robot(self) -> bool:
-        return self.model in ROBOTS
+        return MODELS[self.model].is_robot
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """The slots of the components of a robot, by `NAME.FIELD`: those that the solver writes, and the owner's."""
+
+    solver: Mapping[str, int]
+    owner: Mapping[str, int]
+
+
+NOTHING: Final = Carried({}, {})
 
 
 class Layout:
     """Entities in name order and where their slots are. Two layouts are equal when their digests are."""
 
-    def __init__(self, models: Mapping[str, str], sensors: Mapping[str, Sequence[str]]) -> None:
-        """Build from the model of every entity and the names of every robot's sensors (one slot each)."""
+    def __init__(self, models: Mapping[str, str], carried: Mapping[str, Carried]) -> None:
+        """Build from the model of every entity and what each robot carries."""
         entities = []
         position = 0
         for index, name in enumerate(sorted(models)):
             model = models[name]
+            its = carried.get(name, NOTHING)
             start = position
             offsets: dict[str, int] = {}
-            for field, count in _SOLVER_FIELDS[model]:
+            counts = {**MODELS[model].slots, **its.solver}
+            for field, count in counts.items():
                 offsets[field] = position
                 position += count
             split = position
-            for sensor in sorted(sensors.get(name, ())):
-                offsets[f"sampled.{sensor}"] = position
-                position += 1
-            entities.append(Entity(index, name, model, start, split, position, offsets))
+            for field, count in its.owner.items():
+                offsets[field], counts[field] = position, count
+                position += count
+            entities.append(Entity(index, name, model, start, split, position, offsets, counts))
         self.entities: tuple[Entity, ...] = tuple(entities)
         self.size = position
         self.models = dict(models)
-        self.sensors = {name: tuple(sorted(channels)) for name, channels in sensors.items()}
+        self.carried = dict(carried)
         self._index = {entity.name: entity for entity in entities}
         self.robots = tuple([entity for entity in entities if entity.is_robot])
         """Entities that have an owner, in name order."""
@@ -127,6 +110,11 @@ class Layout:
     def names(self) -> tuple[str, ...]:
         return tuple(entity.name for entity in self.entities)
 
+    def components(self, robot: str) -> list[str]:
+        """Return the components of a robot that have slots, in name order."""
+        its = self.carried.get(robot, NOTHING)
+        return sorted({slot.partition(".")[0] for slot in (*its.solver, *its.owner)})
+
     @property
     def digest(self) -> bytes:
         """BLAKE2b, 32 bytes, of every entity's name, model and slots."""
@@ -136,6 +124,7 @@ class Layout:
                 for text in (entity.name, entity.model, *entity.offsets):
                     raw = text.encode()
                     hasher.update(struct.pack("<I", len(raw)) + raw)
+                hasher.update(struct.pack(f"<{len(entity.counts)}Q", *entity.counts.values()))
                 hasher.update(struct.pack("<3Q", entity.start, entity.split, entity.stop))
             self._digest = hasher.digest()
         return self._digest
@@ -144,14 +133,53 @@ class Layout:
 def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layout:
     """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
     models = {} if spec.is_hall else {BALL: "ball", WORLD: "world"}
-    sensors: dict[str, Sequence[str]] = {}
-    for name, robot in spec.robots.items():
-        models[name] = robot.model
-        sensors[name] = tuple(robot.sensors)
+    models |= {name: robot.model for name, robot in spec.robots.items()}
+    carried = {name: _carried(spec, robot) for name, robot in spec.robots.items()}
     for name, model in added:
         if spec.is_hall:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to a hall")
         if model not in ADDABLE or name in models:
-            raise Malformed(f"{model} {name} cannot be added: {' or '.join(sorted(ADDABLE))} with a free name can be")
+            raise Malformed(f"{model} {name} cannot be added: {' or '.join(ADDABLE)} with a free name can be")
         models[name] = model
-    return Layout(models, sensors)
+    return Layout(models, carried)
+
+
+def _carried(spec: WorldSpec, robot: Robot) -> Carried:
+    """Return the slots of a robot's components and of their modifiers, in name order."""
+    solver: dict[str, int] = {}
+    for name, actuator in sorted(robot.actuators.items()):
+        component = registry.find("actuator", actuator.kind)
+        solver |= _slots(name, component, actuator, Carrier(0, spec.tick_ns))
+        solver |= _slots_of_modifiers(name, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
+    owner: dict[str, int] = {}
+    for name, sensor in sorted(robot.sensors.items()):
+        component = registry.find("sensor", sensor.kind)
+        period_ns = spec.turns(sensor)[0] * spec.tick_ns
+        owner |= _slots(name, component, sensor, Carrier(0, period_ns))
+        owner |= _slots_of_modifiers(name, sensor.modifiers, numbers_of(component, sensor), period_ns)
+        owner[f"{name}.{SAMPLES}"] = 1
+    return Carried(solver, owner)
+
+
+def _slots_of_modifiers(
+    name: str, modifiers: Sequence[ModifierSettings], numbers: Numbers | None, period_ns: int
+) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for label, settings in zip(modifier_labels(modifiers), modifiers, strict=True):
+        assert numbers is not None, "checked with the deployment"
+        component = registry.find("modifier", settings.kind)
+        found |= _slots(f"{name}.{label}", component, settings, Carrier(numbers.size, period_ns))
+    return found
+
+
+def _slots(name: str, component: Component, settings: ComponentSettings, carrier: Carrier) -> dict[str, int]:
+    return {f"{name}.{field}": size for field, size in component.slots_on(settings, carrier).items()}
+
+
+def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:
+    """Return the names of the modifiers of a component: their kinds, numbered where there are several of one."""
+    kinds = [registry.find("modifier", settings.kind).name for settings in modifiers]
+    return [
+        kind if kinds.index(kind) == place else f"{kind}{kinds[:place].count(kind) + 1}"
+        for place, kind in enumerate(kinds)
+    ]

@@ -15,13 +15,12 @@ from foosim.common.units import Quantity, period_ticks
 from foosim.world.kits.hall import Hall
 from foosim.world.kits.table import Table
 from foosim.world.mesh import Mesh
-from foosim.world.robots.foosball_rod import RodRobot, RodSensor
-from foosim.world.robots.overhead_camera import BallSensor, CameraRobot
-from foosim.world.robots.rover import RoverRobot, RoverSensor, StationRobot
+from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.robots.overhead_camera import CameraRobot
+from foosim.world.robots.rover import RoverRobot, StationRobot
 from foosim.world.scene import Shape
 from foosim.world.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, open_meshes, scenery_shape
 
-Sensor = RodSensor | BallSensor | RoverSensor
 Robot = Annotated[RodRobot | CameraRobot | RoverRobot | StationRobot, Field(discriminator="model")]
 
 

@@ -13,8 +13,8 @@ from foosim.console.recorded.capture_status import status_at
 from foosim.console.recorded.link_history import PACKET_MARKS
 from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
-from foosim.deployment.channel_kinds import channel_kind
-from foosim.world.payloads import decode_payload
+from foosim.deployment.channel_kinds import channel_codec
+from foosim.world.forms.payloads import PayloadCodec
 
 POINTS: Final = 600
 STATUS_POINTS: Final = 200
@@ -77,7 +77,7 @@ def reading_points(
     """Return what a robot sent on a channel in a time: tick and numbers of each reading. Raises CaptureError."""
     recording = history.recording
     try:
-        kind = channel_kind(recording.deployment, robot, channel)
+        codec = channel_codec(recording.deployment, robot, channel)
     except UnknownName:
         return []
     times = recording.index.places[PACKETS].log_ns
@@ -91,16 +91,14 @@ def reading_points(
             continue
         row = history.packet(number)
         if row.channel == channel and row.payload:
-            found[row.sent_ns] = _numbers(kind, row.payload)
+            found[row.sent_ns] = _numbers(codec, row.payload)
     return [(sent_ns // recording.tick_ns, numbers) for sent_ns, numbers in sorted(found.items())]
 
 
-def _numbers(kind: str, payload: bytes) -> list[float]:
+def _numbers(codec: PayloadCodec | None, payload: bytes) -> list[float]:
+    if codec is None:
+        return []
     try:
-        value: Any = decode_payload(kind, payload)
+        return codec.numbers(codec.decode(payload))
     except Malformed:
         return []
-    if isinstance(value, bytes):
-        return []
-    parts = [part for number in value for part in (number if isinstance(number, tuple) else (number,))]
-    return [float(part) for part in parts]

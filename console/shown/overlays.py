@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
+from foosim.world.components.view import Mounting
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
-from foosim.world.robots.rover import ProximitySensor, RoverRobot
-from foosim.world.sensors.fitting import Fitting
-from foosim.world.sensors.proximity import Proximity, ways_of
+from foosim.world.sensors.proximity import Proximity, ProximitySettings, ways_of
 
 
 class Overlays:
@@ -25,16 +24,15 @@ class Overlays:
         self._ranges: dict[int, list[tuple[int, float, int]]] = {}
         """Of each of them: the slot of the rover's position, the range, the slot of the heading."""
         for name, robot in deployment.robots.items():
-            if isinstance(robot, RoverRobot):
-                for settings in robot.sensors.values():
-                    if isinstance(settings, ProximitySensor):
-                        self._add(deployment, name, settings)
+            for channel, settings in robot.sensors.items():
+                if isinstance(settings, ProximitySettings):
+                    self._add(deployment, name, channel, settings)
 
-    def _add(self, deployment: Deployment, name: str, settings: ProximitySensor) -> None:
+    def _add(self, deployment: Deployment, name: str, channel: str, settings: ProximitySettings) -> None:
         entity = self._layout[name]
         rover = deployment.hall.rover
         self._radius_m, self._height_m = rover.radius, rover.height
-        sensor = Proximity(settings, Fitting(deployment, self._layout, entity, b""))
+        sensor = Proximity(settings, Mounting(deployment, self._layout, entity, channel, b""))
         self._groups.setdefault(settings.rays, []).append(sensor)
         place = entity.offsets["position"], settings.range, entity.offsets["heading"]
         self._ranges.setdefault(settings.rays, []).append(place)

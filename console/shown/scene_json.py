@@ -11,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.deployment.schema import Deployment
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.per_field import codec_of
 from foosim.world.initial_state import kickoff_spot
 from foosim.world.layout import ADDABLE, BALL, Layout
 from foosim.world.mesh import Mesh
-from foosim.world.payloads import COMMANDS
 from foosim.world.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
-from foosim.world.spec import Sensor
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "position": ("m",),
@@ -35,16 +35,6 @@ UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "wait_ticks": ("ticks",),
 }
 """Of a field's numbers; the last one stands for all behind it. What is not here has no unit."""
-SET_POINT_UNITS: Final[Mapping[str, tuple[str, ...]]] = {"rod": ("m", "rad"), "rover": ("m/s",)}
-"""Units of `set_point`, by model."""
-READING_UNITS: Final[Mapping[str, str]] = {
-    "encoder": "m, rad",
-    "ball": "m",
-    "pose": "m, rad",
-    "odometry": "m",
-    "proximity": "m",
-    "battery": "V",
-}
 
 
 def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[str, Any]:
@@ -72,8 +62,8 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "links": links,
         "scenery": scenery,
         "bodies": bodies,
-        "fields": _fields(layout),
-        "commands": _commands(layout),
+        "fields": _fields(deployment, layout),
+        "commands": _commands(deployment, layout),
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
@@ -120,14 +110,15 @@ def _mesh(mesh: Mesh) -> dict[str, str]:
     }
 
 
-def _fields(layout: Layout) -> list[dict[str, Any]]:
+def _fields(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
     """Return the runs of numbers of a frame: those of one unit, by their first index."""
     fields = []
     for entity in layout.entities:
-        ends = [*list(entity.offsets.values())[1:], entity.stop]
-        for (name, start), end in zip(entity.offsets.items(), ends, strict=True):
-            units = SET_POINT_UNITS.get(entity.model, ("",)) if name == "set_point" else UNITS.get(name, ("",))
-            for place, count in _runs(end - start, len(units)):
+        commanded = {f"{channel}.set_point": codec for channel, codec in _actuators(deployment, entity.name)}
+        for name, start in entity.offsets.items():
+            codec = commanded.get(name)
+            units = UNITS.get(name, ("",)) if codec is None else tuple(field.unit for field in codec.fields)
+            for place, count in _runs(entity.counts[name], len(units)):
                 fields.append(
                     {
                         "entity": entity.name,
@@ -140,17 +131,28 @@ def _fields(layout: Layout) -> list[dict[str, Any]]:
     return fields
 
 
-def _commands(layout: Layout) -> list[dict[str, Any]]:
+def _actuators(deployment: Deployment, robot: str) -> list[tuple[str, PayloadCodec]]:
+    """Return the channels of a robot's actuators, and the codecs of their commands."""
+    settings = deployment.robots.get(robot)
+    actuators = {} if settings is None else settings.actuators
+    return [(channel, codec_of(actuator.kind, "actuator")) for channel, actuator in sorted(actuators.items())]
+
+
+def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
     """Return the numbers of a frame that are set-points: what an actuator holds of the last command that it took."""
-    found = []
-    for entity in layout.robots:
-        if entity.model in COMMANDS:
-            channel, command = COMMANDS[entity.model]
-            units = SET_POINT_UNITS[entity.model]
-            for place, name in enumerate(command._fields):
-                unit, index = units[min(place, len(units) - 1)], entity.offsets["set_point"] + place
-                found.append({"robot": entity.name, "channel": channel, "number": name, "unit": unit, "index": index})
-    return found
+    return [
+        {
+            "robot": entity.name,
+            "channel": channel,
+            "number": field.name,
+            "unit": field.unit,
+            "index": entity.offsets[f"{channel}.set_point"] + place,
+        }
+        for entity in layout.robots
+        for channel, codec in _actuators(deployment, entity.name)
+        if f"{channel}.set_point" in entity.offsets
+        for place, field in enumerate(codec.fields)
+    ]
 
 
 def _runs(count: int, units: int) -> list[tuple[int, int]]:
@@ -160,13 +162,11 @@ def _runs(count: int, units: int) -> list[tuple[int, int]]:
 
 
 def _sensors(deployment: Deployment) -> list[dict[str, str]]:
-    found: list[dict[str, str]] = []
-    for name, robot in sorted(deployment.robots.items()):
-        sensors: Mapping[str, Sensor] = robot.sensors
-        for channel, sensor in sorted(sensors.items()):
-            kind = sensor.kind
-            found.append({"robot": name, "channel": channel, "kind": kind, "unit": READING_UNITS[kind]})
-    return found
+    return [
+        {"robot": name, "channel": channel, "kind": sensor.kind, "unit": codec_of(sensor.kind, "sensor").unit}
+        for name, robot in sorted(deployment.robots.items())
+        for channel, sensor in sorted(robot.sensors.items())
+    ]
 
 
 def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
@@ -15,7 +15,7 @@ from foosim.rehearsal.swarm.campaign import Flown, fly
 from foosim.runtime.process import end_with
 
 
-def fly_seeds(text: str, name: str, seeds: Sequence[int], ticks: int, jobs: int) -> Iterator[Flown]:
+def fly_seeds(text: str, name: str, seeds: Sequence[int], ticks: int, jobs: int) -> Generator[Flown, None, None]:
     """Fly the seeds in `jobs` processes, and yield their results in the order of the seeds.
 
     One job is this process. The processes end with the iterator, also amid a seed. Raises Failed when one of them

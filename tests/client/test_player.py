@@ -20,7 +20,9 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
-from foosim.world.payloads import BallPosition, Command, RodPosition
+from foosim.world.actuators.joint_position import Command
+from foosim.world.sensors.ball import BallPosition
+from foosim.world.sensors.encoder import RodPosition
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -156,15 +158,15 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
          " red.midfield), 'red.gaol', nearest is 'red.goal'"),
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
-        ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a Command"),
-        ({"red.goal": Command(0.0, "up")}, "position.spin is not a number, 'up'"),  # type: ignore[arg-type]
+        ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a command"),
+        ({"red.goal": Command(0.0, "up")}, "joint_position.spin is not a number, 'up'"),  # type: ignore[arg-type]
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
         (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),
         ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to Commands"),
         ({"red.goal": Command(0.5, 0.0)}, "slide of red.goal is not within -0.123 to 0.123 m, 0.5"),
-        ({"camera": Command(0.0, 0.0)}, "no rod (there are: blue.attack, blue.defence, blue.goal, blue.midfield,"
-         " red.attack, red.defence, red.goal, red.midfield), 'camera'"),
+        ({"camera": Command(0.0, 0.0)}, "no robot that takes a Command (there are: blue.attack, blue.defence,"
+         " blue.goal, blue.midfield, red.attack, red.defence, red.goal, red.midfield), 'camera'"),
     ],
 )  # fmt: skip
 def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:

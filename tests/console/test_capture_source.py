@@ -18,6 +18,7 @@ from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import NOWHERE, PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import About, Curve, Moment, Source, Wanted
+from foosim.deployment.loader import apply_sets
 from foosim.replay.between import Between
 from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, damaged, replay
 
@@ -182,6 +183,13 @@ def test_what_a_branch_says_is_what_up_takes(run: Path, tmp_path: Path, monkeypa
     (tmp_path / "table.yaml").write_text(TABLE.read_text())
     text, _ = asyncio.run(ask(0))
     assert str(run) in text and "is not what the run had" in text, f"it had {SETS}"
+    (tmp_path / "table.yaml").write_text(Recording(run).about.deployment_text)
+    text, _ = asyncio.run(ask(0))
+    assert "#" not in text
+    for one in ("robots.camera.sensors.ball.modifiers=[]", "robots.red.goal.actuators={loop: {kind: joint_position}}"):
+        (tmp_path / "table.yaml").write_text(apply_sets(Recording(run).about.deployment_text, "table.yaml", [one]))
+        text, _ = asyncio.run(ask(0))
+        assert "is not what the run had" in text, one
 
 
 def test_a_damaged_file_is_told_and_the_rest_is_shown(run: Path, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from foosim.protocol.messages import Commit
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_frame
 from foosim.world.layout import build_layout
+from foosim.world.sensors.proximity import ProximitySettings
 from tests.console.memory import TABLE, table
 
 BALL2 = [["ball2", "ball"]]
@@ -171,7 +172,7 @@ def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None
     deployment = load_deployment(fleet_text(1, "robots.rover01.heading=90 deg"), "hall")
     frame = initial_frame(deployment)
     rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
-    sensor = next(s for s in deployment.robots["rover01"].sensors.values() if s.kind == "proximity")
+    sensor = next(s for s in deployment.robots["rover01"].sensors.values() if isinstance(s, ProximitySettings))
     radius = deployment.hall.rover.radius
     assert rays.shape == (sensor.rays, 6)
     rays[:, (0, 3)] -= frame.at("rover01", "position")

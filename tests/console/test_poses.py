@@ -56,8 +56,9 @@ def test_the_commands_of_a_world_are_the_set_points_of_its_actuators(fleet_text:
         layout = build_layout(deployment)
         commands = scene_content(deployment, layout, build_scene(deployment, layout))["commands"]
         assert {command["channel"] for command in commands} == {channel}
-        robot = next(entity for entity in layout.robots if "set_point" in entity.offsets)
+        slot = f"{channel}.set_point"
+        robot = next(entity for entity in layout.robots if slot in entity.offsets)
         mine = [command for command in commands if command["robot"] == robot.name]
         assert [(command["number"], command["unit"]) for command in mine] == told
-        assert [command["index"] - robot.offsets["set_point"] for command in mine] == [0, 1]
-        assert len(commands) == 2 * sum("set_point" in entity.offsets for entity in layout.robots)
+        assert [command["index"] - robot.offsets[slot] for command in mine] == [0, 1]
+        assert len(commands) == 2 * sum(slot in entity.offsets for entity in layout.robots)

@@ -74,7 +74,7 @@ def test_nothing_in_the_folder_is_unchecked() -> None:
 
 def is_deployment(path: Path) -> bool:
     """Whether this is a deployment file, which has tests of its own."""
-    return path.suffix == ".yaml" and "\nformat: 1\n" in path.read_text()
+    return path.suffix == ".yaml" and "\nformat: 2\n" in path.read_text()
 
 
 # --- commands --------------------------------------------------------------------------------------------------------

@@ -13,13 +13,20 @@ from pydantic import ValidationError
 
 from foosim.common.names import LINE_NAMES, TEAMS
 from foosim.common.units import Pace
+from foosim.deployment.components import read_components
+from foosim.deployment.json_schema import deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
-from foosim.deployment.schema import Deployment, deployment_schema_text
-from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.deployment.schema import Deployment
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.world.forms.per_field import numbers_of, read_per_field
+from foosim.world.forms.registry import find
+from foosim.world.modifiers.gaussian_noise import GaussianNoiseSettings
 from foosim.world.robots.foosball_rod import RodRobot
 from foosim.world.robots.overhead_camera import CameraRobot
+from foosim.world.sensors.ball import BallSettings
+from foosim.world.sensors.encoder import EncoderSettings
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
@@ -73,9 +80,14 @@ def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) 
     camera, rod = table.robots["camera"], table.robots["red.goal"]
     assert isinstance(camera, CameraRobot)
     assert isinstance(rod, RodRobot)
-    assert (camera.sensors["ball"].rate_hz, camera.sensors["ball"].noise) == (Fraction(100), 0.0015)
-    encoder = rod.sensors["encoder"]
-    assert (encoder.position_noise, encoder.angle_noise) == (0.0002, math.radians(0.5))
+    ball, encoder = camera.sensors["ball"], rod.sensors["encoder"]
+    assert isinstance(ball, BallSettings)
+    assert ball.rate_hz == Fraction(100)
+    assert isinstance(encoder, EncoderSettings)
+    (noise,) = encoder.modifiers
+    numbers = numbers_of(find("sensor", "encoder"), encoder)
+    assert isinstance(noise, GaussianNoiseSettings) and numbers is not None
+    assert read_per_field(noise.std, numbers) == [0.0002, math.radians(0.5)]
     rule = links_of(table).rule_for("player-red", "red.goal")
     assert rule is not None
     assert isinstance(rule.jitter, GammaJitter)
@@ -92,7 +104,9 @@ def test_what_is_left_out_has_its_default(table: Deployment) -> None:
     data = data_of(TABLE_TEXT)
     for section in ("network", "capture", "deadlines", "players", "mixed_cpu"):
         del data[section]
-    bare = Deployment.model_validate(data)
+    read, findings = read_components(data)
+    bare = Deployment.model_validate(read)
+    assert findings == []
     assert bare.capture == table.capture
     assert bare.deadlines == table.deadlines
     assert bare.network.links == []
@@ -137,7 +151,9 @@ def test_a_rule_without_effects_is_a_perfect_link() -> None:
 
 
 def test_a_deployment_written_in_si_units_is_the_same_deployment(table: Deployment) -> None:
-    assert Deployment.model_validate(table.model_dump(mode="json", by_alias=True)) == table
+    data, findings = read_components(table.model_dump(mode="json", by_alias=True))
+    assert findings == []
+    assert Deployment.model_validate(data) == table
 
 
 def test_values_do_not_change(table: Deployment) -> None:
@@ -160,7 +176,7 @@ def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse() ->
         "tik=2 ms",
         "table.ball.mass=21 mm",
         "network.links.0.loss=0.5",
-        "format=2",
+        "format=3",
     ):
         key, _, value = change.partition("=")
         data = data_of(TABLE_TEXT)

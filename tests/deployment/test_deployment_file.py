@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import PROBLEMS_MAX, apply_sets, load_deployment, read_deployment_text
-from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
 
 CASES = Path(__file__).with_name("deployment_problems.txt")
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
@@ -26,7 +26,7 @@ def small_text() -> str:
     tree, _ = read_tree(TABLE_TEXT, locate_in("table.yaml"))
     assert tree is not None
     return f"""\
-format: 1
+format: 2
 world: small
 seed: 1
 tick: 2 ms
@@ -43,15 +43,15 @@ robots:
       encoder:
         kind: encoder
         rate: 100 Hz
-        position_noise: 0.2 mm
-        angle_noise: 0.5 deg
+        modifiers:
+          - {{kind: gaussian_noise, std: {{slide: 0.2 mm, spin: 0.5 deg}}}}
   camera:
     model: camera
     sensors:
       ball:
         kind: ball
         rate: 100 Hz
-        noise: 1.5 mm
+        modifiers: [{{kind: gaussian_noise, std: 1.5 mm}}]
 nodes:
   one:
     robots: [red.goal, camera]

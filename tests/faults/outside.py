@@ -17,7 +17,7 @@ from foosim.client.client import Client, connect
 from foosim.client.control import RequestRefused
 from foosim.client.errors import ConnectionRefused
 from foosim.common import limits
-from foosim.common.names import CHANNEL_ECHO, CHANNEL_POSITION
+from foosim.common.names import CHANNEL_ECHO
 from tests.faults.cluster import Cluster, FaultError
 from tests.faults.kinds import Figures, Kind, Trial
 
@@ -75,7 +75,7 @@ def robot_explodes(trial: Trial) -> Figures:
     with entered(cluster) as client:
         for slide in (nan, inf, -inf, 1e300):
             for payload in (struct.pack("<dd", slide, 0.0), struct.pack("<dd", 0.0, slide), b"\xff" * 16):
-                client.send(ROBOT, CHANNEL_POSITION, payload)
+                client.send(ROBOT, "position", payload)
         cluster.advance(5)
     with suppress(RequestRefused):
         cluster.control.ask("push", impulse=[1e300, 0.0, 0.0])

@@ -114,10 +114,10 @@ def _no_quarantine(planting: Planting) -> None:
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)
 def _twice_delivered(planting: Planting) -> None:
-    def deliver(self: Any, packets: Any, solved: Any, numbers: Any) -> Any:
+    def deliver(self: Any, packets: Any, solved: Any, numbers: Any, tick: int) -> Any:
         kept = getattr(self, "kept_packets", [])
         self.kept_packets = list(packets)
-        return before(self, kept if kept and not packets else packets, solved, numbers)
+        return before(self, kept if kept and not packets else packets, solved, numbers, tick)
 
     before: Any = planting.swap(Stepper, "deliver", deliver)
 
@@ -134,8 +134,8 @@ def _knowing_step(planting: Planting) -> None:
 
 @register("outboxes are not emptied", "an outbox holds what is sent at the next tick, once", 1)
 def _full_outbox(planting: Planting) -> None:
-    def deliver(self: Any, packets: Any, solved: Any, numbers: Any) -> Any:
-        outboxes = before(self, packets, solved, numbers)
+    def deliver(self: Any, packets: Any, solved: Any, numbers: Any, tick: int) -> Any:
+        outboxes = before(self, packets, solved, numbers, tick)
         kept = getattr(self, "kept_outboxes", {})
         self.kept_outboxes = outboxes
         return outboxes or kept

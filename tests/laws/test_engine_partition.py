@@ -20,7 +20,8 @@ from foosim.deployment.schema import Deployment
 from foosim.node.engines.analytic import PureEngine
 from foosim.node.engines.bullet import BulletEngine
 from foosim.node.engines.interface import Engine, EngineFactory
-from foosim.world.actuators.joint_position import PositionActuator
+from foosim.world.components.fitted import actuators_of
+from foosim.world.components.view import View
 from foosim.world.initial_state import initial_numbers, place_ball
 from foosim.world.islands import Assignment, reach_of
 from foosim.world.layout import Entity, Layout, build_layout
@@ -102,7 +103,11 @@ class Comparison:
         self.layout = build_layout(self.deployment, added)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.reach = reach_of(self.deployment, self.layout)
-        self.actuators = {rod.index: PositionActuator(self.deployment, rod) for rod in self.layout.rods}
+        self.actuators = {
+            rod.index: fitted.actuator
+            for rod in self.layout.rods
+            for fitted in actuators_of(self.deployment, self.layout, rod)
+        }
         lines = self.deployment.table.lines
         self.figures = {
             name: figure_ys(lines[robot.line])
@@ -128,7 +133,7 @@ class Comparison:
             launch(self.layout, self.numbers, tick)
             self._want(tick)
             whole, shared = self.numbers.copy(), self.numbers.copy()
-            self._solve(self.one, self.bodies, whole)
+            self._solve(self.one, self.bodies, whole, tick)
             self._solve_in_parts(tick, shared)
             outcome.ticks += 1
             if whole != shared:
@@ -143,17 +148,18 @@ class Comparison:
         """Let every rod follow the ball with its nearest figure, and kick every 100 ms."""
         ball = self.numbers[self.layout["ball"].offsets["position"] + 1]
         for rod in self.layout.rods:
-            start = rod.offsets["set_point"]
+            start = rod.offsets["position.set_point"]
             if tick % 10 == 0:
                 side = min((ball - y for y in self.figures[rod.name]), key=abs)
                 self.numbers[start] = min(max(side + draw(200 + rod.index, tick, -0.02, 0.02), -0.11), 0.11)
             if tick % max(1, 100_000_000 // self.deployment.tick_ns) == 0:
                 self.numbers[start + 1] = draw(300 + rod.index, tick, -1.0, 1.0) * draw(350 + rod.index, tick, 0.2, 7.0)
 
-    def _solve(self, engine: Engine, bodies: Sequence[Entity], numbers: list[float]) -> None:
+    def _solve(self, engine: Engine, bodies: Sequence[Entity], numbers: list[float], tick: int) -> None:
         rods = [entity for entity in bodies if entity.model == "rod"]
         engine.load(bodies, numbers)
-        engine.command(rods, [self.actuators[rod.index].command(numbers) for rod in rods])
+        view = View(tick, numbers)
+        engine.command(rods, [self.actuators[rod.index].command(view) for rod in rods])
         engine.step(self.deployment.substeps)
         engine.read(bodies, numbers)
 
@@ -180,7 +186,7 @@ class Comparison:
                 self.balls_solver = node
             if bodies:
                 outcome.bodies_loaded_max = max(outcome.bodies_loaded_max, len(bodies))
-                self._solve(part, bodies, numbers)
+                self._solve(part, bodies, numbers, tick)
 
     def _count(self, numbers: Sequence[float]) -> None:
         self.outcome.rod_touches += sum(numbers[rod.offsets["contacts"]] for rod in self.layout.rods)

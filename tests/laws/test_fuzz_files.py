@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 SLOW: Final = 0.05
 """Share of the payloads that a target gets whose one payload costs milliseconds."""
-SMALL: Final = """format: 1
+SMALL: Final = """format: 2
 world: table
 seed: 3
 tick: 2 ms
@@ -48,7 +48,7 @@ substeps: 4
 engine: pure
 pace: fast
 robots:
-  camera: {model: camera, sensors: {ball: {kind: ball, rate: 100 Hz, noise: 0.5 mm}}}
+  camera: {model: camera, sensors: {ball: {kind: ball, rate: 100 Hz, modifiers: [{kind: gaussian_noise, std: 0.5 mm}]}}}
 nodes: {red: {robots: [camera]}}
 players: {p: {class: "a:B", rate: 100 Hz, robots: {camera: [ball]}, parameters: {x: [1, {y: null}]}}}
 network: {links: [{id: all, from: "*", to: "*", delay: 2 ms, jitter: {shape: gamma, sd: 1 ms}, loss: 0.5 %}]}
@@ -330,8 +330,8 @@ def test_spoiled_commands_are_refused_by_the_robot(fuzz: Fuzz, disturbed: Distur
             channel = rng.choice(("position", "echo", "encoder", "", "x"))
             numbers = frame.numbers
             packet = Delivered(0, "x", number, 0, rng.choice((rod.name, "camera", "nobody", "")), channel, payload)
-            stepper.deliver([packet], tuple(entity.index for entity in frame.layout.entities), numbers)
-            wanted = rod.offsets["set_point"]
+            stepper.deliver([packet], tuple(entity.index for entity in frame.layout.entities), numbers, frame.tick)
+            wanted = rod.offsets["position.set_point"]
             assert all(abs(value) < 1e6 for value in numbers[wanted : wanted + 2]), payload.hex()
 
     fuzz.run(bring)

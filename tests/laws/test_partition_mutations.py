@@ -76,7 +76,7 @@ def kicked_towards_the_next_rod() -> tuple[Stepper, list[float]]:
     place_ball(numbers, layout["ball"], (-deployment.table.lines["midfield"].x - 0.05, 0.0, radius_m))
     kicker = layout["blue.midfield"]
     numbers[kicker.offsets["joint_velocities"] + 1] = 140.0
-    numbers[kicker.offsets["set_point"] + 1] = 100.0
+    numbers[kicker.offsets["position.set_point"] + 1] = 100.0
     return Stepper(deployment, layout), numbers
 
 

@@ -20,8 +20,8 @@ from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
+from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.frame import Frame
-from foosim.world.payloads import Drive
 
 TICKS: Final = 250
 ROVERS: Final = 6

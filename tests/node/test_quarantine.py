@@ -70,7 +70,7 @@ def start() -> list[float]:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     place_ball(numbers, BALL, (0.18, 0.05, 0.0175), (1.0, 0.5, 0.0))
     for name in ("red.attack", "red.goal"):
-        numbers[LAYOUT[name].offsets["set_point"]] = 0.1
+        numbers[LAYOUT[name].offsets["position.set_point"]] = 0.1
         numbers[LAYOUT[name].offsets["contacts"]] = 5.0
     return numbers
 

@@ -52,7 +52,7 @@ class Hall:
         self.numbers[rover.offsets["heading"]] = heading
 
     def want(self, rover: Entity, left: float, right: float) -> None:
-        at = rover.offsets["set_point"]
+        at = rover.offsets["drive.set_point"]
         self.numbers[at : at + 2] = left, right
 
     def step(self, ticks: int = 1, engine: RoverEngine | None = None) -> None:

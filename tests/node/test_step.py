@@ -136,33 +136,33 @@ def test_edits_with_numbers_that_are_not_finite_are_malformed(bad: float) -> Non
 def test_deliveries_apply_in_their_order_so_that_the_last_command_counts() -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     packets = [delivered("red.goal", command(0.01 * n, float(n)), sequence=n) for n in range(1, 5)]
-    assert STEPPER.deliver(packets, EVERY, numbers) == {}
-    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.04, 4.0]
+    assert STEPPER.deliver(packets, EVERY, numbers, 7) == {}
+    assert slots(numbers, LAYOUT, "red.goal", "position.set_point", 2) == [0.04, 4.0]
     assert slots(numbers, LAYOUT, "red.goal", "refused", 1) == [0.0]
-    STEPPER.deliver(packets[::-1], EVERY, numbers)
-    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.01, 1.0]
+    STEPPER.deliver(packets[::-1], EVERY, numbers, 7)
+    assert slots(numbers, LAYOUT, "red.goal", "position.set_point", 2) == [0.01, 1.0]
 
 
 def test_a_node_applies_what_is_for_the_robots_that_it_solves() -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     packets = [delivered("red.goal", command(0.01, 0.0)), delivered("blue.goal", command(0.02, 0.0))]
-    STEPPER.deliver(packets, [LAYOUT["blue.goal"].index], numbers)
-    assert slots(numbers, LAYOUT, "red.goal", "set_point", 2) == [0.0, 0.0]
-    assert slots(numbers, LAYOUT, "blue.goal", "set_point", 2) == [0.02, 0.0]
+    STEPPER.deliver(packets, [LAYOUT["blue.goal"].index], numbers, 7)
+    assert slots(numbers, LAYOUT, "red.goal", "position.set_point", 2) == [0.0, 0.0]
+    assert slots(numbers, LAYOUT, "blue.goal", "position.set_point", 2) == [0.02, 0.0]
 
 
 @pytest.mark.parametrize("destination", ["ball", "world", "nobody", "player-blue"])
 def test_what_is_for_no_robot_changes_nothing(destination: str) -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     for channel in ("position", "echo"):
-        assert STEPPER.deliver([delivered(destination, command(0.01, 0.0), channel)], EVERY, numbers) == {}
+        assert STEPPER.deliver([delivered(destination, command(0.01, 0.0), channel)], EVERY, numbers, 7) == {}
     assert numbers == initial_numbers(DEPLOYMENT, LAYOUT)
 
 
 @pytest.mark.parametrize(("robot", "channel"), [("red.goal", "encoder"), ("red.goal", "none"), ("camera", "position")])
 def test_a_channel_that_a_robot_does_not_hear_is_refused_and_counted(robot: str, channel: str) -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-    assert STEPPER.deliver([delivered(robot, command(0.01, 0.0), channel)] * 3, EVERY, numbers) == {}
+    assert STEPPER.deliver([delivered(robot, command(0.01, 0.0), channel)] * 3, EVERY, numbers, 7) == {}
     assert slots(numbers, LAYOUT, robot, "refused", 1) == [3.0]
 
 
@@ -208,6 +208,6 @@ def test_the_frame_that_a_tick_starts_from_is_not_touched() -> None:
     frame = in_play()
     digest, raw = frame.digest, frame.values.tobytes()
     layout, numbers = STEPPER.edited(frame, [Push("ball", HERE)])
-    STEPPER.deliver([delivered("red.goal", command(0.01, 1.0))], EVERY, numbers)
+    STEPPER.deliver([delivered("red.goal", command(0.01, 1.0))], EVERY, numbers, 7)
     STEPPER.sense(frame, layout.robots)
     assert frame.values.tobytes() == raw and Frame(frame.tick, LAYOUT, np.array(frame.numbers)).digest == digest

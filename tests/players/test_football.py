@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from foosim.client.player import Commands, Sample
+from foosim.client.player import Sample
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.names import LINE_NAMES
 from foosim.deployment.loader import load_deployment
 from foosim.players.football import Team
 from foosim.rehearsal.run import rehearse
-from foosim.world.payloads import BallPosition, Command, RodPosition
+from foosim.world.actuators.joint_position import Command
+from foosim.world.sensors.ball import BallPosition
+from foosim.world.sensors.encoder import RodPosition
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
@@ -31,7 +33,7 @@ class Bench:
         self.rods = {f"{name}.{line}": RodPosition(0.0, 0.0) for line in LINE_NAMES}
         self.turn = 0
 
-    def act(self, x: float, y: float) -> Commands:
+    def act(self, x: float, y: float) -> dict[str, Command]:
         """One turn, with the ball at `x` along the direction in which the team attacks, and at `y`."""
         self.turn += 1
         now_ns = self.turn * PERIOD * DEPLOYMENT.tick_ns
@@ -39,12 +41,14 @@ class Bench:
         samples = {("camera", "ball"): Sample("camera", "ball", self.turn, now_ns, now_ns, ball)}
         for name, position in self.rods.items():
             samples[name, "encoder"] = Sample(name, "encoder", self.turn, now_ns, now_ns, position)
-        commands = self.team.act(self.turn * PERIOD, samples)
-        for name, command in commands.items():
-            self.rods[name] = RodPosition(*command)
+        commands: dict[str, Command] = {}
+        for name, command in self.team.act(self.turn * PERIOD, samples).items():
+            assert isinstance(command, Command)
+            commands[name] = command
+            self.rods[name] = RodPosition(command.slide, command.spin)
         return commands
 
-    def forward(self, line: str, commands: Commands) -> float:
+    def forward(self, line: str, commands: dict[str, Command]) -> float:
         """How far the feet of a rod are told to swing towards the goal that the team attacks, in rad."""
         # Positive spin moves the feet towards -x, which is where blue attacks.
         return -SIDE[self.name] * commands[f"{self.name}.{line}"].spin

@@ -18,7 +18,7 @@ from foosim.players.warehouse_rover import Patrol
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.frame import Frame
-from foosim.world.payloads import Pose
+from foosim.world.sensors.pose import Pose
 
 ROVERS: Final = 6
 TICKS: Final = 1000

@@ -10,7 +10,9 @@ import pytest
 from foosim.deployment.loader import load_deployment
 from foosim.players.roadmap import Roadmap, roadmap_of
 from foosim.players.steering import Estimate, Steering, least
-from foosim.world.payloads import Drive, Pose, WheelTravel
+from foosim.world.actuators.wheel_speeds import Drive
+from foosim.world.sensors.odometry import WheelTravel
+from foosim.world.sensors.pose import Pose
 
 FAR = (4.0,) * 16
 
@@ -35,12 +37,12 @@ def seen(**ways: float) -> tuple[float, ...]:
 
 def test_it_goes_straight_to_a_goal_ahead_and_turns_to_one_aside(steering: Steering) -> None:
     assert steering.towards(at(0, 0, 0), (5, 0), FAR, 1.0) == Drive(1.0, 1.0)
-    left, right = steering.towards(at(0, 0, 0), (0, 5), FAR, 1.0)
-    assert right > 0 > left and left == pytest.approx(-right)
-    left, right = steering.towards(at(0, 0, pi), (5, -0.1), FAR, 1.0)
-    assert right > 0 > left, "the shorter way round"
-    left, right = steering.towards(at(0, 0, 0.3), (5, 0), FAR, 1.0)
-    assert 0 < right < left <= 1.2
+    drive = steering.towards(at(0, 0, 0), (0, 5), FAR, 1.0)
+    assert drive.right > 0 > drive.left and drive.left == pytest.approx(-drive.right)
+    drive = steering.towards(at(0, 0, pi), (5, -0.1), FAR, 1.0)
+    assert drive.right > 0 > drive.left, "the shorter way round"
+    drive = steering.towards(at(0, 0, 0.3), (5, 0), FAR, 1.0)
+    assert 0 < drive.right < drive.left <= 1.2
 
 
 def test_it_slows_down_before_its_goal_and_stands_there(steering: Steering) -> None:
@@ -50,22 +52,24 @@ def test_it_slows_down_before_its_goal_and_stands_there(steering: Steering) -> N
 
 
 def test_it_turns_aside_to_the_right_of_what_is_ahead_or_to_where_room_is(steering: Steering) -> None:
-    left, right = steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.6), 1.0)
-    assert left > right
-    left, right = steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.6, right=0.3), 1.0)
-    assert left < right
+    drive = steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.6), 1.0)
+    assert drive.left > drive.right
+    drive = steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.6, right=0.3), 1.0)
+    assert drive.left < drive.right
     assert steering.towards(at(0, 0, 0), (0.5, 0), seen(ahead=0.6), 1.0).left == pytest.approx(0.48), "behind the goal"
 
 
 def test_it_gets_away_from_what_nearly_touches_it(steering: Steering) -> None:
-    assert sum(steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.1), 1.0)) < 0
-    assert sum(steering.towards(at(0, 0, 0), (5, 0), seen(behind=0.1), 1.0)) > 0
+    drive = steering.towards(at(0, 0, 0), (5, 0), seen(ahead=0.1), 1.0)
+    assert drive.left + drive.right < 0
+    drive = steering.towards(at(0, 0, 0), (5, 0), seen(behind=0.1), 1.0)
+    assert drive.left + drive.right > 0
 
 
 def test_no_wheel_is_asked_for_more_than_it_can(steering: Steering) -> None:
     for heading in range(-6, 7):
         drive = steering.towards(at(0, 0, heading / 2), (5, 3), FAR, 3.0)
-        assert max(map(abs, drive)) <= 1.2
+        assert max(abs(drive.left), abs(drive.right)) <= 1.2
 
 
 def test_its_wheels_tell_it_where_it_is_between_two_poses() -> None:

@@ -148,13 +148,16 @@ def test_the_frame_is_the_newest_at_or_before_the_time(captured: Captured) -> No
 def refusals(captured: Captured, tmp_path: Path) -> Iterator[tuple[str, str, str]]:
     """What is asked for, changes of the deployment, and what is refused."""
     alone = str(captured.alone)
-    camera = "robots.camera.sensors={eye: {kind: ball, rate: 100 Hz, noise: 1 mm}}"
+    camera = "robots.camera.sensors={eye: {kind: ball, rate: 100 Hz}}"
     yield f"{alone}@0.7s", "", "no frame of .* at that time, it has frames up to 0.6 s, '700 ms'"
     yield f"{alone}@soon", "", "--from: the time behind @, not a time .*, 'soon'"
     yield str(tmp_path / "nowhere.mcap"), "", "nowhere.mcap: cannot be read, No such file"
     yield __file__, "", "no MCAP file"
     yield f"{alone}@0.1s", "tick=1 ms", "the capture has ticks of 2 ms, the deployment of 1 ms"
-    yield f"{alone}@0.1s", camera, "does not fit the capture: sensors of camera are ball in the capture, eye in the"
+    yield f"{alone}@0.1s", camera, "does not fit the capture: components of camera are ball in the capture, eye in the"
+    loop = "robots.red.goal.actuators={loop: {kind: joint_position}}"
+    have, want = "encoder, position in the capture", "encoder, loop in the deployment"
+    yield f"{alone}@0.1s", loop, f"does not fit the capture: components of red.goal are {have}, {want}"
 
 
 def test_what_does_not_fit_is_refused_by_name(captured: Captured, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import csv
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import numpy as np
@@ -18,8 +18,16 @@ from foosim.analysis.export import export_capture
 from foosim.analysis.tables import table_names
 from foosim.capture.reader import open_capture
 from foosim.common.errors import BadValue, Failed
-from foosim.world.payloads import Command, decode_payload
+from foosim.world.actuators.joint_position import Command
+from foosim.world.forms.per_field import codec_of
 from tests.replay.conftest import TICK_NS, damaged, messages_of, replay, rewritten, with_row
+
+KINDS: Final = {
+    "ball": ("ball", "sensor"),
+    "encoder": ("encoder", "sensor"),
+    "position": ("joint_position", "actuator"),
+}
+"""What the table's channels carry."""
 
 
 def lines_of(path: Path) -> list[dict[str, str]]:
@@ -39,9 +47,9 @@ def test_packets_read_back_as_csv_are_those_of_the_capture(run: Path, tmp_path: 
     assert [bytes.fromhex(line["payload"]) for line in lines] == packets.payload.tolist()
     for line in lines:
         value = msgspec.json.decode(line["value"])
-        kind = "ball" if line["channel"] == "ball" else "encoder" if line["channel"] == "encoder" else "position"
-        decoded = decode_payload(kind, bytes.fromhex(line["payload"]))
-        assert tuple(value.values()) == decoded and value.keys() == set(decoded._fields)
+        codec = codec_of(*KINDS[line["channel"]])
+        decoded = codec.decode(bytes.fromhex(line["payload"]))
+        assert list(value.values()) == codec.numbers(decoded) and tuple(value) == codec.names
 
 
 def test_commands_have_their_numbers(run: Path, tmp_path: Path) -> None:
@@ -50,7 +58,7 @@ def test_commands_have_their_numbers(run: Path, tmp_path: Path) -> None:
     commands = packets.where(packets.channel == "position")
     lines = lines_of(tmp_path / "commands.csv")
     assert 100 < len(lines) == len(commands) < len(packets)
-    numbers = [decode_payload("position", payload) for payload in commands.payload]
+    numbers = [codec_of(*KINDS["position"]).decode(payload) for payload in commands.payload]
     assert [Command(float(line["slide"]), float(line["spin"])) for line in lines] == numbers
     assert [int(line["due_ns"]) for line in lines] == commands.due_ns.tolist()
     assert "payload" not in lines[0]

@@ -42,7 +42,7 @@ from foosim.replay.main import PlayOptions, PlayResult, Stopper, play_capture
 from foosim.replay.terminal import Lines
 from foosim.runtime.transport.certificate_folder import CertificateError
 from foosim.runtime.transport.certificates import load_credentials
-from foosim.world.payloads import BallPosition
+from foosim.world.sensors.ball import BallPosition
 from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, replay
 
 MS = 1_000_000

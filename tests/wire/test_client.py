@@ -9,7 +9,7 @@ import pytest
 from foosim.client import connect, control
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
-from foosim.world.payloads import RodPosition
+from foosim.world.sensors.encoder import RodPosition
 
 if TYPE_CHECKING:
     from foosim.client.client import Client

@@ -33,7 +33,7 @@ def echo(payload: bytes, sequence: int = 1, source: str = "player-red", destinat
 
 def after(packets: list[Delivered]) -> tuple[dict[int, bytes], list[float]]:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-    return STEPPER.deliver(packets, EVERY, numbers), numbers
+    return STEPPER.deliver(packets, EVERY, numbers, 0), numbers
 
 
 def answers(outboxes: dict[int, bytes], tick: int = 1) -> list[RobotPacket]:
@@ -114,5 +114,5 @@ def test_an_outbox_is_said_once() -> None:
 
 def test_only_who_solves_a_robot_fills_its_outbox() -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-    assert STEPPER.deliver([echo(b"x")], [LAYOUT["blue.goal"].index], numbers) == {}
+    assert STEPPER.deliver([echo(b"x")], [LAYOUT["blue.goal"].index], numbers, 0) == {}
     assert refused(numbers) == 0.0

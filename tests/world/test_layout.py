@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.layout import ADDABLE, BALL, BODIES, ROBOTS, WORLD, Layout, build_layout
+from foosim.world.forms.models import MODELS
+from foosim.world.layout import ADDABLE, BALL, NOTHING, WORLD, Carried, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -25,20 +26,32 @@ models = st.dictionaries(
 @settings(max_examples=100)
 @given(models=models, data=st.data())
 def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.DataObject) -> None:
-    channels = st.lists(st.text("abc", min_size=1, max_size=3), max_size=3, unique=True)
-    sensors = {name: data.draw(channels) for name, model in models.items() if model in ROBOTS}
-    layout = Layout(models, sensors)
+    slots = st.dictionaries(st.text("abc", min_size=1, max_size=3), st.integers(1, 5), max_size=3)
+    carried = {
+        name: Carried(
+            {f"{one}.held": count for one, count in data.draw(slots).items()},
+            {f"{one}.seen": count for one, count in data.draw(slots).items()},
+        )
+        for name, model in models.items()
+        if MODELS[model].is_robot
+    }
+    layout = Layout(models, carried)
     assert list(layout.names) == sorted(models)
     position = 0
     for index, entity in enumerate(layout.entities):
         assert (entity.index, entity.start) == (index, position)
         assert entity.start < entity.split <= entity.stop
-        assert entity.stop - entity.split == len(sensors.get(entity.name, []))
-        starts = list(entity.offsets.values())
-        assert starts == sorted(set(starts)) and entity.start == starts[0] and starts[-1] < entity.stop
-        position = entity.stop
+        its = carried.get(entity.name, NOTHING)
+        assert entity.counts == {**MODELS[entity.model].slots, **its.solver, **its.owner}
+        assert entity.stop - entity.split == sum(its.owner.values())
+        assert list(entity.offsets) == list(entity.counts)
+        for field, count in entity.counts.items():
+            assert entity.offsets[field] == position and count > 0
+            assert (position >= entity.split) == (field in its.owner)
+            position += count
+        assert entity.stop == position
     assert layout.size == position
-    again = Layout(dict(reversed(models.items())), {name: names[::-1] for name, names in sensors.items()})
+    again = Layout(dict(reversed(models.items())), dict(reversed(carried.items())))
     assert again.digest == layout.digest, "the order in which things are named is nothing"
 
 
@@ -48,26 +61,84 @@ def test_the_table_has_its_entities() -> None:
     assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
     assert [entity.name for entity in LAYOUT.balls] == [BALL]
     assert {entity.name for entity in LAYOUT.entities if not entity.has_body} == {WORLD, "camera"}
-    assert {"rod", "rover"} == BODIES & ROBOTS and ADDABLE <= BODIES - ROBOTS
+    assert {name for name, model in MODELS.items() if model.has_body and model.is_robot} == {"rod", "rover"}
+    assert ADDABLE == ("ball",) and MODELS["ball"].has_body and not MODELS["ball"].is_robot
+    assert {name for name, model in MODELS.items() if model.actuators} == {"rod", "rover"}
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 
 
 def test_what_the_owner_writes_is_the_memory_of_sensors() -> None:
     for entity in LAYOUT.entities:
         owned = [field for field, at in entity.offsets.items() if at >= entity.split]
-        assert owned == [f"sampled.{channel}" for channel in LAYOUT.sensors.get(entity.name, ())]
+        sensors = DEPLOYMENT.robots[entity.name].sensors if entity.is_robot else {}
+        assert owned == [f"{channel}.samples" for channel in sorted(sensors)]
+        assert all(entity.counts[field] == 1 for field in owned)
+
+
+def test_what_an_actuator_remembers_is_the_solvers() -> None:
+    for rod in LAYOUT.rods:
+        held = [field for field in rod.offsets if "." in field and rod.offsets[field] < rod.split]
+        assert held == ["position.set_point"] and rod.counts["position.set_point"] == 2
+        assert LAYOUT.components(rod.name) == ["encoder", "position"]
+    assert LAYOUT.components("camera") == ["ball"] and LAYOUT.components(BALL) == []
+
+
+SENSOR: Final = "{kind: encoder, rate: 100 Hz}"
+SLIDE: Final = "{kind: joint_position}"
+
+
+def laid_out(*sets: str) -> Layout:
+    return build_layout(load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name))
+
+
+def test_the_order_in_which_components_are_named_is_nothing() -> None:
+    one, other = (
+        laid_out(
+            "players={}",
+            f"robots.red.goal.sensors={{{', '.join(f'{name}: {SENSOR}' for name in sensors)}}}",
+            f"robots.red.goal.actuators={{{', '.join(f'{name}: {SLIDE}' for name in actuators)}}}",
+        )
+        for sensors, actuators in ((("zeta", "alpha"), ("one",)), (("alpha", "zeta"), ("one",)))
+    )
+    assert one.digest == other.digest
+    assert one.components("red.goal") == ["alpha", "one", "zeta"]
+    assert list(one["red.goal"].offsets)[-3:] == ["one.set_point", "alpha.samples", "zeta.samples"]
+
+
+def test_a_robot_without_actuators_has_its_models_and_one_that_names_them_has_those() -> None:
+    assert laid_out(f"robots.red.goal.actuators={{position: {SLIDE}}}").digest == LAYOUT.digest
+    assert laid_out("robots.red.goal.actuators=null").digest == LAYOUT.digest
+    moved = laid_out(f"robots.red.goal.actuators={{loop: {SLIDE}}}")
+    assert moved.components("red.goal") == ["encoder", "loop"] and moved.size == LAYOUT.size
+    none = laid_out("robots.red.goal.actuators={}")
+    assert none.components("red.goal") == ["encoder"] and none.size == LAYOUT.size - 2
+    assert len({layout.digest for layout in (LAYOUT, moved, none)}) == 3
 
 
 def test_every_difference_has_another_digest() -> None:
+    solver, owner = {"position.set_point": 2}, {"encoder.samples": 1}
+    assert LAYOUT.carried["red.goal"] == Carried(solver, owner)
+    others = [
+        NOTHING,
+        Carried(solver, {}),
+        Carried({}, owner),
+        Carried(solver, {"encodes.samples": 1}),
+        Carried(solver, {**owner, "second.samples": 1}),
+        Carried({"position.set_points": 2}, owner),
+        Carried({"positions.et_point": 2}, owner),
+        Carried({"position.set_point": 1, "position.more": 1}, owner),
+        Carried({"position.set_point": 3}, owner),
+        Carried({**solver, **owner}, {}),
+        Carried({}, {**solver, **owner}),
+        Carried({"position.set_point": 1}, {"encoder.samples": 2}),
+    ]
     layouts = [
         LAYOUT,
         build_layout(DEPLOYMENT, [("ball2", "ball")]),
         build_layout(DEPLOYMENT, [("ball3", "ball")]),
         build_layout(DEPLOYMENT, [("ball2", "ball"), ("ball3", "ball")]),
-        Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.sensors),
-        Layout(LAYOUT.models, {**LAYOUT.sensors, "red.goal": ()}),
-        Layout(LAYOUT.models, {**LAYOUT.sensors, "red.goal": ("encodes",)}),
-        Layout(LAYOUT.models, {**LAYOUT.sensors, "red.goal": ("encoder", "second")}),
+        Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.carried),
+        *(Layout(LAYOUT.models, {**LAYOUT.carried, "red.goal": other}) for other in others),
     ]
     assert len({layout.digest for layout in layouts}) == len(layouts)
     assert build_layout(DEPLOYMENT).digest == LAYOUT.digest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
 
@@ -9,71 +10,93 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import Struct, structs
 
+from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
-from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
-from foosim.world.payloads import (
-    KINDS,
-    BallPosition,
-    Battery,
-    Command,
-    Drive,
-    Pose,
-    Ranges,
-    RodPosition,
-    Value,
-    WheelTravel,
-    decode_payload,
-    encode_command,
-    encode_payload,
-)
+from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.wheel_speeds import Drive
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import FORMS, names
+from foosim.world.sensors.ball import BallPosition
+from foosim.world.sensors.battery import Battery
+from foosim.world.sensors.encoder import RodPosition
+from foosim.world.sensors.odometry import WheelTravel
+from foosim.world.sensors.pose import Pose
+from foosim.world.sensors.proximity import Ranges
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
-VALUES: dict[str, Value] = {
-    "encoder": RodPosition(0.1, -2.5),
-    "ball": BallPosition(1 / 3, -0.0, 1e-300),
-    "position": Command(-0.12, 1.5),
-    "pose": Pose(1 / 3, -7.5, 3.1),
-    "odometry": WheelTravel(12.5, -0.25),
-    "battery": Battery(0.5, 24.6),
-    "proximity": Ranges((4.0, 0.0, 1 / 3)),
-    "drive": Drive(-0.5, 1.2),
-    "echo": b"any \x00 bytes",
+ENCODER = CommandEncoder(DEPLOYMENT)
+VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
+    "encoder": (RodPosition(0.1, -2.5), [0.1, -2.5], ["m", "rad"]),
+    "ball": (BallPosition(1 / 3, -0.0, 1e-300), [1 / 3, -0.0, 1e-300], ["m", "m", "m"]),
+    "joint_position": (Command(-0.12, 1.5), [-0.12, 1.5], ["m", "rad"]),
+    "pose": (Pose(1 / 3, -7.5, 3.1), [1 / 3, -7.5, 3.1], ["m", "m", "rad"]),
+    "odometry": (WheelTravel(12.5, -0.25), [12.5, -0.25], ["m", "m"]),
+    "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
+    "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
+    "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
 }
+"""A value of each kind, its numbers, and the units of its fields."""
+SIZES = {"encoder": 16, "ball": 24, "joint_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
+"""In bytes, of the kinds that have as many numbers always."""
+
+
+def codec(kind: str) -> PayloadCodec:
+    return codec_of(kind, next(form for form in FORMS if kind in names(form)))
 
 
 def test_every_kind_is_tested() -> None:
-    assert sorted(VALUES) == sorted(KINDS)
+    assert sorted(VALUES) == sorted([*names("sensor"), *names("actuator")])
+    assert {*SIZES, "proximity"} == {*VALUES}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", VALUES)
 def test_a_value_comes_back_as_it_was(kind: str) -> None:
-    value = VALUES[kind]
-    again = decode_payload(kind, encode_payload(kind, value))
+    value, _, _ = VALUES[kind]
+    again = codec(kind).decode(codec(kind).encode(value))
     assert (again, type(again)) == (value, type(value))
 
 
-@pytest.mark.parametrize("kind", ["encoder", "ball", "position"])
+@pytest.mark.parametrize("kind", VALUES)
 def test_numbers_are_little_endian_float64_in_order(kind: str) -> None:
-    assert np.frombuffer(encode_payload(kind, VALUES[kind]), "<f8").tolist() == list(VALUES[kind])
+    value, numbers, _ = VALUES[kind]
+    assert np.frombuffer(codec(kind).encode(value), "<f8").tolist() == numbers == codec(kind).numbers(value)
 
 
-@given(st.sampled_from(["encoder", "ball", "position"]), st.binary(max_size=40))
+@pytest.mark.parametrize("kind", VALUES)
+def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
+    value, _, units = VALUES[kind]
+    fields = codec(kind).fields
+    assert [field.name for field in fields] == list(structs.asdict(value))
+    assert [field.unit for field in fields] == units
+    assert [field.is_number for field in fields] == [kind != "proximity"] * len(fields)
+    assert [field.is_several for field in fields] == [kind == "proximity"] * len(fields)
+
+
+@given(st.sampled_from(sorted(SIZES)), st.binary(max_size=40))
 def test_random_bytes_are_a_value_or_malformed(kind: str, payload: bytes) -> None:
-    size = 24 if kind == "ball" else 16
-    if len(payload) == size and np.isfinite(np.frombuffer(payload, "<f8")).all():
-        assert encode_payload(kind, decode_payload(kind, payload)) == payload
+    if len(payload) == SIZES[kind] and np.isfinite(np.frombuffer(payload, "<f8")).all():
+        assert codec(kind).encode(codec(kind).decode(payload)) == payload
     else:
         with pytest.raises(Malformed):
-            decode_payload(kind, payload)
+            codec(kind).decode(payload)
 
 
 @pytest.mark.parametrize("payload", [b"", bytes(12), bytes(8 * 129), np.array([1.0, nan]).tobytes()])
 def test_rays_are_one_to_128_finite_numbers(payload: bytes) -> None:
     with pytest.raises(Malformed, match="proximity"):
-        decode_payload("proximity", payload)
+        codec("proximity").decode(payload)
+
+
+def test_one_ray_and_128_are_rays() -> None:
+    for count in (1, 128):
+        ways = tuple(float(ray) for ray in range(count))
+        assert codec("proximity").decode(np.array(ways).tobytes()) == Ranges(ways)
 
 
 @pytest.mark.parametrize(
@@ -87,15 +110,20 @@ def test_rays_are_one_to_128_finite_numbers(payload: bytes) -> None:
 )
 def test_what_does_not_fit_says_why(payload: bytes, text: str) -> None:
     with pytest.raises(Malformed) as error:
-        decode_payload("encoder", payload)
+        codec("encoder").decode(payload)
     assert str(error.value) == text
 
 
-def test_the_kind_of_each_channel() -> None:
-    assert channel_kind(DEPLOYMENT, "red.goal", "encoder") == "encoder"
-    assert channel_kind(DEPLOYMENT, "red.goal", "position") == "position"
-    assert channel_kind(DEPLOYMENT, "camera", "ball") == "ball"
-    assert channel_kind(DEPLOYMENT, "camera", "echo") == "echo"
+def test_the_codec_of_each_channel() -> None:
+    for robot, channel, kind, value in (
+        ("red.goal", "encoder", "encoder", RodPosition),
+        ("red.goal", "position", "joint_position", Command),
+        ("camera", "ball", "ball", BallPosition),
+    ):
+        found = channel_codec(DEPLOYMENT, robot, channel)
+        assert found is not None and (found.name, found.kind) == (kind, value)
+    assert channel_codec(DEPLOYMENT, "camera", "echo") is None
+    assert channel_codec(DEPLOYMENT, "player-red", "anything") is None
 
 
 @pytest.mark.parametrize(
@@ -108,13 +136,13 @@ def test_the_kind_of_each_channel() -> None:
 )
 def test_an_unknown_channel_names_those_that_exist(robot: str, channel: str, text: str) -> None:
     with pytest.raises(UnknownName) as error:
-        channel_kind(DEPLOYMENT, robot, channel)
+        channel_codec(DEPLOYMENT, robot, channel)
     assert str(error.value) == text
 
 
 def test_an_unknown_robot_names_the_nearest() -> None:
     with pytest.raises(UnknownName, match=r"unknown robot .*'red\.gol', nearest is 'red\.goal'"):
-        channel_kind(DEPLOYMENT, "red.gol", "encoder")
+        channel_codec(DEPLOYMENT, "red.gol", "encoder")
 
 
 @pytest.mark.parametrize(
@@ -123,24 +151,64 @@ def test_an_unknown_robot_names_the_nearest() -> None:
         (Command(0.1231, 0.0), "slide of red.goal is not within -0.123 to 0.123 m, 0.1231"),
         (Command(-0.1231, 0.0), "slide of red.goal is not within -0.123 to 0.123 m, -0.1231"),
         (Command(0.0, 1000.1), "spin of red.goal is not within -1000.0 to 1000.0 rad, 1000.1"),
-        (Command(nan, 0.0), "position.slide is not finite, nan"),
-        (Command(0.0, -inf), "position.spin is not finite, -inf"),
-        (Command(10**400, 0.0), f"position.slide is not finite, 1{'0' * 43}...0"),
-        (Command("left", 0.0), "position.slide is not a number, 'left'"),  # type: ignore[arg-type]
-        (Command(0.0, None), "position.spin is not a number, null"),  # type: ignore[arg-type]
+        (Command(nan, 0.0), "joint_position.slide is not finite, nan"),
+        (Command(0.0, -inf), "joint_position.spin is not finite, -inf"),
+        (Command(10**400, 0.0), f"joint_position.slide is not finite, 1{'0' * 43}...0"),
+        (Command("left", 0.0), "joint_position.slide is not a number, 'left'"),  # type: ignore[arg-type]
+        (Command(0.0, None), "joint_position.spin is not a number, null"),  # type: ignore[arg-type]
     ],
 )
 def test_a_command_out_of_reach_is_told_to_the_sender(command: Command, text: str) -> None:
     with pytest.raises(BadValue) as error:
-        encode_command(DEPLOYMENT, "red.goal", command)
+        ENCODER.encode("red.goal", command)
+    assert str(error.value) == text
+    with pytest.raises(BadValue) as error:
+        ENCODER.encode_numbers("red.goal", "position", [command.slide], {"spin": command.spin})
     assert str(error.value) == text
 
 
 def test_a_command_at_the_edge_of_its_reach_is_good() -> None:
-    assert encode_command(DEPLOYMENT, "red.goal", Command(0.123, -1000.0)) == np.array([0.123, -1000.0]).tobytes()
+    channel, payload = ENCODER.encode("red.goal", Command(0.123, -1000.0))
+    assert (channel, payload) == ("position", np.array([0.123, -1000.0]).tobytes())
+    for numbers, named in (([0.123, -1000.0], {}), ([0.123], {"spin": -1000.0}), ([], {"spin": -1000, "slide": 0.123})):
+        assert ENCODER.encode_numbers("red.goal", channel, numbers, named) == payload
+
+
+@pytest.mark.parametrize(
+    ("numbers", "named", "said"),
+    [
+        ([], {}, "nothing"),
+        ([0.1], {}, "0.1"),
+        ([0.1, 0.2, 0.3], {}, "0.1, 0.2, 0.3"),
+        ([0.1, 0.2], {"spin": 0.2}, "0.1, 0.2, spin"),
+        ([0.1], {"slide": 0.2}, "0.1, slide"),
+        ([0.1], {"turn": 0.2}, "0.1, turn"),
+    ],
+)
+def test_numbers_that_are_not_those_of_a_command_name_its_fields(
+    numbers: list[float], named: dict[str, float], said: str
+) -> None:
+    with pytest.raises(BadValue) as error:
+        ENCODER.encode_numbers("red.goal", "position", numbers, named)
+    assert str(error.value) == f"red.goal's position takes slide, spin, each once, '{said}'"
 
 
 @pytest.mark.parametrize("robot", ["camera", "ball", "red.gaol"])
-def test_what_is_no_rod_takes_no_command(robot: str) -> None:
-    with pytest.raises(UnknownName, match=r"no rod \(there are: blue\.attack, .*red\.midfield\)"):
-        encode_command(DEPLOYMENT, robot, Command(0.0, 0.0))
+def test_what_has_no_such_actuator_takes_no_command(robot: str) -> None:
+    with pytest.raises(
+        UnknownName, match=r"no robot that takes a Command \(there are: blue\.attack, .*red\.midfield\)"
+    ):
+        ENCODER.encode(robot, Command(0.0, 0.0))
+
+
+def test_a_rod_takes_no_drive_and_a_rover_no_command(fleet_text: Callable[..., str]) -> None:
+    with pytest.raises(UnknownName, match=r"no robot that takes a Drive \(there are: none\), 'red\.goal'"):
+        ENCODER.encode("red.goal", Drive(0.0, 0.0))
+    hall = CommandEncoder(load_deployment(fleet_text(2), "hall.yaml"))
+    with pytest.raises(UnknownName, match=r"no robot that takes a Command \(there are: none\), 'rover01'"):
+        hall.encode("rover01", Command(0.0, 0.0))
+    with pytest.raises(UnknownName, match=r"no robot that takes a Drive \(there are: rover01, rover02\), 'base'"):
+        hall.encode("base", Drive(0.0, 0.0))
+    assert hall.encode("rover01", Drive(1.2, -1.2)) == ("drive", np.array([1.2, -1.2]).tobytes())
+    with pytest.raises(BadValue, match=r"right of rover01 is not within -1\.2 to 1\.2 m/s, 1\.21"):
+        hall.encode("rover01", Drive(0.0, 1.21))

@@ -11,12 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
-from foosim.world.actuators.joint_position import PositionActuator
+from foosim.world.actuators.joint_position import ANGLE_RAD_MAX, Command, PositionActuator
+from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.view import View, WritableView
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
-from foosim.world.payloads import ANGLE_RAD_MAX
 from foosim.world.robot_packets import Delivered
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -31,12 +33,22 @@ def packed(slide: float, spin: float) -> bytes:
     return struct.pack("<2d", slide, spin)
 
 
+def fitted(rod: str = ROD.name) -> FittedActuator:
+    (found,) = actuators_of(DEPLOYMENT, LAYOUT, LAYOUT[rod])
+    assert found.channel == "position" and isinstance(found.actuator, PositionActuator)
+    return found
+
+
+def takes(command: Command, numbers: list[float], rod: str = ROD.name) -> bool:
+    return fitted(rod).actuator.accept(command, WritableView(0, numbers))
+
+
 def wanted(numbers: list[float]) -> tuple[float, float]:
-    at = ROD.offsets["set_point"]
+    at = ROD.offsets["position.set_point"]
     return numbers[at], numbers[at + 1]
 
 
-REFUSED: Final[dict[str, bytes]] = {
+MALFORMED: Final[dict[str, bytes]] = {
     "empty": b"",
     "a byte too few": packed(0.01, 0.0)[:-1],
     "a byte too many": packed(0.01, 0.0) + b"\x00",
@@ -46,23 +58,31 @@ REFUSED: Final[dict[str, bytes]] = {
     "spin is no number": packed(0.01, nan),
     "slide without end": packed(inf, 0.0),
     "spin without end": packed(0.01, -inf),
+}
+OUT_OF_REACH: Final[dict[str, bytes]] = {
     "beyond the stroke": packed(STROKE + 1e-9, 0.0),
     "beyond the other stroke": packed(-STROKE - 1e-9, 0.0),
     "too many turns": packed(0.0, ANGLE_RAD_MAX + 1e-9),
     "too many turns back": packed(0.0, -ANGLE_RAD_MAX - 1e-9),
     "great": packed(1.7e308, -1.7e308),
 }
+REFUSED: Final = {**MALFORMED, **OUT_OF_REACH}
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_is_no_command_is_refused_counted_and_changes_nothing(what: str) -> None:
+    """The codec refuses what is none, before the actuator sees it; the actuator what is out of its reach."""
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-    assert PositionActuator(DEPLOYMENT, ROD).accept(packed(0.05, 1.0), numbers)
+    assert takes(Command(0.05, 1.0), numbers) and wanted(numbers) == (0.05, 1.0)
     before = numbers.copy()
-    assert not PositionActuator(DEPLOYMENT, ROD).accept(REFUSED[what], numbers)
+    if what in MALFORMED:
+        with pytest.raises(Malformed):
+            fitted().codec.decode(REFUSED[what])
+    else:
+        assert not takes(fitted().codec.decode(REFUSED[what]), numbers)
     assert numbers == before
     packet = Delivered(0, "player-red", 1, 0, "red.goal", "position", REFUSED[what])
-    Stepper(DEPLOYMENT, LAYOUT).deliver([packet, packet], [ROD.index], numbers)
+    Stepper(DEPLOYMENT, LAYOUT).deliver([packet, packet], [ROD.index], numbers, 0)
     assert numbers[ROD.offsets["refused"]] == 2.0
     numbers[ROD.offsets["refused"]] = 0.0
     assert numbers == before
@@ -72,9 +92,10 @@ def test_what_is_no_command_is_refused_counted_and_changes_nothing(what: str) ->
 @given(slide=st.floats(-STROKE, STROKE), spin=st.floats(-ANGLE_RAD_MAX, ANGLE_RAD_MAX))
 def test_a_command_within_reach_is_the_actuators_memory(slide: float, spin: float) -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-    assert PositionActuator(DEPLOYMENT, ROD).accept(packed(slide, spin), numbers)
+    assert takes(fitted().codec.decode(packed(slide, spin)), numbers)
     assert wanted(numbers) == (slide, spin)
-    numbers[ROD.offsets["set_point"] : ROD.offsets["set_point"] + 2] = [0.0, 0.0]
+    at = ROD.offsets["position.set_point"]
+    numbers[at : at + 2] = [0.0, 0.0]
     assert numbers == initial_numbers(DEPLOYMENT, LAYOUT), "and nothing else changes"
 
 
@@ -87,9 +108,8 @@ def test_the_loop_is_proportional_and_limited(wants: tuple[float, float], positi
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     at = ROD.offsets["joint_positions"]
     numbers[at : at + 2] = position
-    actuator = PositionActuator(DEPLOYMENT, ROD)
-    assert actuator.accept(packed(*wants), numbers)
-    (slide, force), (spin, torque) = actuator.command(numbers)
+    assert takes(Command(*wants), numbers)
+    (slide, force), (spin, torque) = fitted().actuator.command(View(0, numbers))
     assert (force, torque) == (DRIVE.slide.force, DRIVE.spin.torque)
     for speed, gain, limit, error in (
         (slide, DRIVE.slide.gain, DRIVE.slide.speed, wants[0] - position[0]),
@@ -102,7 +122,20 @@ def test_the_loop_is_proportional_and_limited(wants: tuple[float, float], positi
 def test_each_line_has_its_own_stroke() -> None:
     for name, stroke in (("red.midfield", "midfield"), ("blue.defence", "defence")):
         numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-        actuator = PositionActuator(DEPLOYMENT, LAYOUT[name])
         reach = DEPLOYMENT.table.lines[stroke].half_stroke  # type: ignore[index]
-        assert actuator.accept(packed(-reach, 0.0), numbers)
-        assert not actuator.accept(packed(-reach - 1e-6, 0.0), numbers)
+        assert takes(Command(-reach, 0.0), numbers, name)
+        assert not takes(Command(-reach - 1e-6, 0.0), numbers, name)
+        assert fitted(name).actuator.limits()["slide"] == (-reach, reach)
+
+
+def test_it_holds_the_rod_where_it_is() -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    at = ROD.offsets["joint_positions"]
+    numbers[at : at + 2] = [0.03, -2.0]
+    before = numbers.copy()
+    fitted().actuator.hold(WritableView(0, numbers))
+    assert wanted(numbers) == (0.03, -2.0)
+    assert [speed for speed, _ in fitted().actuator.command(View(0, numbers))] == [0.0, 0.0]
+    at = ROD.offsets["position.set_point"]
+    numbers[at : at + 2] = [0.0, 0.0]
+    assert numbers == before, "and nothing else changes"

@@ -11,12 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.actuators.differential_drive import DriveActuator
+from foosim.node.tick import Stepper
+from foosim.world.components.fitted import FittedSensor, actuators_of, sensors_of
+from foosim.world.components.sensing import Sensing
+from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Layout, build_layout
-from foosim.world.sensors import make_sensor, sample_all
+from foosim.world.robot_packets import Delivered
 
 PLACED: Final = (
     "robots.rover01.x=2 m",
@@ -37,9 +41,17 @@ class Fitted:
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.rover = self.layout["rover01"]
 
+    def sensor(self, channel: str) -> FittedSensor:
+        fitted = sensors_of(self.deployment, self.layout, self.rover)
+        return next(one for one in fitted if one.channel == channel)
+
+    def payload(self, one: FittedSensor, tick: int) -> bytes:
+        (payload,) = Sensing().sample([one], SensingView(tick, self.numbers))
+        assert payload is not None
+        return payload
+
     def sample(self, channel: str, tick: int = 0) -> tuple[float, ...]:
-        settings = self.deployment.robots["rover01"].sensors[channel]
-        raw = make_sensor(settings, self.deployment, self.layout, self.rover, channel).sample(self.numbers, tick)
+        raw = self.payload(self.sensor(channel), tick)
         return struct.unpack(f"<{len(raw) // 8}d", raw)
 
     def turn(self, heading: float) -> None:
@@ -47,7 +59,7 @@ class Fitted:
 
 
 def test_without_noise_pose_odometry_and_battery_are_the_frame(fleet_text: Callable[..., str]) -> None:
-    quiet = ["pose.position_noise=0 m", "pose.heading_noise=0 deg", "odometry.noise=0 m", "battery.noise=0 V"]
+    quiet = [f"{channel}.modifiers=[]" for channel in ("pose", "odometry", "battery")]
     fitted = Fitted(fleet_text(1, *PLACED, *(SENSORS + one for one in quiet)))
     fitted.turn(0.5)
     travel = fitted.rover.offsets["wheel_travel"]
@@ -65,9 +77,8 @@ def test_noise_has_the_spread_that_is_declared_and_is_each_tick_s_own(fleet_text
         ("odometry", (0.0, 0.0), (0.001, 0.001)),
         ("battery", (0.9, 28.56), (0.0, 0.05)),
     ):
-        settings = fitted.deployment.robots["rover01"].sensors[channel]
-        sensor = make_sensor(settings, fitted.deployment, fitted.layout, fitted.rover, channel)
-        drawn = [struct.unpack(f"<{len(truth)}d", sensor.sample(fitted.numbers, tick)) for tick in range(2000)]
+        sensor = fitted.sensor(channel)
+        drawn = [struct.unpack(f"<{len(truth)}d", fitted.payload(sensor, tick)) for tick in range(2000)]
         for column, mean, sd in zip(zip(*drawn, strict=True), truth, sds, strict=True):
             errors = [value - mean for value in column]
             assert abs(sum(errors) / 2000) <= 3.29 * sd / sqrt(2000) + 1e-12
@@ -75,7 +86,7 @@ def test_noise_has_the_spread_that_is_declared_and_is_each_tick_s_own(fleet_text
         assert drawn[7] == fitted.sample(channel, 7)
 
 
-RAYS: Final = (SENSORS + "proximity.rays=4", SENSORS + "proximity.noise=0 m", SENSORS + "proximity.range=100 m")
+RAYS: Final = (SENSORS + "proximity.rays=4", SENSORS + "proximity.modifiers=[]", SENSORS + "proximity.range=100 m")
 
 
 def test_rays_reach_the_walls_from_the_hull_and_turn_with_the_rover(fleet_text: Callable[..., str]) -> None:
@@ -113,11 +124,8 @@ def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callabl
     """Whoever computes which rovers: with other ranges and numbers of rays among them, near each other or far."""
     other = ("robots.rover02.sensors.proximity.rays=5", "robots.rover03.sensors.proximity.range=30 m")
     fitted = Fitted(fleet_text(5, *other))
-    sensors = [
-        make_sensor(sensor, fitted.deployment, fitted.layout, rover, channel)
-        for rover in fitted.layout.rovers
-        for channel, sensor in sorted(fitted.deployment.robots[rover.name].sensors.items())
-    ]
+    sensors = [one for rover in fitted.layout.rovers for one in sensors_of(fitted.deployment, fitted.layout, rover)]
+    assert [one.channel for one in sensors] == ["battery", "odometry", "pose", "proximity"] * 5
     place = st.tuples(st.floats(-19.0, 19.0), st.floats(-12.0, 12.0), st.floats(-3.0, 3.0))
 
     @settings(max_examples=30)
@@ -127,16 +135,21 @@ def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callabl
             at = rover.offsets["position"]
             fitted.numbers[at : at + 2] = x, y
             fitted.numbers[rover.offsets["heading"]] = heading
-        alone = [sensor.sample(fitted.numbers, tick) for sensor in sensors]
-        assert sample_all(sensors, fitted.numbers, tick) == alone
-        assert sample_all(sensors[::-1][:7], fitted.numbers, tick) == alone[::-1][:7]
+        alone, view = [fitted.payload(one, tick) for one in sensors], SensingView(tick, fitted.numbers)
+        assert sensing.sample(sensors, view) == alone
+        assert sensing.sample(sensors[::-1][:7], view) == alone[::-1][:7]
 
+    sensing = Sensing()
     hold()
-    assert sample_all([], fitted.numbers, 0) == []
+    assert sensing.sample([], SensingView(0, fitted.numbers)) == []
 
 
 def test_beyond_its_range_a_ray_sees_nothing_and_has_no_noise(fleet_text: Callable[..., str]) -> None:
-    fitted = Fitted(fleet_text(1, *PLACED, "robots.rover01.x=18 m", SENSORS + "proximity.noise=0.2 m"))
+    fitted = Fitted(
+        fleet_text(
+            1, *PLACED, "robots.rover01.x=18 m", SENSORS + "proximity.modifiers=[{kind: gaussian_noise, std: 0.2 m}]"
+        )
+    )
     drawn = [fitted.sample("proximity", tick) for tick in range(50)]
     assert {ways[8] for ways in drawn} == {4.0}, "behind it is nothing"
     ahead = [ways[0] for ways in drawn]
@@ -161,8 +174,30 @@ def test_the_drive_holds_speeds_within_its_own_and_refuses_the_rest(
     fleet_text: Callable[..., str], payload: bytes, expected: list[float] | None
 ) -> None:
     fitted = Fitted(fleet_text(1, *PLACED))
-    actuator, at = DriveActuator(fitted.deployment, fitted.rover), fitted.rover.offsets["set_point"]
+    (drive,) = actuators_of(fitted.deployment, fitted.layout, fitted.rover)
+    at = fitted.rover.offsets["drive.set_point"]
     fitted.numbers[at : at + 2] = [0.1, 0.2]
-    assert actuator.accept(payload, fitted.numbers) is (expected is not None)
-    assert fitted.numbers[at : at + 2] == (expected or [0.1, 0.2])
-    assert [speed for speed, _ in actuator.command(fitted.numbers)] == fitted.numbers[at : at + 2]
+    before = fitted.numbers.copy()
+    if expected is None:
+        with pytest.raises(Malformed):
+            drive.codec.decode(payload)
+    else:
+        assert drive.actuator.accept(drive.codec.decode(payload), WritableView(0, fitted.numbers))
+        assert fitted.numbers[at : at + 2] == expected
+        assert [speed for speed, _ in drive.actuator.command(View(0, fitted.numbers))] == expected
+    after, fitted.numbers = fitted.numbers, before.copy()
+    packet = Delivered(0, "pilot01", 1, 0, "rover01", "drive", payload)
+    Stepper(fitted.deployment, fitted.layout).deliver([packet], [fitted.rover.index], fitted.numbers, 0)
+    assert fitted.numbers[fitted.rover.offsets["refused"]] == float(expected is None)
+    fitted.numbers[fitted.rover.offsets["refused"]] = 0.0
+    assert fitted.numbers == after, "and nothing else changes"
+
+
+def test_a_drive_that_holds_stands_still(fleet_text: Callable[..., str]) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED))
+    (drive,) = actuators_of(fitted.deployment, fitted.layout, fitted.rover)
+    before = fitted.numbers.copy()
+    at = fitted.rover.offsets["drive.set_point"]
+    fitted.numbers[at : at + 2] = [0.1, 0.2]
+    drive.actuator.hold(WritableView(0, fitted.numbers))
+    assert fitted.numbers == before and before[at : at + 2] == [0.0, 0.0]

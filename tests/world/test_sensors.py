@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from math import sqrt
+from math import radians, sqrt
 from pathlib import Path
 from statistics import NormalDist, fmean
 from typing import Final
@@ -11,16 +11,19 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.common.keyed_random import draw_key, draw_words, gaussian
+from foosim.common.batched.noise import NoiseKey
+from foosim.common.keyed_random import draw_key
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.tick import Stepper
+from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.sensing import Sensing
+from foosim.world.components.view import SensingView
+from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
-from foosim.world.robots.foosball_rod import RodSensor
-from foosim.world.sensors import SENSORS, make_sensor
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")
@@ -35,11 +38,22 @@ def deployed(*sets: str) -> Deployment:
     return load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
 
 
+def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> FittedSensor:
+    layout = build_layout(deployment)
+    return next(one for one in sensors_of(deployment, layout, layout[robot]) if one.channel == channel)
+
+
+def sampled(one: FittedSensor, numbers: list[float], tick: int) -> bytes:
+    (payload,) = Sensing().sample([one], SensingView(tick, numbers))
+    assert payload is not None
+    return payload
+
+
 def samples(robot: str, channel: str, numbers: list[float], deployment: Deployment = DEPLOYMENT) -> list[list[float]]:
-    settings = deployment.robots[robot].sensors[channel]
-    sensor = make_sensor(settings, deployment, LAYOUT, LAYOUT[robot], channel)
-    drawn = [sensor.sample(numbers, tick) for tick in range(COUNT)]
-    return [list(struct.unpack(f"<{len(raw) // 8}d", raw)) for raw in drawn]
+    one = fitted(robot, channel, deployment)
+    sensing = Sensing()
+    drawn = [payload for tick in range(COUNT) for payload in sensing.sample([one], SensingView(tick, numbers))]
+    return [list(struct.unpack(f"<{len(raw) // 8}d", raw)) for raw in drawn if raw is not None]
 
 
 def assert_gaussian(errors: list[float], sd: float) -> None:
@@ -62,12 +76,10 @@ def test_an_encoder_measures_slide_and_spin_with_noise_of_its_own_on_each() -> N
     numbers = NUMBERS.copy()
     at = LAYOUT["red.goal"].offsets["joint_positions"]
     numbers[at : at + 2] = [0.05, -2.5]
-    settings = DEPLOYMENT.robots["red.goal"].sensors["encoder"]
-    assert isinstance(settings, RodSensor)
     drawn = samples("red.goal", "encoder", numbers)
     slides, spins = [slide - 0.05 for slide, _ in drawn], [spin + 2.5 for _, spin in drawn]
-    assert_gaussian(slides, settings.position_noise)
-    assert_gaussian(spins, settings.angle_noise)
+    assert_gaussian(slides, 0.0002)
+    assert_gaussian(spins, radians(0.5))
     assert abs(correlation(slides, spins)) < 3.29 / sqrt(COUNT)
     assert abs(correlation(slides[1:], slides[:-1])) < 3.29 / sqrt(COUNT), "noise does not remember"
 
@@ -86,40 +98,40 @@ def test_the_camera_measures_the_ball_with_noise_along_the_field_only() -> None:
 
 def test_noise_is_keyed_by_seed_robot_and_channel() -> None:
     """Any tick alone gives what it gives in a row; another seed, robot or channel gives another luck."""
-    settings = DEPLOYMENT.robots["red.goal"].sensors["encoder"]
-    alone = make_sensor(settings, DEPLOYMENT, LAYOUT, LAYOUT["red.goal"], "encoder").sample(NUMBERS, 777)
-    words = draw_words(draw_key(1, "noise", "red.goal", "encoder"), 777)
-    assert isinstance(settings, RodSensor)
-    assert struct.unpack("<2d", alone) == (
-        settings.position_noise * gaussian(words[0]),
-        settings.angle_noise * gaussian(words[1]),
-    )
+    alone = sampled(fitted("red.goal", "encoder"), NUMBERS, 777)
+    slide, spin = NoiseKey(draw_key(1, "sensor", "red.goal", "encoder", "gaussian_noise")).normal(777, 2)
+    assert struct.unpack("<2d", alone) == (0.0002 * slide, radians(0.5) * spin)
+    noise = "modifiers: [{kind: gaussian_noise, std: {slide: 0.2 mm, spin: 0.5 deg}}]"
+    both = f"{{kind: encoder, rate: 100 Hz, {noise}}}"
+    second = deployed(f"robots.red.goal.sensors={{encoder: {both}, second: {both}}}")
+    start = initial_numbers(second, build_layout(second))
     others = [
-        make_sensor(settings, deployed("seed=2"), LAYOUT, LAYOUT["red.goal"], "encoder"),
-        make_sensor(settings, DEPLOYMENT, LAYOUT, LAYOUT["red.attack"], "encoder"),
-        make_sensor(settings, DEPLOYMENT, LAYOUT, LAYOUT["red.goal"], "second"),
+        sampled(fitted("red.goal", "encoder", deployed("seed=2")), NUMBERS, 777),
+        sampled(fitted("red.attack", "encoder"), NUMBERS, 777),
+        sampled(fitted("red.goal", "second", second), start, 777),
     ]
-    assert len({alone, *(sensor.sample(NUMBERS, 777) for sensor in others)}) == 4
+    assert len({alone, *others}) == 4
+    assert sampled(fitted("red.goal", "encoder", second), start, 777) == alone, "what else it has is nothing"
 
 
 def test_noise_does_not_depend_on_what_is_measured() -> None:
     moved = NUMBERS.copy()
     at = LAYOUT["ball"].offsets["position"]
     moved[at] = 0.25
-    sensor = make_sensor(DEPLOYMENT.robots["camera"].sensors["ball"], DEPLOYMENT, LAYOUT, LAYOUT["camera"], "ball")
-    still, there = (struct.unpack("<3d", sensor.sample(numbers, 9)) for numbers in (NUMBERS, moved))
+    sensor = fitted("camera", "ball")
+    still, there = (struct.unpack("<3d", sampled(sensor, numbers, 9)) for numbers in (NUMBERS, moved))
     assert there[0] - still[0] == pytest.approx(0.25, abs=1e-15) and there[1:] == still[1:]
 
 
 def test_without_noise_a_sample_is_the_frame() -> None:
-    quiet = deployed("robots.camera.sensors.ball.noise=0 mm")
+    quiet = deployed("robots.camera.sensors.ball.modifiers=[]")
     seen = {tuple(sample) for sample in samples("camera", "ball", NUMBERS, quiet)}
     assert seen == {(0.0, 0.0, DEPLOYMENT.table.ball.radius)}
 
 
 def test_every_kind_of_the_deployment_has_its_sensor() -> None:
     kinds = {sensor.kind for robot in DEPLOYMENT.robots.values() for sensor in robot.sensors.values()}
-    assert kinds == {"encoder", "ball"} < set(SENSORS)
+    assert kinds == {"encoder", "ball"} < set(names("sensor"))
 
 
 def sensed(deployment: Deployment, ticks: int) -> dict[tuple[str, str], list[int]]:
@@ -129,8 +141,8 @@ def sensed(deployment: Deployment, ticks: int) -> dict[tuple[str, str], list[int
     values = np.array(initial_numbers(deployment, layout))
     sent: dict[tuple[str, str], list[int]] = {}
     for tick in range(ticks):
-        packets, counters = stepper.sense(Frame(tick, layout, values), layout.robots)
-        assert len(counters) == len(packets)
+        packets, remembered = stepper.sense(Frame(tick, layout, values), layout.robots)
+        assert len(remembered) == len(packets) and set(remembered.values()) <= {1.0}
         for packet in packets:
             sent.setdefault((packet.robot, packet.channel), []).append(tick)
     return sent
@@ -151,16 +163,16 @@ def test_a_rate_is_whole_ticks_whatever_the_tick() -> None:
 def test_counters_of_samples_are_the_owners_slots() -> None:
     stepper = Stepper(DEPLOYMENT, LAYOUT)
     robots = [LAYOUT["camera"], LAYOUT["red.goal"]]
-    packets, counters = stepper.sense(Frame(0, LAYOUT, np.array(NUMBERS)), robots)
+    packets, remembered = stepper.sense(Frame(0, LAYOUT, np.array(NUMBERS)), robots)
     assert [packet.robot for packet in packets] == ["camera", "red.goal"]
-    assert counters == [LAYOUT["camera"].offsets["sampled.ball"], LAYOUT["red.goal"].offsets["sampled.encoder"]]
-    assert all(robot.split <= slot < robot.stop for robot, slot in zip(robots, counters, strict=True))
+    slots = [LAYOUT["camera"].offsets["ball.samples"], LAYOUT["red.goal"].offsets["encoder.samples"]]
+    assert remembered == dict.fromkeys(slots, 1.0)
+    assert all(robot.split <= slot < robot.stop for robot, slot in zip(robots, slots, strict=True))
 
 
 def test_what_a_robot_sends_is_numbered_in_the_order_of_channels() -> None:
     two = deployed(
-        "robots.red.goal.sensors={zeta: {kind: encoder, rate: 100 Hz, position_noise: 0 mm, angle_noise: 0 deg}, "
-        "alpha: {kind: encoder, rate: 100 Hz, position_noise: 0 mm, angle_noise: 0 deg}}",
+        "robots.red.goal.sensors={zeta: {kind: encoder, rate: 100 Hz}, alpha: {kind: encoder, rate: 100 Hz}}",
         "players={}",
     )
     layout = build_layout(two)

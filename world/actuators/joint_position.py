@@ -6,50 +6,75 @@ the one of the original table (`docs/reference/table.md`); its gains and limits 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import isfinite
+from typing import Final
 
-from foosim.common.names import CHANNEL_POSITION
-from foosim.world.layout import Entity
-from foosim.world.payloads import ANGLE_RAD_MAX, payload_struct
+from msgspec import Struct
+
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.registry import actuator
+from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.robots.foosball_rod import RodRobot
-from foosim.world.spec import WorldSpec
 
-_PAYLOAD = payload_struct(CHANNEL_POSITION)
+ANGLE_RAD_MAX: Final = 1000.0
+"""The greatest angle that a rod's actuator accepts."""
 
 
+class JointPositionSettings(ActuatorSettings):
+    """Moves a rod to a slide and a spin; gains and limits are the table's."""
+
+
+class Command(Struct, frozen=True):
+    """The set-point of a rod: `slide` along world +y from its middle, `spin` about +y."""
+
+    slide: Metres
+    spin: Radians
+
+
+@actuator(
+    "joint_position",
+    JointPositionSettings,
+    Command,
+    slots={"set_point": 2},
+    needs=("joint_positions",),
+    kit="table",
+)
 class PositionActuator:
-    """One rod's actuator; its set-point is in the frame."""
+    """A proportional loop from a rod's set-point to the speeds of its motors."""
 
-    channel = CHANNEL_POSITION
-
-    def __init__(self, spec: WorldSpec, entity: Entity) -> None:
-        robot = spec.robots[entity.name]
+    def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
+        robot = at.spec.robots[at.robot.name]
         assert isinstance(robot, RodRobot)
-        drive = spec.table.drive
-        self._slide_m_max = spec.table.lines[robot.line].half_stroke
-        self._set_point = entity.offsets["set_point"]
-        self._position = entity.offsets["joint_positions"]
+        drive = at.spec.table.drive
+        self._slide_m_max = at.spec.table.lines[robot.line].half_stroke
+        self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
         self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
         self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)
 
-    def accept(self, payload: bytes, numbers: list[float]) -> bool:
-        """Take a command (slide in m, spin in rad) into the actuator's memory; False when it is refused."""
-        if len(payload) != _PAYLOAD.size:
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and greatest slide (m) and spin (rad) that are accepted."""
+        return {"slide": (-self._slide_m_max, self._slide_m_max), "spin": (-ANGLE_RAD_MAX, ANGLE_RAD_MAX)}
+
+    def accept(self, command: Command, view: WritableView) -> bool:
+        """Take a set-point; one that is out of its limits is refused."""
+        if abs(command.slide) > self._slide_m_max or abs(command.spin) > ANGLE_RAD_MAX:
             return False
-        slide_m, spin_rad = _PAYLOAD.unpack(payload)
-        if not (isfinite(slide_m) and isfinite(spin_rad)):
-            return False
-        if abs(slide_m) > self._slide_m_max or abs(spin_rad) > ANGLE_RAD_MAX:
-            return False
-        numbers[self._set_point] = slide_m
-        numbers[self._set_point + 1] = spin_rad
+        view.write(self._set_point, command.slide, command.spin)
         return True
 
-    def command(self, numbers: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:
+    def hold(self, view: WritableView) -> None:
+        """Make the present position the set-point."""
+        view.write(self._set_point, *view.read(self._joints))
+
+    def stir(self, view: WritableView) -> None:
+        """Turn, for the small run that tells engines apart."""
+        view.write(self._set_point, 0.0, 1.0)
+
+    def command(self, view: View) -> tuple[tuple[float, float], ...]:
         """Return (target speed, greatest force) of slide and spin, in SI units."""
+        numbers, set_point, joints = view.numbers, self._set_point.at, self._joints.at
         gain, speed, force = self._slide
-        slide = gain * (numbers[self._set_point] - numbers[self._position])
+        slide = gain * (numbers[set_point] - numbers[joints])
         spin_gain, spin_speed, torque = self._spin
-        spin = spin_gain * (numbers[self._set_point + 1] - numbers[self._position + 1])
+        spin = spin_gain * (numbers[set_point + 1] - numbers[joints + 1])
         return (min(max(slide, -speed), speed), force), (min(max(spin, -spin_speed), spin_speed), torque)

@@ -2,26 +2,13 @@
 
 from typing import Literal
 
-from pydantic import Field
-
 from foosim.common.names import LineName, Team
-from foosim.common.spec_base import AngleNoise, LengthNoise, Name, Offset, Rate, SpecBase, default
+from foosim.world.robots.settings import RobotSettings
 
 
-class RodSensor(SpecBase):
-    """Reads a rod's slide (m) and angle (rad), with Gaussian noise on each: 2 float64."""
-
-    kind: Literal["encoder"]
-    rate_hz: Rate = Field(alias="rate")
-    offset_ns: Offset = default("0 s", "offset")
-    position_noise: LengthNoise
-    angle_noise: AngleNoise
-
-
-class RodRobot(SpecBase):
-    """A motorised rod with its figures. Its actuator channel is `position`: slide (m) and angle (rad), 2 float64."""
+class RodRobot(RobotSettings):
+    """A motorised rod with its figures. Its usual actuator is `position`, of the kind `joint_position`."""
 
     model: Literal["rod"]
     team: Team
     line: LineName
-    sensors: dict[Name, RodSensor] = Field(max_length=16)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.world.actuators.differential_drive import DriveActuator
+from foosim.world.components.fitted import actuators_of
+from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity, Layout
 from foosim.world.spec import WorldSpec
 
@@ -18,8 +19,8 @@ class HallWorld:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         hall = spec.hall
-        self.actuators = {entity.index: DriveActuator(spec, entity) for entity in layout.rovers}
-        self._layout = layout
+        fitted = {entity.index: actuators_of(spec, layout, entity) for entity in layout.rovers}
+        self.actuators = {index: actuators for index, actuators in fitted.items() if actuators}
         self._x_max, self._y_max = hall.length / 2 - hall.rover.radius, hall.width / 2 - hall.rover.radius
         self._reach_m = hall.rover.drive.speed * spec.tick_ns / 1e9 * ROUNDING
 
@@ -28,9 +29,10 @@ class HallWorld:
 
     def stir(self, numbers: list[float]) -> None:
         """Let all rovers drive in curves of their own."""
-        for number, rover in enumerate(self._layout.rovers):
-            set_point = rover.offsets["set_point"]
-            numbers[set_point : set_point + 2] = [0.3 + 0.01 * number, 0.4]
+        view = WritableView(0, numbers)
+        for fitted in self.actuators.values():
+            for one in fitted:
+                one.actuator.stir(view)
 
     def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether a rover is in the hall, no farther away than its wheels can have taken it."""

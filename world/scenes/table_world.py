@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.world.actuators.joint_position import PositionActuator
+from foosim.world.components.fitted import actuators_of
+from foosim.world.components.view import WritableView
 from foosim.world.layout import BALL, Entity, Layout
 from foosim.world.robots.foosball_rod import RodRobot
 from foosim.world.rules.football import TableRules
@@ -22,7 +23,8 @@ class TableWorld:
     """The table of one deployment, with the rods and balls of one layout."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
-        self.actuators = {entity.index: PositionActuator(spec, entity) for entity in layout.rods}
+        fitted = {entity.index: actuators_of(spec, layout, entity) for entity in layout.rods}
+        self.actuators = {index: actuators for index, actuators in fitted.items() if actuators}
         self.rules = TableRules.of(spec)
         self._layout = layout
         table = spec.table
@@ -54,8 +56,10 @@ class TableWorld:
         """Kick the ball among turning rods."""
         ball = self._layout[BALL].offsets["linear_velocity"]
         numbers[ball : ball + 3] = [1.0, 0.3, 0.0]
-        for rod in self._layout.rods:
-            numbers[rod.offsets["set_point"] + 1] = 1.0
+        view = WritableView(0, numbers)
+        for fitted in self.actuators.values():
+            for one in fitted:
+                one.actuator.stir(view)
 
     def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether an entity's new, finite state is in the world, within its speed limit and its reach."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from foosim.world.actuators import Actuator
+from foosim.world.components.fitted import FittedActuator
 from foosim.world.layout import Entity, Layout
 from foosim.world.scenes.hall_world import HallWorld
 from foosim.world.scenes.table_world import TableWorld
@@ -16,8 +16,8 @@ class World(Protocol):
     """One kind of world, for one deployment and layout."""
 
     @property
-    def actuators(self) -> Mapping[int, Actuator]:
-        """What moves each robot, by the entity's index."""
+    def actuators(self) -> Mapping[int, tuple[FittedActuator, ...]]:
+        """What moves each robot that has actuators, by the entity's index."""
 
     def apply_rules(self, numbers: list[float], layout: Layout) -> None:
         """Edit a frame's numbers by the rules of the world, with all their memory in the frame."""

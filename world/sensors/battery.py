@@ -1,29 +1,36 @@
-"""A rover's battery: its charge, and its voltage with Gaussian noise from keyed draws."""
+"""A rover's battery: its charge and its voltage."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from msgspec import Struct
 
-from foosim.common.keyed_random import draw_words, gaussian
-from foosim.world.payloads import payload_struct
-from foosim.world.robots.rover import BatterySensor
-from foosim.world.sensors.fitting import Fitting
-
-_PAYLOAD = payload_struct("battery")
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Share, Volts
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
 
 
+class BatterySettings(SensorSettings):
+    """The charge as a share of the capacity, and the voltage."""
+
+
+class Battery(Struct, frozen=True):
+    """A rover's battery: `share` of its capacity, `voltage` in V."""
+
+    share: Share
+    voltage: Volts
+
+
+@sensor("battery", BatterySettings, Battery, needs=("charge",), kit="hall")
 class BatteryGauge:
-    """Payload: charge as a share of the capacity, voltage in V, two little-endian float64."""
+    """Charge of a battery as a share of its capacity, and its voltage, which falls evenly with the charge."""
 
-    def __init__(self, settings: BatterySensor, at: Fitting) -> None:
+    def __init__(self, settings: BatterySettings, at: Mounting) -> None:
         battery = at.spec.hall.rover.battery
-        self._charge = at.robot.offsets["charge"]
+        self._charge = at.slot("charge")
         self._capacity_j = battery.capacity
         self._empty_v, self._span_v = battery.empty, battery.full - battery.empty
-        self._noise_v = settings.noise
-        self._key = at.key
 
-    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
-        share = numbers[self._charge] / self._capacity_j
-        voltage = self._empty_v + share * self._span_v
-        return _PAYLOAD.pack(share, voltage + self._noise_v * gaussian(draw_words(self._key, tick)[0]))
+    def sample(self, view: View) -> Battery:
+        share = view.numbers[self._charge.at] / self._capacity_j
+        return Battery(share, self._empty_v + share * self._span_v)

@@ -1,29 +1,32 @@
-"""Position and angle of a rod, with Gaussian noise from keyed draws."""
+"""Position and angle of a rod."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from msgspec import Struct
 
-from foosim.common.keyed_random import draw_words, gaussian
-from foosim.world.payloads import payload_struct
-from foosim.world.robots.foosball_rod import RodSensor
-from foosim.world.sensors.fitting import Fitting
-
-_PAYLOAD = payload_struct("encoder")
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
 
 
+class EncoderSettings(SensorSettings):
+    """Reads a rod's slide and spin."""
+
+
+class RodPosition(Struct, frozen=True):
+    """Where a rod is: `slide` along world +y from its middle, `spin` about +y, 0 with the feet down."""
+
+    slide: Metres
+    spin: Radians
+
+
+@sensor("encoder", EncoderSettings, RodPosition, needs=("joint_positions",))
 class Encoder:
-    """Payload: slide in m and spin in rad, two little-endian float64."""
+    """Slide and spin of a rod."""
 
-    def __init__(self, settings: RodSensor, at: Fitting) -> None:
-        self._start = at.robot.offsets["joint_positions"]
-        self._position_noise_m = settings.position_noise
-        self._angle_noise_rad = settings.angle_noise
-        self._key = at.key
+    def __init__(self, settings: EncoderSettings, at: Mounting) -> None:
+        self._joints = at.slot("joint_positions")
 
-    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
-        words = draw_words(self._key, tick)
-        return _PAYLOAD.pack(
-            numbers[self._start] + self._position_noise_m * gaussian(words[0]),
-            numbers[self._start + 1] + self._angle_noise_rad * gaussian(words[1]),
-        )
+    def sample(self, view: View) -> RodPosition:
+        return RodPosition(*view.read(self._joints))

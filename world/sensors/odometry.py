@@ -1,31 +1,35 @@
-"""How far a rover's wheels have turned, with Gaussian noise from keyed draws.
+"""How far a rover's wheels have turned.
 
 What the wheels slip is in it, and what they turned while the rover was blocked: the wheels turned, it did not move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from msgspec import Struct
 
-from foosim.common.keyed_random import draw_words, gaussian
-from foosim.world.payloads import payload_struct
-from foosim.world.robots.rover import OdometrySensor
-from foosim.world.sensors.fitting import Fitting
-
-_PAYLOAD = payload_struct("odometry")
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
 
 
+class OdometrySettings(SensorSettings):
+    """How far the left and the right wheel have turned, at the rim."""
+
+
+class WheelTravel(Struct, frozen=True):
+    """How far a rover's wheels have turned since the start, at the rim."""
+
+    left: Metres
+    right: Metres
+
+
+@sensor("odometry", OdometrySettings, WheelTravel, needs=("wheel_travel",))
 class Odometry:
-    """Payload: travel of the left and the right wheel's rim since the start in m, two little-endian float64."""
+    """Travel of the left and the right wheel's rim since the start."""
 
-    def __init__(self, settings: OdometrySensor, at: Fitting) -> None:
-        self._start = at.robot.offsets["wheel_travel"]
-        self._noise_m = settings.noise
-        self._key = at.key
+    def __init__(self, settings: OdometrySettings, at: Mounting) -> None:
+        self._travel = at.slot("wheel_travel")
 
-    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
-        words = draw_words(self._key, tick)
-        return _PAYLOAD.pack(
-            numbers[self._start] + self._noise_m * gaussian(words[0]),
-            numbers[self._start + 1] + self._noise_m * gaussian(words[1]),
-        )
+    def sample(self, view: View) -> WheelTravel:
+        return WheelTravel(*view.read(self._travel))

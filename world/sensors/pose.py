@@ -1,31 +1,38 @@
-"""Where a rover is, as a localisation of the hall gives it, with Gaussian noise from keyed draws."""
+"""Where a rover is, as a localisation of the hall gives it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
-from foosim.common.keyed_random import draw_words, gaussian
-from foosim.world.payloads import payload_struct
-from foosim.world.robots.rover import PoseSensor
-from foosim.world.sensors.fitting import Fitting
+from msgspec import Struct
 
-_PAYLOAD = payload_struct("pose")
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
 
 
+class PoseSettings(SensorSettings):
+    """Where a rover is, and its heading."""
+
+
+class Pose(Struct, frozen=True):
+    """Where a rover is: `x` and `y` in the world frame, `heading` from +x towards +y."""
+
+    x: Metres
+    y: Metres
+    heading: Radians
+
+    groups: ClassVar = {"position": ("x", "y")}
+
+
+@sensor("pose", PoseSettings, Pose, needs=("position", "heading"))
 class PoseTracker:
-    """Payload: x and y in m in the world frame, heading in rad from +x towards +y, three little-endian float64."""
+    """Place and heading in the world frame."""
 
-    def __init__(self, settings: PoseSensor, at: Fitting) -> None:
-        self._position = at.robot.offsets["position"]
-        self._heading = at.robot.offsets["heading"]
-        self._position_noise_m = settings.position_noise
-        self._heading_noise_rad = settings.heading_noise
-        self._key = at.key
+    def __init__(self, settings: PoseSettings, at: Mounting) -> None:
+        self._position, self._heading = at.slot("position"), at.slot("heading")
 
-    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
-        words = draw_words(self._key, tick)
-        return _PAYLOAD.pack(
-            numbers[self._position] + self._position_noise_m * gaussian(words[0]),
-            numbers[self._position + 1] + self._position_noise_m * gaussian(words[1]),
-            numbers[self._heading] + self._heading_noise_rad * gaussian(words[2]),
-        )
+    def sample(self, view: View) -> Pose:
+        x, y, _ = view.read(self._position)
+        return Pose(x, y, view.numbers[self._heading.at])

@@ -10,34 +10,55 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, pi, sin
-from typing import Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
+from pydantic import Field
 
-from foosim.common.keyed_random import draw_words, gaussian
-from foosim.world.robots.rover import ProximitySensor
+from foosim.common import units
+from foosim.common.units import Quantity
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
 from foosim.world.scenes.obstacles import Circle, Rectangle, obstacles_of
-from foosim.world.sensors.fitting import Fitting
 
 Numbers: TypeAlias = NDArray[np.float64]
+Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "100 m")]
+RAYS_MAX: Final = 128
 TINY: Final = 1e-300
 """Replaces 0 in a ray's direction, so that a quotient is never 0 / 0."""
-WORDS: Final = 8
-"""Words of one draw."""
 
 
+class ProximitySettings(SensorSettings):
+    """How far it is from a rover's hull to what stands in the way of each of `rays` rays, at most `range`.
+
+    The first ray is ahead, the others evenly around to the left.
+    """
+
+    rays: Annotated[int, Field(ge=1, le=RAYS_MAX)]
+    range: Range
+
+
+class Ranges(Struct, frozen=True):
+    """The free space around a rover: a distance from its hull for each ray, the first ahead, then to the left."""
+
+    ways: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
+
+
+@sensor("proximity", ProximitySettings, Ranges, needs=("position", "heading"), kit="hall", several="rays")
 class Proximity:
-    """Payload: a little-endian float64 a ray, in m: the free way from the hull, `range` where nothing is hit."""
+    """The free way from the hull along each ray; the sensor's range where nothing is hit."""
 
-    def __init__(self, settings: ProximitySensor, at: Fitting) -> None:
+    def __init__(self, settings: ProximitySettings, at: Mounting) -> None:
         rover = at.spec.hall.rover
         obstacles = obstacles_of(at.spec)
         self._position = at.robot.offsets["position"]
         self._heading = at.robot.offsets["heading"]
         self._rovers = [rover.offsets["position"] for rover in at.layout.rovers]
-        self._radius_m, self._range_m, self._noise_m = rover.radius, settings.range, settings.noise
-        self._key = at.key
+        self.radius_m, self.range_m = rover.radius, settings.range
         angles = [2.0 * pi * ray / settings.rays for ray in range(settings.rays)]
         self._cos = np.array([[cos(angle)] for angle in angles])
         self._sin = np.array([[sin(angle)] for angle in angles])
@@ -47,30 +68,32 @@ class Proximity:
         ).T.copy()
         self._circles = np.array([(c.x, c.y, c.radius) for c in obstacles if type(c) is Circle]).reshape(-1, 3).T.copy()
 
-    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
-        return self.sample_together([self], numbers, tick)[0]
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest way (m); a ray that meets nothing has the greatest."""
+        return {"ways": (0.0, self.range_m)}
 
-    @classmethod
-    def sample_together(cls, sensors: Sequence[Proximity], numbers: Sequence[float], tick: int) -> list[bytes]:
-        """Return the payload of each of these sensors at `tick`: of those with as many rays in one batch."""
-        payloads: dict[int, bytes] = {}
-        for rays in sorted({sensor._rays for sensor in sensors}):
-            alike = [place for place, sensor in enumerate(sensors) if sensor._rays == rays]
-            ways = ways_of([sensors[place] for place in alike], numbers)
-            payloads |= {place: sensors[place]._payload(ways[row], tick) for row, place in enumerate(alike)}
-        return [payloads[place] for place in range(len(sensors))]
+    def sample(self, view: View) -> Ranges:
+        return Ranges(tuple(ProximityBatch([self]).sample(view)[0].tolist()))
 
-    def _payload(self, ways: Numbers, tick: int) -> bytes:
-        free = np.minimum(np.maximum(ways - self._radius_m, 0.0), self._range_m)
-        hit = free < self._range_m
-        if self._noise_m > 0.0 and hit.any():
-            noise = np.array(self._noise(tick, len(free)))
-            free = np.where(hit, np.minimum(np.maximum(free + noise, 0.0), self._range_m), free)
-        return free.tobytes()
+    @staticmethod
+    def together(sensors: Sequence[Proximity]) -> ProximityBatch:
+        """Return these as one; all have as many rays."""
+        return ProximityBatch(sensors)
 
-    def _noise(self, tick: int, count: int) -> list[float]:
-        words = [word for copy in range(-(-count // WORDS)) for word in draw_words(self._key, tick, copy)]
-        return [self._noise_m * gaussian(word) for word in words[:count]]
+
+class ProximityBatch:
+    """Several of them, with as many rays."""
+
+    def __init__(self, sensors: Sequence[Proximity]) -> None:
+        self._sensors = sensors
+        self._radii = np.array([[one.radius_m] for one in sensors])
+        self._ranges = np.array([[one.range_m] for one in sensors])
+
+    def sample(self, view: View) -> Numbers:
+        """Return the free ways (m), of shape (sensors, rays)."""
+        ways = ways_of(self._sensors, view.numbers)
+        free: Numbers = np.minimum(np.maximum(ways - self._radii, 0.0), self._ranges)
+        return free
 
 
 def ways_of(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Numbers:
@@ -79,20 +102,20 @@ def ways_of(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Numbers:
     What is out of a sensor's range may be missing: inf where nothing else is hit. All have as many rays.
     """
     first = sensors[0]
-    at = [sensor._position for sensor in sensors]
+    at = [one._position for one in sensors]
     x, y = (np.array([numbers[place + axis] for place in at]).reshape(-1, 1, 1) for axis in (0, 1))
-    headings = [numbers[sensor._heading] for sensor in sensors]
+    headings = [numbers[one._heading] for one in sensors]
     c, s = (np.array([turn(heading) for heading in headings]).reshape(-1, 1, 1) for turn in (cos, sin))
     dx, dy = c * first._cos - s * first._sin, s * first._cos + c * first._sin
     ways: Numbers = np.minimum.reduce(_to_rectangles(x, y, dx, dy, first._rectangles), axis=2)  # four walls at least
     rovers = np.array([numbers[place : place + 2] for place in first._rovers]).reshape(-1, 2).T
     middles_x = np.concatenate((first._circles[0], rovers[0])) - x
     middles_y = np.concatenate((first._circles[1], rovers[1])) - y
-    radii = np.concatenate((first._circles[2], np.full(rovers.shape[1], first._radius_m)))
-    reach = np.array([sensor._range_m for sensor in sensors]).reshape(-1, 1, 1) + first._radius_m + radii
+    radii = np.concatenate((first._circles[2], np.full(rovers.shape[1], first.radius_m)))
+    reach = np.array([one.range_m for one in sensors]).reshape(-1, 1, 1) + first.radius_m + radii
     near = (np.abs(middles_x) <= reach) & (np.abs(middles_y) <= reach)
-    for row, sensor in enumerate(sensors):
-        near[row, 0, len(first._circles[0]) + first._rovers.index(sensor._position)] = False
+    for row, one in enumerate(sensors):
+        near[row, 0, len(first._circles[0]) + first._rovers.index(one._position)] = False
     met = np.flatnonzero(near.any(axis=(0, 1)))
     if len(met):
         to_circles = _to_circles(dx, dy, middles_x[:, :, met], middles_y[:, :, met], radii[met])

@@ -1,0 +1,93 @@
+"""What `foosim-supervisor components` shows: the components that a deployment can name here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from foosim.common.errors import UnknownName
+from foosim.world.forms import registry
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.registry import FORMS, Component
+
+CARRIES: Final = {"sensor": "reading", "actuator": "command"}
+"""What the values of a form are called."""
+
+
+def chosen(form: str | None, name: str | None) -> list[Component]:
+    """Return all components of the forms, or those that were asked for. Raises UnknownName."""
+    if form is not None and form not in FORMS:
+        raise UnknownName("unknown form", form, FORMS)
+    forms = FORMS if form is None else (form,)
+    if name is None:
+        return [registry.find(one, kind) for one in forms for kind in registry.names(one)]
+    return [registry.find(one, name) for one in forms]
+
+
+def as_json(component: Component) -> dict[str, Any]:
+    """Return all that there is to know of a component."""
+    about: dict[str, Any] = {
+        "form": component.form,
+        "name": component.name,
+        "summary": component.summary,
+        "class": f"{component.module}:{component.made.__qualname__}",
+        "settings": [{"key": key, "value": value, "default": default} for key, value, default in _settings(component)],
+        "slots": None if callable(component.slots) else dict(component.slots),
+        "needs": list(component.needs),
+        "kit": component.kit,
+    }
+    if component.value is not None:
+        fields = PayloadCodec(component.value, component.name).fields
+        about[CARRIES[component.form]] = [
+            {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
+        ]
+    return about
+
+
+def line(component: Component) -> str:
+    """Return a component in one line."""
+    return f"{component.form:9} {component.name:16} {component.summary}"
+
+
+def lines(component: Component) -> Iterator[str]:
+    """Yield a component in full."""
+    about = as_json(component)
+    yield f"{component.form} {component.name}, of {about['class']}"
+    yield f"  {component.summary}"
+    yield "  settings"
+    for setting in about["settings"]:
+        default = "required" if setting["default"] is None else f"default {setting['default']}"
+        yield f"    {setting['key']}: {setting['value']} ({default})"
+    if component.form in CARRIES:
+        fields = about[CARRIES[component.form]]
+        units = [f"{field['field']}{'[]' if field['several'] else ''} {field['unit']}".rstrip() for field in fields]
+        yield f"  {CARRIES[component.form]}: {', '.join(units)}"
+    if about["slots"]:
+        counted = (field if size == 1 else f"{field}[{size}]" for field, size in about["slots"].items())
+        yield f"  slots: {', '.join(counted)}"
+    elif about["slots"] is None:
+        yield "  slots: by its settings"
+    if component.needs:
+        yield f"  needs a model with: {', '.join(component.needs)}"
+    if component.kit:
+        yield f"  needs a deployment with: {component.kit}"
+
+
+def _settings(component: Component) -> Iterator[tuple[str, str, str | None]]:
+    """Yield key, what is valid, and the default of each setting; None where it is required."""
+    schema = component.settings.model_json_schema(by_alias=True)
+    required = schema.get("required", ())
+    for key, value in schema["properties"].items():
+        if key != "kind":
+            default = None if key in required else str(value.get("default", ""))
+            yield key, _valid(value), default
+
+
+def _valid(value: Mapping[str, Any]) -> str:
+    """Return in words which values a setting accepts."""
+    if "description" in value:
+        return str(value["description"])
+    if "enum" in value:
+        return " or ".join(map(str, value["enum"]))
+    bounds = [f"{word} {value[key]}" for key, word in (("minimum", "at least"), ("maximum", "at most")) if key in value]
+    return ", ".join([str(value.get("type", "any")), *bounds])

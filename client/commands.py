@@ -1,0 +1,80 @@
+"""Commands of robots as packets: on the channel of the actuator that takes them, checked by its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final
+
+from msgspec import Struct
+
+from foosim.common.errors import BadValue, UnknownName
+from foosim.deployment.schema import Deployment
+from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.layout import Layout, build_layout
+
+NO_NAMES: Final[Mapping[str, Any]] = MappingProxyType({})
+
+
+class CommandEncoder:
+    """Makes the packets of the commands of one deployment's robots."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._layout: Layout | None = None
+        self._fitted: dict[str, tuple[FittedActuator, ...]] = {}
+
+    def encode(self, robot: str, command: Struct) -> tuple[str, bytes]:
+        """Return the channel and the payload of a command.
+
+        A node refuses and counts a command out of bounds, or clips it; here the sender gets an error. Raises
+        UnknownName for a robot without an actuator that takes it, BadValue for what is not finite or out of bounds.
+        """
+        for one in self.actuators(robot):
+            if isinstance(command, one.codec.kind):
+                return one.channel, _checked(robot, one, command)
+        fitting = [name for name in self._deployment.robots if self._takes(name, command)]
+        raise UnknownName(f"no robot that takes a {type(command).__name__}", robot, fitting)
+
+    def encode_numbers(
+        self, robot: str, channel: str, numbers: Sequence[Any], named: Mapping[str, Any] = NO_NAMES
+    ) -> bytes:
+        """Return the payload of the command with these numbers on a robot's channel. Raises as `encode` does."""
+        one = self._actuator(robot, channel)
+        names = [field.name for field in one.codec.fields]
+        given = {**dict(zip(names, numbers, strict=False)), **named}
+        if len(numbers) + len(named) != len(names) or {*given} != {*names}:
+            said = ", ".join([*map(str, numbers), *named]) or "nothing"
+            raise BadValue(f"{robot}'s {channel} takes {', '.join(names)}, each once", said)
+        return _checked(robot, one, one.codec.kind(**given))
+
+    def codec(self, robot: str, channel: str) -> PayloadCodec:
+        """Return the codec of the commands on a robot's channel, which is an actuator's."""
+        return self._actuator(robot, channel).codec
+
+    def _actuator(self, robot: str, channel: str) -> FittedActuator:
+        return next(one for one in self.actuators(robot) if one.channel == channel)
+
+    def actuators(self, robot: str) -> tuple[FittedActuator, ...]:
+        """Return the actuators of a robot; of what is none, nothing."""
+        if robot not in self._deployment.robots:
+            return ()
+        if self._layout is None:
+            self._layout = build_layout(self._deployment)
+        if robot not in self._fitted:
+            self._fitted[robot] = actuators_of(self._deployment, self._layout, self._layout[robot])
+        return self._fitted[robot]
+
+    def _takes(self, robot: str, command: Struct) -> bool:
+        return any(isinstance(command, one.codec.kind) for one in self.actuators(robot))
+
+
+def _checked(robot: str, one: FittedActuator, command: Struct) -> bytes:
+    payload = one.codec.encode(command)
+    units = {field.name: field.unit for field in one.codec.fields}
+    for name, (least, most) in one.actuator.limits().items():
+        value = getattr(command, name)
+        if not least <= value <= most:
+            raise BadValue(f"{name} of {robot} is not within {least} to {most} {units[name]}", value)
+    return payload

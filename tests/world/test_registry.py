@@ -1,0 +1,689 @@
+"""Components of one's own: how a deployment's words find a class, what hurts nobody else, and a run that has them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from math import pi
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+from msgspec import Struct
+
+from foosim.analysis.export import export_capture
+from foosim.capture.reader import open_capture
+from foosim.common.errors import DeploymentError, Malformed, Refused, UnknownName
+from foosim.deployment.json_schema import deployment_schema
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.rehearsal.run import Rehearsed, rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.forms import registry
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import FOLDERS, FORMS, find, names
+from foosim.world.frame import Frame
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = TABLE.read_text()
+
+GAUGES: Final = '''
+from typing import Annotated
+
+from msgspec import Struct
+from pydantic import Field
+
+from foosim.common.spec_base import LengthNoise
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+
+
+class ReachSettings(SensorSettings):
+    """How far a rod is out."""
+
+    scale: Annotated[float, Field(ge=0, le=10)]
+    grain: LengthNoise = Field(default="0 m", validate_default=True)
+
+
+class Reach(Struct, frozen=True):
+    """How far a rod is out, and when that was."""
+
+    slide: Metres
+    tick: float
+
+
+@sensor("reach", ReachSettings, Reach, needs=("joint_positions",))
+class ReachGauge:
+    """The slide of a rod, scaled."""
+
+    def __init__(self, settings, at):
+        self._joints, self._scale = at.slot("joint_positions"), settings.scale
+
+    def sample(self, view):
+        return Reach(self._scale * view.read(self._joints)[0], float(view.tick))
+
+
+class Idle:
+    """Nobody registers it."""
+'''
+TELLERS: Final = '''
+from msgspec import Struct
+
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+
+
+class Told(Struct, frozen=True):
+    """In words."""
+
+    text: str
+    slide: Metres
+    ticks: list[int]
+
+
+@sensor("teller", SensorSettings, Told, needs=("joint_positions",))
+class Teller:
+    """Says where a rod is."""
+
+    def __init__(self, settings, at):
+        self._joints, self._name = at.slot("joint_positions"), at.robot.name
+
+    def sample(self, view):
+        slide = view.read(self._joints)[0]
+        return Told(f"{self._name} at {slide:.3f} m \\u2713", slide, [view.tick, -1])
+'''
+WINCH: Final = '''
+from typing import Annotated
+
+from msgspec import Meta, Struct
+from pydantic import Field
+
+from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.forms.registry import actuator
+
+
+class WinchSettings(ActuatorSettings):
+    """Turns a rod as fast as it is told."""
+
+    most: Annotated[float, Field(gt=0)] = 40.0
+
+
+class Turn(Struct, frozen=True):
+    """How fast."""
+
+    rate: Annotated[float, Meta(extra={"unit": "rad/s"})]
+
+
+@actuator("winch", WinchSettings, Turn, slots={"rate": 1, "taken": 1}, needs=("joint_positions",))
+class Winch:
+    """A rod's spin by its speed; it counts the commands that it took."""
+
+    def __init__(self, settings, at):
+        self._rate, self._taken, self._most = at.slot("rate"), at.slot("taken"), settings.most
+        self._joints = at.slot("joint_positions")
+
+    def limits(self):
+        return {"rate": (-self._most, self._most)}
+
+    def accept(self, command, view):
+        if abs(command.rate) > self._most:
+            return False
+        view.write(self._rate, command.rate)
+        view.write(self._taken, view.read(self._taken)[0] + 1.0)
+        return True
+
+    def hold(self, view):
+        view.write(self._rate, 0.0)
+
+    def stir(self, view):
+        view.write(self._rate, 1.0)
+
+    def command(self, view):
+        return (0.0, 100.0), (view.read(self._rate)[0], 2.0)
+'''
+LISTENER: Final = '''
+class Listener:
+    """Keeps what it hears, by robot and channel, and commands what its parameters say."""
+
+    heard = {}
+
+    def __init__(self, deployment, parameters):
+        self._commands = parameters.get("commands", {})
+
+    def act(self, tick, samples):
+        for pair, sample in samples.items():
+            Listener.heard.setdefault(pair, {})[sample.sent_ns] = sample.value
+        from own_winch import Turn
+        return {robot: Turn(rate) for robot, rate in self._commands.items()}
+'''
+MODULES: Final = {
+    "own_gauges": GAUGES,
+    "own_tellers": TELLERS,
+    "own_winch": WINCH,
+    "own_listener": LISTENER,
+    "own_broken": "def begin():\n    return 1 / 0\n\nbegin()\n",
+    "own_importer": "import own_missing\n",
+    "own_leaver": "import sys\nsys.exit(0)\n",
+}
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on the path with modules of somebody's own; afterwards nobody knows of what they registered."""
+    for form in FORMS:
+        names(form)
+    folder = tmp_path / "site"
+    folder.mkdir()
+    for name, source in MODULES.items():
+        (folder / f"{name}.py").write_text(source)
+    monkeypatch.syspath_prepend(str(folder))
+    loaded = dict(registry._loaded)
+    yield folder
+    ours = {path.stem for path in folder.glob("*.py")}
+    for name in ours:
+        sys.modules.pop(name, None)
+    for key in [key for key, component in registry._known.items() if component.module in ours]:
+        del registry._known[key]
+    registry._loaded.clear()
+    registry._loaded.update(loaded)
+    codec_of.cache_clear()
+
+
+def install(folder: Path, name: str, *modules: str, version: str = "1.2") -> None:
+    """Leave in a folder what pip leaves there of a package whose entry points are modules in the folder."""
+    about = folder / f"{name}-{version}.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    entries = "\n".join(f"{module.removeprefix('own_')} = {module}" for module in modules)
+    (about / "entry_points.txt").write_text(f"[foosim.world]\n{entries}\n")
+
+
+BEGIN: Final = """
+import json, sys
+from foosim.common.errors import Refused
+from foosim.world.forms.registry import find, names
+
+def said(form, kind):
+    try:
+        return find(form, kind).module
+    except Refused as error:
+        return f"{type(error).__name__}: {error}"
+
+"""
+
+
+def fresh(code: str, folder: Path | None = None) -> Any:
+    """Return what a new process, with a folder on its path, prints as JSON."""
+    path = {} if folder is None else {"PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-c", BEGIN + code], capture_output=True, text=True, check=False, env={**os.environ, **path}
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout, "it ended without a word"
+    return json.loads(done.stdout)
+
+
+# --- foosim's own ----------------------------------------------------------------------------------------------------
+
+
+def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
+    assert names("sensor") == ["ball", "battery", "encoder", "odometry", "pose", "proximity"]
+    assert names("actuator") == ["joint_position", "wheel_speeds"]
+    assert names("modifier") == [
+        *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
+    ]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
+    folder = Path(str(import_module(FOLDERS[form]).__file__)).parent
+    assert names(form) == sorted(path.stem for path in folder.glob("*.py") if path.stem != "__init__")
+    for name in names(form):
+        component = find(form, name)
+        assert (component.form, component.name, component.module) == (form, name, f"{FOLDERS[form]}.{name}")
+        assert component.summary.endswith(".")
+        assert find(form, f"{component.module}:{component.made.__qualname__}") is component
+
+
+def test_finding_one_imports_its_module_only() -> None:
+    """A node of a table does not import what rovers have."""
+    code = """
+found = find("sensor", "encoder").module
+folders = ("foosim.world.sensors.", "foosim.world.actuators.")
+print(json.dumps([found, [name for name in sys.modules if name.startswith(folders)], "numpy" in sys.modules]))
+"""
+    assert fresh(code) == ["foosim.world.sensors.encoder", ["foosim.world.sensors.encoder"], False]
+
+
+@pytest.mark.parametrize(
+    ("form", "kind", "nearest"),
+    [
+        ("sensor", "encodr", ", nearest is 'encoder'"),
+        ("sensor", "Pose", ", nearest is 'pose'"),
+        ("sensor", "joint_position", ""),
+        ("sensor", "", ""),
+        ("sensor", "..", ""),
+        ("sensor", "pose.PoseTracker", ""),
+        ("sensor", "__init__", ""),
+        ("actuator", "wheel_speed", ", nearest is 'wheel_speeds'"),
+    ],
+)
+def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str, nearest: str) -> None:
+    with pytest.raises(UnknownName) as error:
+        find(form, kind)
+    there = ", ".join(names(form))
+    assert str(error.value) == f"unknown {form} (there are: {there}), {kind!r}{nearest}"
+
+
+# --- by module and class ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("site")
+def test_a_class_of_any_module_is_found_by_its_path() -> None:
+    gauge = find("sensor", "own_gauges:ReachGauge")
+    assert (gauge.form, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
+    assert gauge.made is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
+    assert find("sensor", "reach") is gauge, "it has its name from then on"
+    winch = find("actuator", "own_winch:Winch")
+    assert winch.slots == {"rate": 1, "taken": 1} and "own_winch" in sys.modules
+
+
+REFUSED: Final = {
+    "own_gauges:Idle": "own_gauges:Idle: is registered as no sensor",
+    "own_gauges:ReachSettings": "own_gauges:ReachSettings: is registered as no sensor",
+    "own_winch:Winch": "own_winch:Winch: is registered as no sensor",
+    "json:dumps": "json:dumps: is registered as no sensor",
+    "own_gone:Gauge": "own_gone:Gauge: cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
+    "own_gauges.more:Gauge": "own_gauges.more:Gauge: cannot be imported: ModuleNotFoundError: "
+    "No module named 'own_gauges.more'; 'own_gauges' is not a package",
+    "own_importer:Gauge": "own_importer:Gauge: cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
+    "own_broken:Gauge": "own_broken:Gauge: cannot be imported: ZeroDivisionError: division by zero",
+    "own_leaver:Gauge": "own_leaver:Gauge: cannot be imported: SystemExit: 0",
+    "own_gauges:": "own_gauges:: not a class (module:Class)",
+    ":ReachGauge": ":ReachGauge: not a class (module:Class)",
+    "own_gauges:ReachGauge.made": "own_gauges:ReachGauge.made: not a class (module:Class)",
+    "own_gauges::ReachGauge": "own_gauges::ReachGauge: not a class (module:Class)",
+    "own gauges:ReachGauge": "own gauges:ReachGauge: not a class (module:Class)",
+    "./own_gauges:ReachGauge": "./own_gauges:ReachGauge: not a class (module:Class)",
+    "own_gauges:ReachGauge\n": "own_gauges:ReachGauge\n: not a class (module:Class)",
+}
+
+
+@pytest.mark.usefixtures("site")
+@pytest.mark.parametrize("path", REFUSED)
+def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
+    try:
+        with pytest.raises(Refused) as error:
+            find("sensor", path)
+    except SystemExit:
+        pytest.fail("a module that leaves takes the process with it")
+    assert str(error.value) == REFUSED[path]
+
+
+@pytest.mark.usefixtures("site")
+def test_a_missing_class_names_those_that_there_are() -> None:
+    with pytest.raises(UnknownName, match=r"own_gauges has no class .*'ReachGuage', nearest is 'ReachGauge'"):
+        find("sensor", "own_gauges:ReachGuage")
+
+
+# --- two of one name -------------------------------------------------------------------------------------------------
+
+
+def test_two_modules_that_register_one_name_are_refused_with_both_named(site: Path) -> None:
+    (site / "own_second.py").write_text(GAUGES)
+    found = find("sensor", "own_gauges:ReachGauge")
+    with pytest.raises(Refused) as error:
+        find("sensor", "own_second:ReachGauge")
+    assert all(word in str(error.value) for word in ("sensor reach", "own_gauges", "own_second"))
+    assert find("sensor", "reach") is found, "the first one stays"
+    (site / "own_second.py").unlink()
+
+
+THIEF: Final = GAUGES.replace('"reach"', '"encoder"')
+"""A module that takes a name of foosim's."""
+
+
+@pytest.mark.parametrize("first", ["encoder", "own_thief:ReachGauge"])
+def test_a_name_of_foosims_own_is_not_taken_whichever_comes_first(site: Path, first: str) -> None:
+    """Which class a name means must not hang on what a process happened to import before."""
+    (site / "own_thief.py").write_text(THIEF)
+    second = {"encoder": "own_thief:ReachGauge", "own_thief:ReachGauge": "encoder"}[first]
+    told = fresh(f'print(json.dumps([said("sensor", {first!r}), said("sensor", {second!r})]))', site)
+    both = ("own_thief", "foosim.world.sensors.encoder")
+    assert any(all(word in text for word in both) for text in told), told
+    assert fresh('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.world.sensors.encoder"
+
+
+def test_a_package_that_takes_a_name_of_foosims_own_hurts_nobody_else(site: Path) -> None:
+    (site / "own_thief.py").write_text(THIEF)
+    install(site, "thief", "own_thief")
+    code = """
+told = [said("sensor", kind) for kind in ("encodr", "encoder", "pose")]
+print(json.dumps([told, names("sensor")]))
+"""
+    (unknown, encoder, pose), there = fresh(code, site)
+    assert (encoder, pose) == ("foosim.world.sensors.encoder", "foosim.world.sensors.pose")
+    assert unknown.startswith("UnknownName: unknown sensor") and unknown.endswith("'encodr', nearest is 'encoder'")
+    assert all(word in unknown for word in ("own_thief of thief 1.2", "foosim.world.sensors.encoder"))
+    assert set(there) >= {"encoder", "pose"}
+
+
+# --- of installed packages -------------------------------------------------------------------------------------------
+
+
+def test_a_package_gives_its_components_by_name(site: Path) -> None:
+    install(site, "gauges", "own_gauges", "own_winch")
+    assert "own_gauges" not in sys.modules
+    assert find("sensor", "reach").module == "own_gauges"
+    assert find("actuator", "winch").module == "own_winch"
+    assert {"reach", "encoder"} < set(names("sensor"))
+    assert names("actuator") == ["joint_position", "wheel_speeds", "winch"]
+
+
+def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
+    install(site, "gauges", "own_gauges")
+    code = 'print(json.dumps([said("sensor", "encoder"), "own_gauges" in sys.modules]))'
+    assert fresh(code, site) == ["foosim.world.sensors.encoder", False]
+
+
+BROKEN: Final = {
+    "own_broken": "own_broken of worn 0.3 cannot be imported: ZeroDivisionError: division by zero",
+    "own_importer": "own_importer of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
+    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
+    "own_leaver": "own_leaver of worn 0.3 cannot be imported: SystemExit: 0",
+}
+
+
+@pytest.mark.parametrize("module", BROKEN)
+def test_a_package_that_cannot_be_imported_is_named_and_hurts_nobody_else(site: Path, module: str) -> None:
+    install(site, "gauges", "own_gauges")
+    install(site, "worn", module, version="0.3")
+    try:
+        with pytest.raises(UnknownName) as error:
+            find("sensor", "reech")
+    except SystemExit:
+        pytest.fail("a package that leaves takes the process with it")
+    assert str(error.value) == (
+        f"unknown sensor; {BROKEN[module]} "
+        "(there are: ball, battery, encoder, odometry, pose, proximity, reach), 'reech', nearest is 'reach'"
+    )
+    assert find("sensor", "reach").module == "own_gauges" and find("sensor", "encoder").name == "encoder"
+    load_deployment(apply_sets(TEXT, TABLE.name, [REACH.replace("own_gauges:ReachGauge", "reach")]), TABLE.name)
+
+
+def test_the_schema_for_editors_has_what_is_installed(site: Path) -> None:
+    before = deployment_schema()
+    install(site, "own", "own_gauges", "own_winch")
+    assert deployment_schema() == before, "the one that is kept has foosim's own"
+    reach = "robots.red.goal.sensors.own={kind: reach, rate: 100 Hz"
+    winch = "robots.red.goal.actuators={own: {kind: winch"
+    for setting, is_good in (
+        (f"{reach}, scale: 2.0}}", True),
+        (f"{reach}, scale: 11.0}}", False),
+        (f"{reach}, scale: 2.0, grain: 2}}", False),
+        (f"{reach}, scal: 2.0}}", False),
+        (f"{winch}, most: 3.0}}}}", True),
+        (f"{winch}, most: -3.0}}}}", False),
+    ):
+        assert is_valid(setting, installed=True) is is_good, setting
+        assert not is_valid(setting, installed=False), setting
+
+
+def test_the_schema_has_components_without_settings_of_their_own(site: Path) -> None:
+    """Those whose settings are what all sensors have."""
+    install(site, "own", "own_tellers")
+    told = "robots.red.goal.sensors.own={kind: teller, rate: 100 Hz"
+    assert is_valid("seed=2", installed=True)
+    assert is_valid(f"{told}}}", installed=True) and not is_valid(f"{told}, scale: 2.0}}", installed=True)
+
+
+def test_the_schema_keeps_settings_of_one_name_apart(site: Path) -> None:
+    """A package may call its settings as foosim does."""
+    (site / "own_poses.py").write_text(GAUGES.replace('"reach"', '"pose2"').replace("ReachSettings", "PoseSettings"))
+    pose = find("sensor", "pose").settings.__name__
+    assert pose == "PoseSettings"
+    before = deployment_schema()["$defs"][pose]
+    install(site, "own", "own_poses")
+    assert is_valid("robots.red.goal.sensors.own={kind: pose2, rate: 100 Hz, scale: 2.0}", installed=True)
+    assert before in deployment_schema(installed=True)["$defs"].values(), "foosim's own is still there"
+
+
+def is_valid(setting: str, *, installed: bool) -> bool:
+    """Whether the JSON Schema takes the table with a setting, whatever else may be wrong with it."""
+    data = data_of(TEXT)
+    key, _, value = setting.partition("=")
+    inner = data
+    *path, last = key.replace("red.goal", "red/goal").split(".")
+    for step in path:
+        inner = inner[step.replace("/", ".")]
+    inner[last] = data_of(value)
+    schema = deployment_schema(installed=installed)
+    Draft202012Validator.check_schema(schema)
+    return not list(Draft202012Validator(schema).iter_errors(data))
+
+
+def data_of(text: str) -> Any:
+    tree, problems = read_tree(text, locate_in("f"))
+    assert tree is not None and not problems
+    return plain(tree)
+
+
+# --- a deployment with them ------------------------------------------------------------------------------------------
+
+REACH: Final = "robots.red.goal.sensors.reach={kind: 'own_gauges:ReachGauge', rate: 100 Hz, scale: 2.0}"
+TELLER: Final = "robots.red.attack.sensors.words={kind: 'own_tellers:Teller', rate: 50 Hz}"
+WINCH_OF_GOAL: Final = "robots.red.goal.actuators={turn: {kind: 'own_winch:Winch', most: 20.0}}"
+
+
+def listens(heard: Mapping[str, list[str]], commands: Mapping[str, float] | None = None) -> str:
+    about = {
+        "class": "own_listener:Listener",
+        "rate": "50 Hz",
+        "lockstep": True,
+        "robots": dict(heard),
+        "parameters": {"commands": dict(commands or {})},
+    }
+    return f"players={json.dumps({'ear': about})}"
+
+
+def rehearsed(*sets: str, nodes: int = 1, capture: Path | None = None) -> tuple[Rehearsed, dict[int, Frame]]:
+    """Return what came of 60 ticks, and all frames of it."""
+    frames: dict[int, Frame] = {}
+
+    def keep(frame: Frame) -> None:
+        frames[frame.tick] = frame
+
+    sets = ("engine=pure", "network.links=[]", *sets)
+    done = rehearse(TEXT, TABLE.name, 60, nodes, sets, Settings(on_commit=keep), capture=capture)
+    assert not done.json["failed"], done.json["reason"]
+    return done, frames
+
+
+@pytest.mark.usefixtures("site")
+def test_readings_of_a_sensor_of_ones_own_reach_a_player_and_the_capture(tmp_path: Path) -> None:
+    hears = listens({"red.goal": ["reach"]}, {"red.goal": 15.0})
+    done, frames = rehearsed(REACH, WINCH_OF_GOAL, hears, capture=tmp_path / "run.mcap")
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, [REACH]), TABLE.name)
+    heard = sys.modules["own_listener"].Listener.heard["red.goal", "reach"]
+    assert len(heard) >= 5
+    for sent_ns, value in heard.items():
+        assert type(value) is sys.modules["own_gauges"].Reach
+        tick = sent_ns // deployment.tick_ns
+        slide = frames[tick].at("red.goal", "joint_positions") if tick else 0.0
+        assert (value.slide, value.tick) == (2.0 * slide, float(tick))
+    assert frames[60].at("red.goal", "reach.samples") == 12.0, "100 Hz of 500"
+    export_capture(tmp_path / "run.mcap", "packets", tmp_path / "packets.csv")
+    sent = open_capture(tmp_path / "run.mcap").packets
+    values = [codec_of("reach", "sensor").decode(payload) for payload in sent.where(sent.channel == "reach").payload]
+    assert len(values) == 12 and [value.tick for value in values] == [float(tick) for tick in range(0, 60, 5)]
+    assert '""slide"":' in (tmp_path / "packets.csv").read_text(), "a table has them by name"
+    assert rehearsed(REACH, WINCH_OF_GOAL, hears, nodes=3)[0].digests == done.digests, "law 1"
+
+
+@pytest.mark.usefixtures("site")
+def test_an_actuator_of_ones_own_takes_commands_and_moves_its_robot(tmp_path: Path) -> None:
+    sets = (WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": 15.0}))
+    _, frames = rehearsed(*sets, nodes=2, capture=tmp_path / "run.mcap")
+    last = frames[60]
+    assert last.at("red.goal", "turn.rate") == 15.0 and last.at("red.goal", "turn.taken") >= 4.0
+    assert "position.set_point" not in last.layout["red.goal"].offsets
+    assert last.at("red.goal", "refused") == 0.0
+    turned = [frames[tick].at("red.goal", "joint_velocities", 1) for tick in range(55, 61)]
+    assert turned == pytest.approx([15.0] * 6)
+    assert 0.1 < last.at("red.goal", "joint_positions", 1) < 2 * pi
+    export_capture(tmp_path / "run.mcap", "commands", tmp_path / "commands.csv")
+    head, line, *_ = (tmp_path / "commands.csv").read_text().splitlines()
+    assert "rate" in head.split(",") and "15.0" in line.split(",")
+
+
+@pytest.mark.usefixtures("site")
+def test_a_command_of_ones_own_is_checked_by_its_limits() -> None:
+    sets = ("engine=pure", WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": 20.5}))
+    done = rehearse(TEXT, TABLE.name, 60, 1, sets).json
+    assert done["failed"] and "rate of red.goal is not within -20.0 to 20.0 rad/s, 20.5" in done["reason"]
+
+
+@pytest.mark.usefixtures("site")
+def test_a_reading_in_words_reaches_a_player() -> None:
+    rehearsed(TELLER, listens({"red.attack": ["words"]}))
+    heard = sys.modules["own_listener"].Listener.heard
+    assert ("red.attack", "words") in heard, "the player heard nothing that it could decode"
+    value = heard["red.attack", "words"][0]
+    assert type(value) is sys.modules["own_tellers"].Told
+    assert (value.text, value.slide, value.ticks) == ("red.attack at 0.000 m \u2713", 0.0, [0, -1])
+
+
+WRONG: Final = (
+    ("kind: 'own_gauges:ReachGauge', rate: 100 Hz, scale: 11.0",
+     [("11.0", ".scale: more than the most that is valid, 10.0, 11.0")]),
+    ("kind: 'own_gauges:ReachGauge', rate: 100 Hz, scale: two", [("two", ".scale: not a number, 'two'")]),
+    ("kind: 'own_gauges:ReachGauge', rate: 100 Hz, scal: 2.0",
+     [("{", ": missing key, 'scale'"), ("scal", ": unknown key, 'scal', nearest is 'scale'")]),
+    ("kind: 'own_gauges:ReachGauge', scale: 2.0, grain: 2 kg, rate: 3 mm",
+     [("2 kg", ".grain: not a length (a number and one of m, cm, mm, um, km), '2 kg', nearest is '2 km'"),
+      ("3 mm", ".rate: not a rate (a number and one of Hz, kHz, mHz), '3 mm'")]),
+    ("rate: 100 Hz, kind: 'own_gauges:Idle'",
+     [("'own", ".kind: own_gauges:Idle: is registered as no sensor, 'own_gauges:Idle'")]),
+    ("kind: 'own_gone:Idle', rate: 100 Hz",
+     [("'own", ".kind: own_gone:Idle: cannot be imported: ModuleNotFoundError: No module named 'own_gone', "
+       "'own_gone:Idle'")]),
+    ("kind: own_gauges.ReachGauge, rate: 100 Hz",
+     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity), "
+       "'own_gauges.ReachGauge'")]),
+)  # fmt: skip
+"""Settings, and what is said of them at which word."""
+
+
+@pytest.mark.parametrize(("settings", "said"), WRONG)
+@pytest.mark.usefixtures("site")
+def test_what_is_wrong_with_settings_of_ones_own_has_its_place(settings: str, said: list[tuple[str, str]]) -> None:
+    """In the file, by line and column, in the words that foosim's own settings have."""
+    lines = TEXT.splitlines()
+    number = lines.index("      encoder:") + 1
+    line = f"      own: {{{settings}}}"
+    text = "\n".join([*lines[: number - 1], line, *lines[number - 1 :]])
+    with pytest.raises(DeploymentError) as error:
+        load_deployment(text, "mine.yaml")
+    assert list(error.value.problems) == [
+        f"mine.yaml:{number}:{line.index(word) + 1}: robots.red.goal.sensors.own{what}" for word, what in said
+    ]
+
+
+@pytest.mark.usefixtures("site")
+def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(TEXT, "t.yaml", ["robots.camera.sensors.own={kind: 'own_tellers:Teller', rate: 100 Hz}"])
+    (problem,) = error.value.problems
+    assert problem.endswith(
+        "robots.camera.sensors.own.kind: a sensor that a camera cannot carry, which has no joint_positions "
+        "(valid on: rod), 'own_tellers:Teller'"
+    )
+
+
+LOOP: Final = "{kind: joint_position}"
+
+
+@pytest.mark.parametrize("actuators", ["{}", "null", f"{{loop: {LOOP}}}", f"{{one: {LOOP}, two: {LOOP}}}"])
+@pytest.mark.parametrize("engine", ["pure", "bullet"])
+def test_actuators_that_validate_run(actuators: str, engine: str) -> None:
+    """A deployment with other actuators than the model's is refused, or it runs."""
+    sets = ("players={}", f"engine={engine}", f"robots.red.goal.actuators={actuators}")
+    try:
+        apply_sets(TEXT, TABLE.name, sets)
+    except DeploymentError:
+        return
+    assert not rehearse(TEXT, TABLE.name, 5, 2, sets).json["failed"]
+
+
+def test_a_sensor_may_have_the_name_of_an_actuator_that_its_robot_does_not_have() -> None:
+    sensor = "robots.red.goal.sensors={position: {kind: ball, rate: 100 Hz}}"
+    for actuators in ("{}", f"{{loop: {LOOP}}}"):
+        sets = ["players={}", f"robots.red.goal.actuators={actuators}", sensor]
+        robot = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name).robots["red.goal"]
+        assert list(robot.sensors) == ["position"] and "position" not in robot.actuators
+
+
+# --- values that are not all numbers ---------------------------------------------------------------------------------
+
+
+class Spoken(Struct, frozen=True):
+    """Words, and where they were said."""
+
+    text: str
+    slide: Metres
+    marks: tuple[int, ...] = ()
+
+
+SPOKEN: Final = PayloadCodec(Spoken, "speech")
+
+
+@given(st.builds(Spoken, st.text(), st.floats(allow_nan=False), st.lists(st.integers(-9, 2**40)).map(tuple)))
+def test_a_value_in_words_comes_back_as_it_was(value: Spoken) -> None:
+    payload = SPOKEN.encode(value)
+    assert isinstance(payload, bytes)
+    again = SPOKEN.decode(payload)
+    assert (again, type(again)) == (value, Spoken)
+
+
+def test_only_fields_that_are_numbers_count_as_numbers() -> None:
+    assert [field.name for field in SPOKEN.fields] == ["text", "slide", "marks"]
+    assert [field.is_number for field in SPOKEN.fields] == [False, True, False]
+    assert SPOKEN.names == ("slide",) and SPOKEN.unit == "m"
+    assert SPOKEN.numbers(Spoken("a", 1.5)) == []
+
+
+@given(st.binary(max_size=40))
+def test_rubbish_is_malformed(payload: bytes) -> None:
+    try:
+        value = SPOKEN.decode(payload)
+    except Malformed as error:
+        assert str(error).startswith("speech: ")
+    else:
+        assert isinstance(value, Spoken)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [b"", b"\xc1", b"\x90", b"\x91\xa1a", b"\x93\x01\x02\x90", b"\x93\xa1a\xa1b\x90", b"\x92\xa1\xff\x01", b"\x80"],
+)
+def test_what_is_no_value_in_words_is_malformed(payload: bytes) -> None:
+    with pytest.raises(Malformed, match=r"^speech: "):
+        SPOKEN.decode(payload)
+
+
+def test_what_stands_behind_a_value_in_words_is_malformed() -> None:
+    with pytest.raises(Malformed, match=r"^speech: "):
+        SPOKEN.decode(SPOKEN.encode(Spoken("a", 1.5)) + b"\x00")
+    with pytest.raises(Malformed, match=r"^speech: "):
+        SPOKEN.decode(SPOKEN.encode(Spoken("a", 1.5))[:-1])

@@ -1,0 +1,54 @@
+"""A rover's drive: the rims of both wheels approach their set-points of speed as fast as the motors accelerate."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.quantities import MetresPerSecond
+from foosim.world.forms.registry import actuator
+from foosim.world.forms.settings import ActuatorSettings
+
+
+class WheelSpeedsSettings(ActuatorSettings):
+    """Turns the two wheels of a rover; speed and acceleration are those of the hall's rovers."""
+
+
+class Drive(Struct, frozen=True):
+    """The set-points of a rover's wheels; both positive is ahead, a faster right one turns left."""
+
+    left: MetresPerSecond
+    right: MetresPerSecond
+
+
+@actuator("wheel_speeds", WheelSpeedsSettings, Drive, slots={"set_point": 2}, needs=("wheel_speeds",), kit="hall")
+class DriveActuator:
+    """The two wheels of a rover."""
+
+    def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
+        drive = at.spec.hall.rover.drive
+        self._set_point = at.slot("set_point")
+        self._speed, self._acceleration = drive.speed, drive.acceleration
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and greatest speed of each wheel (m/s); a command beyond is held within."""
+        return {"left": (-self._speed, self._speed), "right": (-self._speed, self._speed)}
+
+    def accept(self, command: Drive, view: WritableView) -> bool:
+        """Take the wheels' speeds, held within the drive's."""
+        left, right = (min(max(speed, -self._speed), self._speed) for speed in (command.left, command.right))
+        view.write(self._set_point, left, right)
+        return True
+
+    def hold(self, view: WritableView) -> None:
+        """Stop the wheels."""
+        view.write(self._set_point, 0.0, 0.0)
+
+    def stir(self, view: WritableView) -> None:
+        """Drive in a curve, for the small run that tells engines apart."""
+        view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
+
+    def command(self, view: View) -> tuple[tuple[float, float], ...]:
+        """Return (target speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
+        left, right = view.read(self._set_point)
+        return (left, self._acceleration), (right, self._acceleration)

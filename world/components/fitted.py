@@ -1,0 +1,214 @@
+"""The components of the robots of one layout, made from their settings: what senses, and what takes commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Any, Final
+
+from foosim.common.errors import Malformed
+from foosim.common.keyed_random import draw_key
+from foosim.world.components.view import (
+    Actuator,
+    ComponentError,
+    Modifier,
+    ModifierMounting,
+    Mounting,
+    Sensor,
+    View,
+    WritableView,
+)
+from foosim.world.forms import registry
+from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.per_field import codec_of, numbers_of
+from foosim.world.forms.registry import Component
+from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
+from foosim.world.layout import SAMPLES, Entity, Layout, modifier_labels
+from foosim.world.spec import WorldSpec
+
+NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class FittedModifier:
+    """A modifier of one sensor or actuator: its name, and which robot's it is, for messages."""
+
+    what: str
+    modifier: Modifier
+
+    def apply(self, values: list[float], view: WritableView) -> list[float] | None:
+        """Return what becomes of the numbers of a reading. Raises ComponentError."""
+        try:
+            return self.modifier.apply(values, view)
+        except Exception as error:
+            raise self.failed(view.tick, error) from error
+
+    def failed(self, tick: int, error: Exception) -> ComponentError:
+        """Return the error of a modifier that has raised."""
+        return ComponentError(self.what, tick, error)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedSensor:
+    """A sensor of one robot: the channel of its readings, period and offset in ticks, the slot that counts them."""
+
+    robot: str
+    channel: str
+    period: int
+    offset: int
+    samples_at: int
+    sensor: Sensor
+    codec: PayloadCodec
+    modifiers: tuple[FittedModifier, ...]
+    size: int
+    """How many numbers a reading has; 0 of one that is not all numbers."""
+
+    def is_due(self, tick: int) -> bool:
+        """Whether it measures at a tick."""
+        return tick % self.period == self.offset
+
+    def sample(self, view: WritableView) -> Any:
+        """Return what is measured. Raises ComponentError."""
+        try:
+            return self.sensor.sample(view)
+        except Exception as error:
+            raise ComponentError(f"sensor {self.channel} of {self.robot}", view.tick, error) from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedActuator:
+    """An actuator of one robot, and the channel of its commands."""
+
+    robot: str
+    channel: str
+    actuator: Actuator
+    codec: PayloadCodec
+    modifiers: tuple[FittedModifier, ...]
+
+    @property
+    def has_waiting(self) -> bool:
+        """Whether commands may have to wait for their tick."""
+        return any(hasattr(one.modifier, "due") for one in self.modifiers)
+
+    def accept(self, payload: bytes, view: WritableView) -> bool:
+        """Take a command; False when it is refused. Raises ComponentError."""
+        try:
+            command = self.codec.decode(payload)
+        except Malformed:
+            return False
+        if not self.modifiers:
+            return self._take(command, view)
+        return self._go_on(0, self.codec.numbers(command), view)
+
+    def take_due(self, view: WritableView) -> None:
+        """Take the commands whose time has come. Raises ComponentError."""
+        for place, one in enumerate(self.modifiers):
+            due = getattr(one.modifier, "due", None)
+            if due is not None:
+                try:
+                    values = due(view)
+                except Exception as error:
+                    raise one.failed(view.tick, error) from error
+                if values is not None:
+                    self._go_on(place + 1, values, view)
+
+    def _go_on(self, place: int, values: list[float], view: WritableView) -> bool:
+        """Take a command that has come to this place among the modifiers; dropping or delaying one is no refusal."""
+        left: list[float] | None = values
+        for one in self.modifiers[place:]:
+            assert left is not None
+            try:
+                accept = getattr(one.modifier, "accept", one.modifier.apply)
+                left = accept(left, view)
+            except Exception as error:
+                raise one.failed(view.tick, error) from error
+            if left is None:
+                return True
+        assert left is not None
+        return self._take(self.codec.from_numbers(left), view)
+
+    def _take(self, command: Any, view: WritableView) -> bool:
+        try:
+            return self.actuator.accept(command, view)
+        except Exception as error:
+            raise self._failed(view.tick, error) from error
+
+    def command(self, view: View) -> tuple[tuple[float, float], ...]:
+        """Return what it asks of each motor. Raises ComponentError."""
+        try:
+            return self.actuator.command(view)
+        except Exception as error:
+            raise self._failed(view.tick, error) from error
+
+    def _failed(self, tick: int, error: Exception) -> ComponentError:
+        return ComponentError(f"actuator {self.channel} of {self.robot}", tick, error)
+
+
+# --- making ----------------------------------------------------------------------------------------------------------
+
+
+def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSensor, ...]:
+    """Return the sensors of a robot, in the order of their channels. Raises ComponentError."""
+    fitted = []
+    for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
+        component = registry.find("sensor", settings.kind)
+        mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "sensor", robot.name, channel))
+        period, offset = spec.turns(settings)
+        sensor = _made(component, settings, mounting)
+        modifiers = tuple(_modifiers(component, settings, mounting, sensor, period * spec.tick_ns))
+        numbers = numbers_of(component, settings)
+        fitted.append(
+            FittedSensor(
+                robot.name,
+                channel,
+                period,
+                offset,
+                robot.offsets[f"{channel}.{SAMPLES}"],
+                sensor,
+                codec_of(settings.kind, "sensor"),
+                modifiers,
+                0 if numbers is None else numbers.size,
+            )
+        )
+    return tuple(fitted)
+
+
+def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedActuator, ...]:
+    """Return the actuators of a robot, in the order of their channels. Raises ComponentError."""
+    fitted = []
+    for channel, settings in sorted(spec.robots[robot.name].actuators.items()):
+        component = registry.find("actuator", settings.kind)
+        mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "actuator", robot.name, channel))
+        made = _made(component, settings, mounting)
+        modifiers = tuple(_modifiers(component, settings, mounting, made, spec.tick_ns))
+        fitted.append(FittedActuator(robot.name, channel, made, codec_of(settings.kind, "actuator"), modifiers))
+    return tuple(fitted)
+
+
+def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:
+    at = mounting if isinstance(mounting, Mounting) else mounting.mounting
+    try:
+        return component.made(settings, mounting)
+    except Exception as error:
+        raise ComponentError(f"{component.form} {at.name} of {at.robot.name}", 0, error) from error
+
+
+def _modifiers(
+    component: Component, settings: SensorSettings | ActuatorSettings, mounting: Mounting, made: Any, period_ns: int
+) -> Iterator[FittedModifier]:
+    """Yield the modifiers of a component's readings or commands, in order; their draws are keyed by their names."""
+    if not settings.modifiers:
+        return
+    numbers = numbers_of(component, settings)
+    assert numbers is not None, "checked with the deployment"
+    spec, robot, channel = mounting.spec, mounting.robot, mounting.name
+    limits = made.limits() if component.form == "sensor" and hasattr(made, "limits") else NO_LIMITS
+    bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
+    low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
+    for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
+        key = draw_key(spec.seed, component.form, robot.name, channel, label)
+        own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key)
+        at = ModifierMounting(own, numbers, low, high, spec.tick_ns, period_ns / 1e9, key)
+        made_modifier = _made(registry.find("modifier", its.kind), its, at)
+        yield FittedModifier(f"modifier {label} of {robot.name} {channel}", made_modifier)

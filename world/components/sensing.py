@@ -1,0 +1,137 @@
+"""The readings of many sensors in one frame: each by itself, or those of a class together, with the same bits.
+
+Sensors that are due at one tick are due together again, so what is put together is kept for each set of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.common.errors import BadValue
+from foosim.world.components.fitted import FittedSensor
+from foosim.world.components.view import ComponentError, SensingView
+
+Numbers: TypeAlias = NDArray[np.float64]
+PLANS_MAX: Final = 64
+"""Sets of sensors whose plan is kept: those of ticks, and of robots that are out of service."""
+
+
+class Sensing:
+    """Samples the sensors of one layout."""
+
+    def __init__(self) -> None:
+        self._plans: dict[tuple[int, ...], Plan] = {}
+
+    def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
+        """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
+
+        `view.not_finite` has the sensors whose readings are dropped since a number in them is not finite.
+        """
+        key = tuple(map(id, fitted))
+        plan = self._plans.get(key)
+        if plan is None:
+            while len(self._plans) >= PLANS_MAX:
+                self._plans.pop(next(iter(self._plans)))
+            plan = self._plans[key] = Plan(fitted)
+        return plan.sample(view)
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Sensors or modifiers of one class that are computed together: the places of their sensors, what they became, and
+    their names, for messages."""
+
+    places: list[int]
+    made: Any
+    what: str
+
+
+class Plan:
+    """What is done for one set of sensors, in which order."""
+
+    def __init__(self, fitted: Sequence[FittedSensor]) -> None:
+        self._fitted = tuple(fitted)
+        everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
+        self._together, self._alone = self._divided(everyone, "sensor")
+        depth = max((len(one.modifiers) for one in fitted), default=0)
+        self._steps = [self._step(place) for place in range(depth)]
+
+    def _step(self, depth: int) -> tuple[list[_Group], list[int]]:
+        """Return the modifiers at a depth: groups, and the places of the sensors whose modifier works alone."""
+        having = [(place, one) for place, one in enumerate(self._fitted) if len(one.modifiers) > depth]
+        return self._divided([(place, one.modifiers[depth].modifier, one.size) for place, one in having], "modifier")
+
+    def _divided(self, members: Sequence[tuple[int, Any, int]], form: str) -> tuple[list[_Group], list[int]]:
+        """Divide (place, object, numbers) into groups of a class and a length, and the places of those without one."""
+        kinds: dict[tuple[type[Any], int], list[tuple[int, Any]]] = {}
+        alone = []
+        for place, one, size in members:
+            if size and hasattr(type(one), "together"):
+                kinds.setdefault((type(one), size), []).append((place, one))
+            else:
+                alone.append(place)
+        groups = []
+        for (kind, _), its in kinds.items():
+            names = ", ".join(f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its)
+            groups.append(
+                _Group([place for place, _ in its], kind.together([one for _, one in its]), f"{form} {names}")
+            )
+        return groups, alone
+
+    def sample(self, view: SensingView) -> list[bytes | None]:
+        """Return the payload of each sensor, None of a reading that is dropped. Raises ComponentError."""
+        fitted = self._fitted
+        readings: list[Any] = [None] * len(fitted)
+        for place in self._alone:
+            one = fitted[place]
+            reading = one.sample(view)
+            readings[place] = one.codec.numbers(reading) if one.modifiers else reading
+        for group in self._together:
+            rows = _computed(group, view, group.made.sample, view)
+            for place, row in zip(group.places, rows, strict=True):
+                readings[place] = row
+        for depth, (groups, alone) in enumerate(self._steps):
+            for place in alone:
+                if readings[place] is not None:
+                    readings[place] = fitted[place].modifiers[depth].apply(list(readings[place]), view)
+            for group in groups:
+                _apply_together(group, readings, view)
+        return [_payload(one, reading, view) for one, reading in zip(fitted, readings, strict=True)]
+
+
+def _apply_together(group: _Group, readings: list[Any], view: SensingView) -> None:
+    """Let the modifiers of a group work on their readings; those that were dropped before stay so."""
+    there = [place for place in group.places if readings[place] is not None]
+    nothing = [0.0] * len(readings[there[0]]) if there else []
+    if there:
+        values = np.array([nothing if readings[place] is None else readings[place] for place in group.places])
+        for place, row in zip(group.places, _computed(group, view, group.made.apply, values, view), strict=True):
+            if readings[place] is not None:
+                readings[place] = row
+
+
+def _computed(group: _Group, view: SensingView, compute: Callable[..., Numbers], *arguments: Any) -> Numbers:
+    try:
+        return compute(*arguments)
+    except Exception as error:
+        raise ComponentError(group.what, view.tick, error) from error
+
+
+def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None:
+    """Return the bytes of a reading; None of one that was dropped, or has a number that is not finite."""
+    if reading is None:
+        return None
+    try:
+        if isinstance(reading, np.ndarray):
+            return one.codec.encode_numbers(reading.tolist())
+        if isinstance(reading, list):
+            return one.codec.encode_numbers(reading)
+        return one.codec.encode(reading)
+    except BadValue:
+        view.not_finite.append(one)
+        return None

@@ -1,0 +1,192 @@
+"""What sensors and actuators have in common: what they see of the world, and where they are mounted.
+
+A component is a pure function of the frame, its settings and keyed draws. Whatever it remembers is numbers of the
+frame, which it declares when it registers itself (`registry`); an object keeps only what follows from the deployment
+and the layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from foosim.world.forms.per_field import Numbers, read_per_field
+from foosim.world.layout import Entity, Layout
+from foosim.world.spec import WorldSpec
+
+if TYPE_CHECKING:  # numpy is for those who compute a tick
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class ComponentError(Exception):
+    """A component has raised: whichever node computes its tick, it would raise again. `cause` has its traceback."""
+
+    def __init__(self, what: str, tick: int, cause: Exception) -> None:
+        super().__init__(f"{what} failed at tick {tick}: {type(cause).__name__}: {cause}")
+        self.cause = cause
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A field of an entity in the frame: the place of its first number, how many there are, and whether the component
+    that asked for it declared it, so that it may write it."""
+
+    at: int
+    size: int
+    name: str
+    is_own: bool
+
+
+class View:
+    """What a component sees of the world in one tick: the numbers of the frame, by slots.
+
+    `numbers` are those of all entities, SI units, in the world frame of reference; they are not written to directly.
+    """
+
+    __slots__ = ("_values", "count", "numbers", "tick")
+
+    def __init__(self, tick: int, numbers: Sequence[float], values: NDArray[np.float64] | None = None) -> None:
+        self.tick = tick
+        self.numbers = numbers
+        self.count = 0
+        """Of the commands that an actuator gets in one tick, which this is."""
+        self._values = values
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The numbers as an array."""
+        if self._values is None:
+            import numpy as np
+
+            self._values = np.array(self.numbers)
+        return self._values
+
+    def read(self, slot: Slot) -> Sequence[float]:
+        """Return the numbers of a slot."""
+        return self.numbers[slot.at : slot.at + slot.size]
+
+
+class WritableView(View):
+    """A view in the part of a tick in which components write to their slots."""
+
+    __slots__ = ("_written",)
+
+    def __init__(self, tick: int, numbers: list[float]) -> None:
+        super().__init__(tick, numbers)
+        self._written = numbers
+
+    def write(self, slot: Slot, *values: float) -> None:
+        """Write all numbers of a slot, which the component must have declared."""
+        check_write(slot, values)
+        self._written[slot.at : slot.at + slot.size] = values
+
+
+class SensingView(WritableView):
+    """A view in which sensors and their modifiers remember: what they write is in the next frame, not in this one."""
+
+    __slots__ = ("not_finite", "written")
+
+    def __init__(self, tick: int, numbers: list[float], values: NDArray[np.float64] | None = None) -> None:
+        super().__init__(tick, numbers)
+        self._values = values
+        self.written: dict[int, float] = {}
+        """Numbers of the next frame, by place."""
+        self.not_finite: list[Any] = []
+        """Sensors whose reading has a number that is not finite."""
+
+    def write(self, slot: Slot, *values: float) -> None:
+        """Write all numbers of a slot, which the component must have declared."""
+        check_write(slot, values)
+        self.written.update(enumerate(values, slot.at))
+
+
+def check_write(slot: Slot, values: Sequence[float]) -> None:
+    """Assert that a component may write these numbers to a slot."""
+    assert slot.is_own, f"a component writes {slot.name}, which is not its own"
+    assert len(values) == slot.size, f"{len(values)} numbers for {slot.name}, which has {slot.size}"
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """Where a component is: on which robot of which world, under which name, and the key of its draws."""
+
+    spec: WorldSpec
+    layout: Layout
+    robot: Entity
+    name: str
+    key: bytes
+
+    def slot(self, field: str) -> Slot:
+        """Return a slot of the component itself, else one of its robot's body, by field."""
+        own = f"{self.name}.{field}"
+        name = own if own in self.robot.offsets else field
+        return Slot(self.robot.offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", name is own)
+
+
+@dataclass(frozen=True, slots=True)
+class ModifierMounting:
+    """What a modifier is on: the numbers of a reading or command, with the bounds of each, and the key of its draws.
+
+    `period_s` is the time between two readings, or a tick's for commands.
+    """
+
+    mounting: Mounting
+    numbers: Numbers
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    tick_ns: int
+    period_s: float
+    key: bytes
+
+    def slot(self, field: str) -> Slot:
+        """Return a slot of the modifier."""
+        return self.mounting.slot(field)
+
+    def per_field(self, written: Any, other: float) -> list[float]:
+        """Return a setting's number for each number, and `other` for those of which it says nothing."""
+        return [other if number is None else number for number in read_per_field(written, self.numbers)]
+
+
+class Sensor(Protocol):
+    """What the tick of a node asks of a sensor. It is made from its settings and its mounting.
+
+    A class may have two more methods: `limits()`, the least and greatest value of each field that it can measure, and
+    the static `together(sensors)`, which returns an object whose `sample(view)` gives the numbers of the readings of
+    several as an array of shape (sensors, numbers), with the same bits. Their readings are of one length.
+    """
+
+    def sample(self, view: WritableView) -> Any:
+        """Return what is measured: a value of the registered reading."""
+
+
+class Modifier(Protocol):
+    """What is asked of a modifier. It is made from its settings and its mounting; it works on numbers alone.
+
+    A class may have two more methods: the static `together(modifiers)`, which returns an object whose `apply(values,
+    view)` does the same to an array of shape (modifiers, numbers), and for commands `accept`, which takes one in place
+    of `apply`, with `due(view)`, which returns one that had to wait and takes effect at this tick, or None.
+    """
+
+    def apply(self, values: list[float], view: WritableView) -> list[float] | None:
+        """Return what becomes of the numbers of a value; None: it is dropped."""
+
+
+class Actuator(Protocol):
+    """What the tick of a node asks of an actuator. It is made from its settings and its mounting."""
+
+    def accept(self, command: Any, view: WritableView) -> bool:
+        """Take a command, a value of the registered type, into the slots; False when it is refused."""
+
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Return the least and the greatest value of each field of a command that has bounds."""
+
+    def hold(self, view: WritableView) -> None:
+        """Ask for the present state from here on: the robot is taken out of service, or put back into it."""
+
+    def stir(self, view: WritableView) -> None:
+        """Ask for some motion, for the fixed small run that tells engines apart."""
+
+    def command(self, view: View) -> tuple[tuple[float, float], ...]:
+        """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units."""

@@ -1,0 +1,164 @@
+"""Payloads of packets: readings and commands to and from bytes.
+
+A reading or command is a msgspec struct that its component brings. One of numbers is packed: each a little-endian
+float64 in SI units, a tuple of numbers at the end as many of them as there are. Any other is MessagePack, a map of its
+fields. `echo`, and what players and clients send each other, is any bytes.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Final, TypeAlias
+
+import msgspec
+from msgspec import Struct, inspect
+
+from foosim.common.errors import BadValue, Malformed
+
+FLOAT_MAX: Final = sys.float_info.max
+MANY_MAX: Final = 1 << 16
+"""Numbers in a tuple whose type has no bound of its own."""
+
+Value: TypeAlias = Struct | bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a reading or command: its name and unit; whether it is one number, several, or something else."""
+
+    name: str
+    unit: str
+    is_number: bool
+    is_several: bool = False
+
+
+class PayloadCodec:
+    """Encodes and decodes the values of one type."""
+
+    def __init__(self, kind: type[Struct], name: str) -> None:
+        """`name` is that of the component, for messages."""
+        self.kind: Final = kind
+        self.name: Final = name
+        self.fields: Final = tuple(_field(field) for field in _info(kind).fields)
+        self._many = self.fields[-1].is_several
+        count = len(self.fields) - self._many
+        self._is_packed = all(field.is_number for field in self.fields[:count])
+        self._packed = struct.Struct(f"<{count}d")
+        self._least, self._most = _bounds(_info(kind).fields[-1].type) if self._many else (0, 0)
+        self._other = msgspec.msgpack.Decoder(kind)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its fields that are one number each."""
+        return tuple(field.name for field in self.fields if field.is_number)
+
+    @property
+    def unit(self) -> str:
+        """The units of its fields, each once."""
+        return ", ".join(dict.fromkeys(field.unit for field in self.fields if field.unit))
+
+    def decode(self, payload: bytes) -> Any:
+        """Return the value in a payload; raises Malformed for one that is none, or has a number that is not finite."""
+        if not self._is_packed:
+            try:
+                return self._other.decode(payload)
+            except msgspec.DecodeError as error:
+                raise Malformed(f"{self.name}: {error}") from None
+        size, least = len(payload), self._packed.size
+        if size == least and not self._many:
+            numbers = self._packed.unpack(payload)
+            if not all(map(isfinite, numbers)):
+                raise Malformed(f"{self.name} with numbers that are not finite")
+            return self.kind(*numbers)
+        return self._decode_many(payload)
+
+    def _decode_many(self, payload: bytes) -> Any:
+        more, rest = divmod(len(payload) - self._packed.size, 8)
+        if not self._many:
+            raise Malformed(f"{len(payload)} bytes, {self.name} has {self._packed.size}")
+        if rest or not self._least <= more <= self._most:
+            what = f"{self.name} has {self._packed.size} and 8 for each of {self._least} to {self._most} numbers"
+            raise Malformed(f"{len(payload)} bytes, {what}")
+        numbers = struct.unpack(f"<{len(payload) // 8}d", payload)
+        if not all(map(isfinite, numbers)):
+            raise Malformed(f"{self.name} with numbers that are not finite")
+        count = len(self.fields) - 1
+        return self.kind(*numbers[:count], numbers[count:])
+
+    def encode(self, value: Any) -> bytes:
+        """Return the payload of a value; raises BadValue for a number that is none or not finite."""
+        assert isinstance(value, self.kind), f"{self.name} is a {self.kind.__name__}, not a {type(value).__name__}"
+        if not self._is_packed:
+            return msgspec.msgpack.encode(value)
+        numbers = self.numbers(value)
+        names = [field.name for field in self.fields]
+        for place, number in enumerate(numbers):
+            self._check(names[min(place, len(names) - 1)], number)
+        return struct.pack(f"<{len(numbers)}d", *numbers)
+
+    def encode_numbers(self, numbers: Sequence[float]) -> bytes:
+        """Return the payload of a value's numbers; raises BadValue for one that is not finite."""
+        payload = struct.pack(f"<{len(numbers)}d", *numbers)
+        if not all(map(isfinite, numbers)):
+            raise BadValue(f"{self.name} with numbers that are not finite", list(numbers))
+        return payload
+
+    def from_numbers(self, numbers: Sequence[float]) -> Any:
+        """Return the value that has these numbers, in the order of its fields."""
+        count = len(self.fields) - self._many
+        return self.kind(*numbers[:count], *([tuple(numbers[count:])] if self._many else ()))
+
+    def _check(self, field: str, number: Any) -> None:
+        if not isinstance(number, int | float):
+            raise BadValue(f"{self.name}.{field} is not a number", number)
+        if not -FLOAT_MAX <= number <= FLOAT_MAX:
+            raise BadValue(f"{self.name}.{field} is not finite", number)
+
+    def numbers(self, value: Any) -> list[Any]:
+        """Return all numbers of a value, in the order of its fields; of what is not packed none."""
+        if not self._is_packed:
+            return []
+        values = list(msgspec.structs.astuple(value))
+        return [*values[:-1], *values[-1]] if self._many else values
+
+
+def as_mapping(value: Value) -> dict[str, Any]:
+    """Return a value's fields by name; none of bytes."""
+    return {} if isinstance(value, bytes) else msgspec.structs.asdict(value)
+
+
+def _info(kind: type[Struct]) -> inspect.StructType:
+    info = inspect.type_info(kind)
+    assert isinstance(info, inspect.StructType), f"{kind} is no struct"
+    assert info.fields, f"{kind.__name__} has no fields"
+    return info
+
+
+def _field(field: inspect.Field) -> Field:
+    unit = ""
+    found = field.type
+    is_several = isinstance(_plain(found), inspect.VarTupleType)
+    if is_several:
+        found = _plain(found).item_type  # type: ignore[attr-defined]
+    if isinstance(found, inspect.Metadata):
+        unit = str((found.extra or {}).get("unit", ""))
+    is_number = isinstance(_plain(found), inspect.FloatType)
+    return Field(field.name, unit, is_number and not is_several, is_several and is_number)
+
+
+def _bounds(kind: inspect.Type) -> tuple[int, int]:
+    """Return the least and the greatest length of a tuple of numbers."""
+    several = _plain(kind)
+    assert isinstance(several, inspect.VarTupleType)
+    return several.min_length or 0, MANY_MAX if several.max_length is None else several.max_length
+
+
+def _plain(kind: inspect.Type) -> inspect.Type:
+    """Return a type without its annotations."""
+    while isinstance(kind, inspect.Metadata):
+        kind = kind.type
+    return kind

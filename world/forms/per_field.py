@@ -1,0 +1,119 @@
+"""Settings that have a number for each field of a reading or command, with the unit of that field.
+
+A deployment writes one for all fields, `std: 2 mm`, or names them: `std: {slide: 0.2 mm, spin: 0.5 deg}`. A name is
+that of a field, or of a group of fields of one unit that the reading declares, such as `position` for x and y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from math import isfinite
+from typing import Annotated, Any, Final, TypeAlias
+
+from pydantic import BeforeValidator, StrictFloat, StrictInt, WithJsonSchema
+
+from foosim.common import units
+from foosim.common.errors import BadValue, UnknownName
+from foosim.common.units import Dimension, custom_error
+from foosim.world.forms import registry
+from foosim.world.forms.payloads import Field, PayloadCodec
+from foosim.world.forms.registry import Component
+from foosim.world.forms.settings import ComponentSettings
+
+Quantity: TypeAlias = str | StrictInt | StrictFloat
+DIMENSIONS: Final[Mapping[str, Dimension]] = {
+    dimension.base: dimension
+    for dimension in (
+        *(units.LENGTH, units.MASS, units.ANGLE, units.SPEED, units.SPIN, units.ACCELERATION, units.FORCE),
+        *(units.TORQUE, units.ENERGY, units.POWER, units.VOLTAGE, units.CURRENT),
+    )
+}
+"""By the unit of a field."""
+GROUPS: Final = "groups"
+"""The class variable of a reading or command that has its groups of fields: names by name."""
+
+
+def _written(value: object) -> object:
+    """Refuse what is neither a quantity nor quantities by name."""
+    values = [*value.values()] if isinstance(value, dict) else [value]
+    if not values or not all(isinstance(one, str | int | float) and not isinstance(one, bool) for one in values):
+        raise custom_error(BadValue("not a quantity, nor quantities by the names of fields", value))
+    return value
+
+
+_SCHEMA: Final = {
+    "anyOf": [
+        {"type": "string"},
+        {"type": "number"},
+        {"type": "object", "additionalProperties": {"type": ["string", "number"]}},
+    ],
+    "description": "a quantity in the unit of the field: one for all fields, or quantities by their names",
+}
+PerField: TypeAlias = Annotated[Quantity | dict[str, Quantity], BeforeValidator(_written), WithJsonSchema(_SCHEMA)]
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The numbers of a reading or command: their fields, the groups of these, and how many numbers there are.
+
+    All numbers beyond the fields are those of the last one, which has several.
+    """
+
+    fields: tuple[Field, ...]
+    groups: Mapping[str, tuple[str, ...]]
+    size: int
+
+    def places(self, name: str) -> tuple[int, ...]:
+        """Return the places of the numbers of a field or group; none for another name."""
+        names = self.groups.get(name, (name,))
+        return tuple(place for place in range(self.size) if self.field(place).name in names)
+
+    def field(self, place: int) -> Field:
+        """Return the field that a number belongs to."""
+        return self.fields[min(place, len(self.fields) - 1)]
+
+
+@cache
+def codec_of(kind: str, form: str) -> PayloadCodec:
+    """Return the codec of a component's readings or commands."""
+    component = registry.find(form, kind)
+    assert component.value is not None, f"{form} {kind} carries nothing"
+    return PayloadCodec(component.value, component.name)
+
+
+def numbers_of(component: Component, settings: ComponentSettings) -> Numbers | None:
+    """Return the numbers of a component's readings or commands; None where these have something else, too."""
+    codec = codec_of(component.name, component.form)
+    if not all(field.is_number or field.is_several for field in codec.fields):
+        return None
+    more = getattr(settings, component.several) - 1 if codec.fields[-1].is_several else 0
+    return Numbers(codec.fields, getattr(component.value, GROUPS, {}), len(codec.fields) + more)
+
+
+def read_per_field(written: Any, numbers: Numbers, least: float | None = None) -> list[float | None]:
+    """Return what was written for each number, in SI units; None for those of which nothing was.
+
+    Raises UnknownName for a name that is none, BadValue for what is no quantity of a field's unit or below `least`.
+    """
+    if not isinstance(written, Mapping):
+        return [_read(written, numbers.field(place), least) for place in range(numbers.size)]
+    found: list[float | None] = [None] * numbers.size
+    for name, quantity in written.items():
+        places = numbers.places(name)
+        if not places:
+            raise UnknownName("no such field", name, [field.name for field in numbers.fields] + [*numbers.groups])
+        for place in places:
+            found[place] = _read(quantity, numbers.field(place), least)
+    return found
+
+
+def _read(quantity: Any, field: Field, least: float | None) -> float:
+    dimension = DIMENSIONS.get(field.unit)
+    if dimension is None and isinstance(quantity, str):
+        raise BadValue(f"not a number, which {field.name} is", quantity)
+    number = float(quantity if dimension is None else units.parse(quantity, dimension))
+    if not isfinite(number) or (least is not None and number < least):
+        raise BadValue("not finite" if least is None else f"less than the least that is valid, {least:g}", quantity)
+    return number

@@ -1,0 +1,13 @@
+"""Numbers of readings and commands, with their units: types of their fields."""
+
+from typing import Annotated, TypeAlias
+
+from msgspec import Meta
+
+Metres: TypeAlias = Annotated[float, Meta(extra={"unit": "m"})]
+Radians: TypeAlias = Annotated[float, Meta(extra={"unit": "rad"})]
+MetresPerSecond: TypeAlias = Annotated[float, Meta(extra={"unit": "m/s"})]
+Amperes: TypeAlias = Annotated[float, Meta(extra={"unit": "A"})]
+Volts: TypeAlias = Annotated[float, Meta(extra={"unit": "V"})]
+Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+"""Of a whole: 0 to 1."""

@@ -1,0 +1,51 @@
+"""A bias that walks: an offset of each number that begins with a draw and changes by one at each value.
+
+Between two values that are t apart the offset changes by a normal draw of standard deviation walk * sqrt(t): a Wiener
+process at the values' times (the rate random walk of an inertial sensor, IEEE Std 952).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from foosim.world.components.view import ModifierMounting, WritableView
+from foosim.world.forms.per_field import PerField
+from foosim.world.forms.registry import modifier
+from foosim.world.forms.settings import ModifierSettings
+
+STEP, START = 0, 1
+"""Slots of the draws."""
+
+
+class BiasWalkSettings(ModifierSettings):
+    """Adds an offset that walks: `initial` is its standard deviation at the start, `walk` that of a second's change."""
+
+    initial: PerField = 0.0
+    walk: PerField = 0.0
+
+
+@modifier(
+    "bias_walk",
+    BiasWalkSettings,
+    per_field={"initial": 0.0, "walk": 0.0},
+    slots=lambda settings, about: {"offset": about.size},
+)
+class BiasWalk:
+    """Adds an offset that walks to each number; what it has walked is in the frame."""
+
+    def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:
+        from foosim.common.batched.noise import NoiseKey  # brings numpy, which those who only read settings need not
+
+        stream = NoiseKey(at.key)
+        initial = at.per_field(settings.initial, 0.0)
+        self._start = [std * one for std, one in zip(initial, stream.normal(0, at.numbers.size, START), strict=True)]
+        self._step = [std * sqrt(at.period_s) for std in at.per_field(settings.walk, 0.0)]
+        self._offset = at.slot("offset")
+        self._stream = stream
+
+    def apply(self, values: list[float], view: WritableView) -> list[float]:
+        """Return the values with the present offsets, and let these walk on."""
+        walked = view.read(self._offset)
+        draws = self._stream.normal(view.tick, len(values), STEP)
+        view.write(self._offset, *(way + std * one for way, std, one in zip(walked, self._step, draws, strict=True)))
+        return [value + start + way for value, start, way in zip(values, self._start, walked, strict=True)]
