@@ -14,6 +14,8 @@ from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.layout import Layout, build_layout
 
+PLAIN: Final = (int, float, str, bytes, tuple, list, dict, type(None))
+"""What is taken as it is; numbers of numpy are made floats."""
 NO_NAMES: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
@@ -47,7 +49,8 @@ class CommandEncoder:
         if len(numbers) + len(named) != len(names) or {*given} != {*names}:
             said = ", ".join([*map(str, numbers), *named]) or "nothing"
             raise BadValue(f"{robot}'s {channel} takes {', '.join(names)}, each once", said)
-        return _checked(robot, one, one.codec.kind(**given))
+        plain = {name: value if isinstance(value, PLAIN) else float(value) for name, value in given.items()}
+        return _checked(robot, one, one.codec.kind(**plain))
 
     def codec(self, robot: str, channel: str) -> PayloadCodec:
         """Return the codec of the commands on a robot's channel, which is an actuator's."""

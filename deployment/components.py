@@ -99,7 +99,7 @@ class _Reader:
         if missing:
             fitting = ", ".join(name for name, other in MODELS.items() if {*component.needs} <= {*other.slots})
             lacking = f"a {model} cannot carry, which has no {', '.join(missing)}"
-            yield Finding(location, f"a {component.form} that {lacking} (valid on: {fitting})", kind)
+            yield Finding(location, f"{component.form} that {lacking} (valid on: {fitting})", kind)
 
     def _modifiers(self, location: Location, modifiers: list[Any]) -> Iterator[Any]:
         for number, settings in enumerate(modifiers):

@@ -151,7 +151,7 @@ def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
         for entity in layout.robots
         for channel, codec in _actuators(deployment, entity.name)
         if f"{channel}.set_point" in entity.offsets
-        for place, field in enumerate(codec.fields)
+        for place, field in enumerate(codec.fields[: entity.counts[f"{channel}.set_point"]])
     ]
 
 

@@ -131,9 +131,9 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--run", "Über"), 2, "--run: a name is a lower case letter, then"),
         (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
         (
-            ("--bogus",),
+            ("--qqq",),
             2,
-            "foosim-supervisor up: there is no such option, '--bogus'; options are --pace, --for, --seed,",
+            "foosim-supervisor up: there is no such option, '--qqq'; options are --pace, --for, --seed,",
         ),
         (("--sed", "3"), 2, "foosim-supervisor up: there is no such option, '--sed', nearest is --seed\n"),
         (("--seed", "x"), 2, "foosim-supervisor up --seed: a whole number is needed, 'x'\n"),
@@ -271,9 +271,9 @@ def test_a_command_without_words_shows_its_help(command: Command, typed: Typed) 
 @pytest.mark.parametrize("program", sorted(PROGRAMS))
 def test_every_program_says_in_its_words_what_was_typed(typed: Typed, program: str) -> None:
     module, _, name = PROGRAMS[program].partition(":")
-    done = typed(program, getattr(importlib.import_module(module), name))("--bogus")
+    done = typed(program, getattr(importlib.import_module(module), name))("--qqq")
     assert done.code == 2 and done.out == ""
-    assert done.err.startswith(f"{program}: there is no such option, '--bogus'; options are --")
+    assert done.err.startswith(f"{program}: there is no such option, '--qqq'; options are --")
 
 
 def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Command, tmp_path: Path) -> None:

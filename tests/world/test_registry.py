@@ -300,23 +300,23 @@ def test_a_class_of_any_module_is_found_by_its_path() -> None:
 
 
 REFUSED: Final = {
-    "own_gauges:Idle": "own_gauges:Idle: is registered as no sensor",
-    "own_gauges:ReachSettings": "own_gauges:ReachSettings: is registered as no sensor",
-    "own_winch:Winch": "own_winch:Winch: is registered as no sensor",
-    "json:dumps": "json:dumps: is registered as no sensor",
-    "own_gone:Gauge": "own_gone:Gauge: cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
-    "own_gauges.more:Gauge": "own_gauges.more:Gauge: cannot be imported: ModuleNotFoundError: "
+    "own_gauges:Idle": "registered as no sensor",
+    "own_gauges:ReachSettings": "registered as no sensor",
+    "own_winch:Winch": "registered as no sensor",
+    "json:dumps": "registered as no sensor",
+    "own_gone:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
+    "own_gauges.more:Gauge": "cannot be imported: ModuleNotFoundError: "
     "No module named 'own_gauges.more'; 'own_gauges' is not a package",
-    "own_importer:Gauge": "own_importer:Gauge: cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
-    "own_broken:Gauge": "own_broken:Gauge: cannot be imported: ZeroDivisionError: division by zero",
-    "own_leaver:Gauge": "own_leaver:Gauge: cannot be imported: SystemExit: 0",
-    "own_gauges:": "own_gauges:: not a class (module:Class)",
-    ":ReachGauge": ":ReachGauge: not a class (module:Class)",
-    "own_gauges:ReachGauge.made": "own_gauges:ReachGauge.made: not a class (module:Class)",
-    "own_gauges::ReachGauge": "own_gauges::ReachGauge: not a class (module:Class)",
-    "own gauges:ReachGauge": "own gauges:ReachGauge: not a class (module:Class)",
-    "./own_gauges:ReachGauge": "./own_gauges:ReachGauge: not a class (module:Class)",
-    "own_gauges:ReachGauge\n": "own_gauges:ReachGauge\n: not a class (module:Class)",
+    "own_importer:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
+    "own_broken:Gauge": "cannot be imported: ZeroDivisionError: division by zero",
+    "own_leaver:Gauge": "cannot be imported: SystemExit: 0",
+    "own_gauges:": "not a class (module:Class)",
+    ":ReachGauge": "not a class (module:Class)",
+    "own_gauges:ReachGauge.made": "not a class (module:Class)",
+    "own_gauges::ReachGauge": "not a class (module:Class)",
+    "own gauges:ReachGauge": "not a class (module:Class)",
+    "./own_gauges:ReachGauge": "not a class (module:Class)",
+    "own_gauges:ReachGauge\n": "not a class (module:Class)",
 }
 
 
@@ -333,7 +333,9 @@ def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
 
 @pytest.mark.usefixtures("site")
 def test_a_missing_class_names_those_that_there_are() -> None:
-    with pytest.raises(UnknownName, match=r"own_gauges has no class .*'ReachGuage', nearest is 'ReachGauge'"):
+    with pytest.raises(
+        UnknownName, match=r"own_gauges registers no such class .*'ReachGuage', nearest is 'ReachGauge'"
+    ):
         find("sensor", "own_gauges:ReachGuage")
 
 
@@ -574,9 +576,9 @@ WRONG: Final = (
      [("2 kg", ".grain: not a length (a number and one of m, cm, mm, um, km), '2 kg', nearest is '2 km'"),
       ("3 mm", ".rate: not a rate (a number and one of Hz, kHz, mHz), '3 mm'")]),
     ("rate: 100 Hz, kind: 'own_gauges:Idle'",
-     [("'own", ".kind: own_gauges:Idle: is registered as no sensor, 'own_gauges:Idle'")]),
+     [("'own", ".kind: registered as no sensor, 'own_gauges:Idle'")]),
     ("kind: 'own_gone:Idle', rate: 100 Hz",
-     [("'own", ".kind: own_gone:Idle: cannot be imported: ModuleNotFoundError: No module named 'own_gone', "
+     [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone', "
        "'own_gone:Idle'")]),
     ("kind: own_gauges.ReachGauge, rate: 100 Hz",
      [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity), "
@@ -606,7 +608,7 @@ def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
         apply_sets(TEXT, "t.yaml", ["robots.camera.sensors.own={kind: 'own_tellers:Teller', rate: 100 Hz}"])
     (problem,) = error.value.problems
     assert problem.endswith(
-        "robots.camera.sensors.own.kind: a sensor that a camera cannot carry, which has no joint_positions "
+        "robots.camera.sensors.own.kind: sensor that a camera cannot carry, which has no joint_positions "
         "(valid on: rod), 'own_tellers:Teller'"
     )
 

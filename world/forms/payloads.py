@@ -96,6 +96,9 @@ class PayloadCodec:
             return msgspec.msgpack.encode(value)
         numbers = self.numbers(value)
         names = [field.name for field in self.fields]
+        more = len(numbers) - len(names) + 1
+        if self._many and not self._least <= more <= self._most:
+            raise BadValue(f"{self.name}.{names[-1]} is not {self._least} to {self._most} numbers", more)
         for place, number in enumerate(numbers):
             self._check(names[min(place, len(names) - 1)], number)
         return struct.pack(f"<{len(numbers)}d", *numbers)
@@ -119,11 +122,15 @@ class PayloadCodec:
             raise BadValue(f"{self.name}.{field} is not finite", number)
 
     def numbers(self, value: Any) -> list[Any]:
-        """Return all numbers of a value, in the order of its fields; of what is not packed none."""
+        """Return all numbers of a value, in the order of its fields; of what is not packed none. Raises BadValue."""
         if not self._is_packed:
             return []
         values = list(msgspec.structs.astuple(value))
-        return [*values[:-1], *values[-1]] if self._many else values
+        if not self._many:
+            return values
+        if not isinstance(values[-1], tuple | list):
+            raise BadValue(f"{self.name}.{self.fields[-1].name} is not several numbers", values[-1])
+        return [*values[:-1], *values[-1]]
 
 
 def as_mapping(value: Value) -> dict[str, Any]:

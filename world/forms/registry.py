@@ -165,7 +165,8 @@ def _registering(describe: Callable[[Callable[..., Any]], Component]) -> Callabl
 def find(form: str, kind: str) -> Component:
     """Return what a deployment calls `kind`: a registered name, or `module:Class`.
 
-    Raises UnknownName, which says what is nearest, and Refused for a module that cannot be imported.
+    Raises UnknownName, which says what is nearest, and Refused for a module that cannot be imported, or a class in it
+    that is not registered.
     """
     if ":" in kind:
         return _of_class(form, kind)
@@ -198,11 +199,13 @@ def load_entry_points() -> list[str]:
 
 
 def _load(entry: EntryPoint) -> str:
+    known = dict(_known)
     try:
         entry.load()
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001  # SystemExit, too: a module may do anything
+        _forget_new(known)
         giver = "a package" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
         return f"{entry.value} of {giver} cannot be imported: {type(error).__name__}: {error}"
     return ""
@@ -224,18 +227,27 @@ def _is_there(form: str, name: str) -> bool:
 def _of_class(form: str, path: str) -> Component:
     """Return the one that `module:Class` registered."""
     if not re.fullmatch(CLASS_PATTERN, path):
-        raise Refused(f"{path}: not a class (module:Class)")
+        raise Refused("not a class (module:Class)")
     module_name, _, class_name = path.partition(":")
+    known = dict(_known)
     try:
         module = import_module(module_name)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit, too: a module may do anything
-        raise Refused(f"{path}: cannot be imported: {type(error).__name__}: {error}") from error
+        _forget_new(known)
+        raise Refused(f"cannot be imported: {type(error).__name__}: {error}") from error
     if not hasattr(module, class_name):
-        raise UnknownName(f"{module_name} has no class", class_name, vars(module))
+        there = [component.made.__qualname__ for component in _known.values() if component.module == module_name]
+        raise UnknownName(f"{module_name} registers no such class", class_name, there)
     made = getattr(module, class_name)
-    for (known, _), component in _known.items():
-        if known == form and component.made is made:
+    for component in _known.values():
+        if component.form == form and component.made is made:
             return component
-    raise Refused(f"{path}: is registered as no {form}")
+    raise Refused(f"registered as no {form}")
+
+
+def _forget_new(known: Mapping[tuple[str, str], Component]) -> None:
+    """Forget what a module has registered that then could not be imported."""
+    for key in _known.keys() - known.keys():
+        del _known[key]
