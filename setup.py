@@ -69,6 +69,7 @@ COMPILED: Final = {
     "vhub/links/fabric": "finds the link of each packet and takes it through its stages",
     "vhub/network/ages": "how old a packet is when a client uses it, at each turn",
     "vhub/network/air": "who hears whom, for each radio packet",
+    "vhub/network/draw_address": "the key and the number of each packet's draws",
     "vhub/network/jitter": "the delay of each packet",
     "vhub/network/link_budget": "the power that each radio packet is received with",
     "vhub/network/packet": "each packet on its way",

@@ -1,7 +1,7 @@
 """What became of one captured packet, and why: the stages that it went through, each with its numbers.
 
 The numbers are those of its row; what a row does not have is made again from the deployment that is in the capture,
-the events that were asked for until then, and the packet's draws, which are a function of seed, link and number: so
+the events that were asked for until then, and the packet's draws, whose address is in the row (`draw_address`): so
 they have to agree with the row's.
 """
 
@@ -59,7 +59,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """A packet, the stages in their order, and its fate. `agrees`: its draws are those that are made again."""
+    """A packet, the stages in their order, and its fate. `agrees`: draws that are made again are those of its row."""
 
     head: str
     steps: tuple[Step, ...]
@@ -113,6 +113,7 @@ class _Captured:
     def __init__(self, capture: CaptureData) -> None:
         self.deployment = capture.deployment
         self.versions = capture.about.versions
+        self.has_counts = capture.about.has_counts
         self._capture = capture
 
     def asked(self, until: int) -> Iterator[tuple[int, str]]:
@@ -163,6 +164,7 @@ def _head(stages: Stages) -> str:
     row = stages.row
     is_robot = row.source in stages.evidence.deployment.robots
     number = f"tick {row.sequence >> OUTBOX_SHIFT}, place {row.sequence & 0xFFFF}" if is_robot else "its own count"
+    number += f", count {row.count} on its channel" if is_robot and stages.evidence.has_counts else ""
     via = f" via {row.radio}" if row.radio and row.radio != row.rule else ""
     copy = f", copy {row.copy}" if row.copy else ""
     how = "published" if row.published else "sent"
@@ -183,7 +185,9 @@ def _verdict(stages: Stages) -> str:
     else:
         later_ns = row.due_ns - row.sent_ns
         text = f"delivered at tick {row.arrival_tick}: due {_time(later_ns)} after it was sent"
-    return text if stages.agrees else f"{text}; its draws are NOT those of this seed, link and number"
+    if stages.number is None:
+        return f"{text}; its draws are not made again: the capture's format has no counts within channels"
+    return text if stages.agrees else f"{text}; its draws are NOT those of the address in its row"
 
 
 def _time(ns: int) -> str:

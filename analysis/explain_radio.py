@@ -22,8 +22,11 @@ from foosim.vhub.radio.timings import LRWPAN
 from foosim.vhub.stages.medium import ACCESS_BLOCK, wifi_timing
 
 
-def attempts_of(row: PacketRow, setup: LinkSetup, *, broadcast: bool) -> tuple[float, list[str]]:
-    """Return the probability of a collision per attempt, and the result of each; none without contenders."""
+def attempts_of(row: PacketRow, number: int | None, setup: LinkSetup, *, broadcast: bool) -> tuple[float, list[str]]:
+    """Return the probability of a collision per attempt, and the result of each, none on media without contenders.
+
+    `number` is that of the packet's draws; where it is not known there are no results.
+    """
     settings, contenders = setup.settings, max(1, row.contenders)
     if settings.medium == "wifi":
         threshold = wifi_contention(contenders, wifi_timing(settings), unicast=not broadcast).threshold
@@ -34,10 +37,13 @@ def attempts_of(row: PacketRow, setup: LinkSetup, *, broadcast: bool) -> tuple[f
         threshold, access_threshold = point.threshold, point.access_threshold
     else:
         return 0.0, []
-    key, attempts = setup.sending_key if broadcast else setup.key, []
+    attempts: list[str] = []
+    if number is None:
+        return threshold / UNIT, attempts
+    key = (setup.sending if broadcast else setup.draws).of(row.channel)
     is_lost = row.decided_by.collision == "contention" or row.cause in ("snr", "out_of_range", "blocked")
     for attempt in range(row.retries + 1):
-        block = draw_words(key, row.sequence, row.copy | ACCESS_BLOCK + (attempt >> 1) << BLOCK_SHIFT)
+        block = draw_words(key, number, row.copy | ACCESS_BLOCK + (attempt >> 1) << BLOCK_SHIFT)
         at = (attempt & 1) << 2
         if block[at + 3] < access_threshold:
             attempts.append("the channel was never free")

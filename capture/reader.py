@@ -48,6 +48,7 @@ from foosim.capture.rows import (
     RECOVERIES,
     ROW_TYPES,
     TICK,
+    WITHOUT_COUNTS,
     ClientRow,
     DigestHex,
     EditRow,
@@ -136,6 +137,11 @@ class About:
     def deployment_name(self) -> str:
         return self.metadata["deployment"]
 
+    @property
+    def has_counts(self) -> bool:
+        """Whether the rows of packets have counts within channels, by which robots' packets draw."""
+        return self.metadata["format"] not in WITHOUT_COUNTS
+
 
 class Scan:
     """One pass over a file: yields the messages of some topics and collects the file's metadata (`about`)."""
@@ -193,7 +199,7 @@ class Scan:
 
     def _check_format(self, found: str) -> None:
         self.about.earlier = found in EARLIER_FORMATS
-        if found == str(FORMAT) or (self.about.earlier and self._earlier):
+        if found == str(FORMAT) or found in WITHOUT_COUNTS or (self.about.earlier and self._earlier):
             return
         if not self.about.earlier:
             raise CaptureError(f"{self._path}: format {found!r} of a capture, this reads {FORMAT}")

@@ -20,8 +20,10 @@ from foosim.common.struct_types import Counter
 from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
 from foosim.world.robot_packets import Delivered
 
-FORMAT: Final = 3
+FORMAT: Final = 4
 """Version of the rows and of the capture's metadata."""
+WITHOUT_COUNTS: Final = frozenset({"3"})
+"""Versions before, which everything reads, and in which the rows of packets have no counts within channels."""
 EARLIER_FORMATS: Final = frozenset({"2"})
 """Versions before, which `info` and `export` read and all else refuses."""
 PROFILE: Final = "foosim"
@@ -126,7 +128,8 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
     `duty_cycle` there is the airtime that was left; with `queue_full` and `queue_codel` how many packets waited, and of
     CoDel for how long waits had been above its target, and which drop in a row it is; with `evicted` who took its
-    place (else -1), and how many were under way; with `rx_full` the bytes that its source had left of its share.
+    place (else -1) with its channel and its `count`, and how many were under way; with `rx_full` the bytes that its
+    source had left of its share.
     """
 
     collision: Literal["", "contention", "interference", "half_duplex"] = ""
@@ -137,6 +140,8 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     codel_drops: Counter = 0
     evicted_by: CounterOrNone = -1
     evicted_by_copy: Counter = 0
+    evicted_by_channel: str = ""
+    evicted_by_count: Counter = 0
     under_way: Counter = 0
     room_left: Counter = 0
     room_share: Counter = 0
@@ -150,8 +155,10 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
 
     Levels are hundredths of a dB or dBm. What no stage looked at has its default and is left out of the file.
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
-    in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
-    for its receiver, 0 when it did not.
+    in hex; their address is seed, link and, of a robot's packet, its channel, the tick of `sent_ns` and `count`: how
+    many packets the robot sent on the channel at that tick before. Of a client's packet it is seed, link and
+    `sequence`; its `count` is 0. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when
+    the packet left for its receiver, 0 when it did not.
     """
 
     source: str
@@ -173,6 +180,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     wall_released_ns: Counter
     radio: str = ""
     published: bool = False
+    count: Counter = 0
     queue_bytes: Counter = 0
     queue_ns: Counter = 0
     access_ns: Counter = 0

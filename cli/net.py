@@ -165,8 +165,8 @@ def explain(
 
     PACKET is SOURCE:SEQUENCE[:DESTINATION[:COPY]], e.g. camera:655360:player-red. The sequence number of a robot's
     packet is its tick times 65536 plus its place among those of that tick. Where it had one receiver, the destination
-    may be left out; copy 1 is the one that the link made. Draws are made again from seed, link and number, and have
-    to agree with the capture.
+    may be left out; copy 1 is the one that the link made. Draws are made again from their address, which the capture
+    has, and have to agree with it.
     """
     which = parse_packet(packet)
     explained = explain_packet(open_capture(capture), which)

@@ -24,7 +24,7 @@ from foosim.capture.rows import ClientRow, PacketRow, edit_of
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.replay.what_if_reader import Frames, Offers, caveats, frames_for, world_of
+from foosim.replay.what_if_reader import Frames, Offers, caveats, frames_for, parts_lacking, world_of
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import IN_FLIGHT, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
@@ -183,7 +183,7 @@ class _Compared:
 
     def __init__(self, capture: CaptureData) -> None:
         self._path = capture.path
-        self._is_part = bool(caveats(capture))
+        self._is_part = bool(parts_lacking(capture))
         self._rows: dict[Key, PacketRow] = {}
         """Those whose packets have no other fate yet."""
         self._packets = self._changed = self._inputs_changed = 0
@@ -269,7 +269,9 @@ def _judged(
                 _come_and_go(state, row)
             edits = [edit_of(edit) for edit in offered.edits]
             fates: list[Flight] = []
-            state.close_world(frame, [offered.robots[key] for key in sorted(offered.robots)], fates, edits)
+            numbers = sorted(offered.robots)
+            counts = [offered.counts[key] for key in numbers] if capture.about.has_counts else None
+            state.close_world(frame, [offered.robots[key] for key in numbers], fates, edits, counts)
             for name in owing:
                 state.leave(name)
             admitted: dict[str, list[Sent]] = {}

@@ -41,6 +41,8 @@ class Offered:
     frame: Frame | None = None
     came: list[ClientRow] = field(default_factory=list)
     robots: dict[tuple[str, int], RobotPacket] = field(default_factory=dict)
+    counts: dict[tuple[str, int], int] = field(default_factory=dict)
+    """Of these, the counts within their channels: packets that nobody heard are not in a capture, and are counted."""
     clients: dict[tuple[str, int], Sent] = field(default_factory=dict)
 
     @property
@@ -57,6 +59,14 @@ def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
 
 def caveats(capture: CaptureData) -> tuple[str, ...]:
     """Return why fates may not be the captured ones without another network: what of the run the capture lacks."""
+    found = list(parts_lacking(capture))
+    if not capture.about.has_counts:
+        found.append("its format has no counts within channels: packets of robots are judged by other draws")
+    return tuple(found)
+
+
+def parts_lacking(capture: CaptureData) -> tuple[str, ...]:
+    """Return which end of its run a capture lacks, each with what follows from that."""
     found = []
     if CUT_TICK in capture.about.metadata:
         found.append("it begins within its run: what links remembered, and events asked for before, are not known")
@@ -157,6 +167,7 @@ class Offers:
         offered = self._at(tick)
         if source in self._robots:
             offered.robots[source, sequence] = RobotPacket(source, sequence & _INDEX, to, row.channel, payload)
+            offered.counts[source, sequence] = row.count
         else:
             offered.clients[source, sequence] = Sent(sequence, to, row.channel, row.stamp_ns, payload)
 

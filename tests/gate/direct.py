@@ -22,7 +22,9 @@ from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.loop import Loop
 from foosim.supervisor.failover import Failover
 from foosim.supervisor.state import RunState
+from foosim.vhub.network.draw_address import DrawKeys
 from foosim.vhub.sessions import Sessions
+from foosim.vhub.state import hub_state
 from tests.gate.planting import Planting
 
 ROOT: Final = Path(__file__).parents[2]
@@ -112,7 +114,37 @@ def _heard_again(planting: Planting) -> None:
     before: Any = planting.swap(Bus, "put", put)
 
 
+def _by_place(planting: Planting) -> None:
+    planting.swap(hub_state, "counts_within_channels", lambda packets: [packet.index for packet in packets])
+
+
+def _one_key(planting: Planting) -> None:
+    planting.swap(DrawKeys, "of", lambda self, channel: self.key)
+
+
+def _uncounted(planting: Planting) -> None:
+    before: Any = planting.swap(hub_state, "robot_number", lambda tick, count: before(tick, 0))
+
+
 DIRECT: Final = (
+    DirectMutant(
+        "robots draw by their sequence numbers",
+        "another sensor shifts no draw of its robot's other packets",
+        "tests/laws/test_components_law.py::test_a_further_encoder_changes_no_other_packet",
+        _by_place,
+    ),
+    DirectMutant(
+        "robots draw without the channel",
+        "two channels of a robot in one tick have different draws",
+        "tests/links/test_channels.py::test_no_two_packets_have_one_draw",
+        _one_key,
+    ),
+    DirectMutant(
+        "robots draw without the count",
+        "two packets of one channel in one tick have different draws",
+        "tests/links/test_channels.py::test_no_two_packets_have_one_draw",
+        _uncounted,
+    ),
     DirectMutant(
         "node goes back to an old epoch",
         "epochs only grow",

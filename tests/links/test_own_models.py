@@ -122,8 +122,8 @@ def test_what_a_model_is_given() -> None:
     assert (second.sequence, second.size, third.sent_ns) == (2, 5, deployment.tick_ns)
     assert nothing is None and memory == {"number": 1, "list": [1, 2.5, None, "text", True]}
     assert len(first.words) == 8 and len({*first.words, *second.words, *third.words}) == 24
-    link = hub.state.fabric.link("a", "b", "news")
-    assert set(first.words).isdisjoint(draw_words(link.setup_at(0).key, 1)), "those of the named slots are others'"
+    draws = hub.state.fabric.link("a", "b", "news").setup_at(0).draws
+    assert set(first.words).isdisjoint(draw_words(draws.key, 1)), "those of the named slots are others'"
 
 
 def test_the_velocity_of_a_rod_and_of_a_rover() -> None:

@@ -86,6 +86,18 @@ def test_a_packet_that_stands_too_late_or_twice_is_refused(run: Path, tmp_path: 
         what_if(open_capture(rewritten(run, tmp_path / "twice.mcap", twice)))
 
 
+def test_robots_packets_are_judged_by_the_counts_of_their_rows(run: Path, tmp_path: Path) -> None:
+    """Also where packets of a channel that nobody heard are not in the capture: they are counted."""
+    messages, later = messages_of(run), 0
+    for place, message in enumerate(messages):
+        if message.topic == PACKETS and b'"source":"camera"' in message.data:
+            messages[place], later = with_row(message, count=1), later + 1
+    found = what_if(open_capture(rewritten(run, tmp_path / "counted.mcap", messages)))
+    cameras = [change for change in found.changes if change.source == "camera"]
+    assert later > 100 and len(cameras) > later * 0.9, "jitter is drawn anew for each of them"
+    assert len(found.changes) < found.packets // 4, "of the others what a player takes with the camera's picture"
+
+
 def changed_by(path: Path, *sets: str) -> WhatIf:
     capture = open_capture(path)
     about = capture.about

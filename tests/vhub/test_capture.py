@@ -137,7 +137,7 @@ def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRu
         "model_hash": model_hash(hub_run.deployment),
         "run": "run-1",
         "fingerprint": "00",
-        "format": "3",
+        "format": "4",
         "world": "table",
         "seed": "1",
         "tick_ns": "2000000",

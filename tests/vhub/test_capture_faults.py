@@ -119,7 +119,7 @@ def test_what_is_no_capture_is_told_so(tmp_path: Path, hub_run: HubRun) -> None:
     assert refused(path) == "FILE: no MCAP file, it does not start as one"
     about = {"format": "3", "deployment": "table.yaml"}
     assert refused(mcap_with(path, "ros2", None)) == "FILE: no capture of foosim, its profile is 'ros2', not 'foosim'"
-    assert refused(mcap_with(path, "foosim", {**about, "format": "1"})) == "FILE: format '1' of a capture, this reads 3"
+    assert refused(mcap_with(path, "foosim", {**about, "format": "1"})) == "FILE: format '1' of a capture, this reads 4"
     assert refused(mcap_with(path, "foosim", about)) == "FILE: the capture has no deployment"
     lacking = mcap_with(path, "foosim", about, hub_run.text, checks=False)
     assert refused(lacking) == "FILE: the capture lacks its metadata 'foosim.digests'"

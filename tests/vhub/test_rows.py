@@ -53,6 +53,7 @@ from foosim.world.frame import Frame
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
 
 if TYPE_CHECKING:
+    from foosim.deployment.schema import Deployment
     from tests.vhub.conftest import HubRun
 
 
@@ -176,12 +177,21 @@ def test_frames_are_kept_byte_for_byte(hub_run: HubRun, entries: list[Entry]) ->
     assert any(row.outboxes for row in rows(entries, FrameRow))
 
 
+def words_of(row: PacketRow, deployment: Deployment) -> tuple[int, ...]:
+    """The draws of a packet, by the address that its row has."""
+    ends = row.source, row.destination
+    if row.source not in deployment.robots:
+        return draw_words(draw_key(deployment.seed, "link", *ends), row.sequence)
+    key = draw_key(deployment.seed, "link", *ends, "channel", row.channel)
+    return draw_words(key, (row.sent_ns // deployment.tick_ns << 16) + row.count)
+
+
 def test_a_verdict_can_be_told_from_the_inputs_in_its_row(hub_run: HubRun, entries: list[Entry]) -> None:
     """The words are the packet's own keyed draws; that of loss decides the loss, and is there when it was asked."""
     threshold = chance_threshold(0.2)
     seen = set()
     for row in rows(entries, PacketRow):
-        words = draw_words(draw_key(hub_run.deployment.seed, "link", row.source, row.destination), row.sequence)
+        words = words_of(row, hub_run.deployment)
         lost, early = row.cause == "random_loss", row.cause in ("random_loss", "node_down")
         seen.add((row.rule, row.fate, row.cause))
         assert row.size == len(row.payload)
@@ -251,9 +261,9 @@ def distinct_flight() -> Flight:
 
 def test_a_packet_begins_as_its_state_does_and_comes_back_whole() -> None:
     addressed = Flight("camera", "controller", "ball", 1, 2, 3, b"payload")
-    assert state_of(addressed) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload")
+    assert state_of(addressed) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", draw=1)
     copied = Flight("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1)
-    assert state_of(copied) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1)
+    assert state_of(copied) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1, draw=1)
     state = state_of(distinct_flight())
     assert state_of(flight_of(state)) == state
 

@@ -21,6 +21,7 @@ from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.network.air import Air
 from foosim.vhub.network.custom_models import LinkModel, make_model
+from foosim.vhub.network.draw_address import DrawKeys
 from foosim.vhub.network.good_bad_periods import Times
 from foosim.vhub.network.jitter import quantiles_ns
 from foosim.vhub.network.link_budget import Budget
@@ -58,7 +59,10 @@ class Link:
         self.state = state
         self._fabric, self._timeline = fabric, fabric.timeline
         via = (profile.radio,) if profile.radio else ()
-        self._key = draw_key(fabric.seed, "link", source, destination, *via)
+        is_robot = source in fabric.deployment.robots
+        self._draws = DrawKeys(fabric.seed, "link", source, destination, *via, by_channel=is_robot)
+        self._key = b"" if is_robot else self._draws.key
+        """Under which all its packets draw; empty where each channel has a key."""
         self._version = -1
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
@@ -93,7 +97,7 @@ class Link:
 
     def _setup(self, settings: Radio) -> LinkSetup:
         source, destination, profile = self.source, self.destination, self.profile
-        return self._fabric.setup(source, destination, profile, settings, self._key, self.state, self._times)
+        return self._fabric.setup(source, destination, profile, settings, self._draws, self.state, self._times)
 
     def _settle(self, time_ns: int) -> None:
         """Select the stages of a time; they are made anew after a change of settings."""
@@ -156,7 +160,7 @@ class Link:
         flight.phase_ns = self._phase_ns
         if self._slots:
             flight.slots = self._slots
-            flight.words = draw_words(self._key, flight.sequence, flight.copy)
+            flight.words = draw_words(self._key or self._draws.of(flight.channel), flight.draw, flight.copy)
         for stage in self._at_sending:
             cause = stage.at_sending(flight)
             if cause:
@@ -306,7 +310,7 @@ class Fabric:
         destination: str,
         profile: Profile,
         settings: Radio,
-        key: bytes,
+        draws: DrawKeys,
         memory: LinkState,
         times: Times,
     ) -> LinkSetup:
@@ -328,8 +332,8 @@ class Fabric:
             destination,
             settings,
             profile.radio,
-            key,
-            draw_key(self.seed, "sending", *radio),
+            draws,
+            DrawKeys(self.seed, "sending", *radio, by_channel=draws.by_channel),
             memory,
             times,
             sender,

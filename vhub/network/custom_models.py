@@ -55,6 +55,7 @@ class Passage(NamedTuple):
     destination: End
     channel: str
     sequence: int
+    """It orders the packets of a source; what else a robot sends shifts it."""
     copy: int
     """1 for a duplicate that the link makes."""
     sent_ns: int
@@ -66,7 +67,7 @@ class Passage(NamedTuple):
     walls: tuple[Wall, ...]
     """Obstacles between them, without their own bodies."""
     words: tuple[int, ...]
-    """Eight 64-bit draws that are reserved for the model: a function of seed, link, sequence number and copy.
+    """Eight 64-bit draws that are reserved for the model, by the packet's address (`draw_address`) and copy.
     `foosim.common.keyed_random` makes numbers of them."""
 
 

@@ -9,6 +9,7 @@ from foosim.deployment.network.radios import Radio
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.network.air import Air
 from foosim.vhub.network.custom_models import LinkModel
+from foosim.vhub.network.draw_address import DrawKeys
 from foosim.vhub.network.good_bad_periods import Times
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.memory import LinkState, RadioState
@@ -26,10 +27,10 @@ class LinkSetup:
     destination: str
     settings: Radio
     radio: str
-    key: bytes
-    """Key of its draws."""
-    sending_key: bytes
-    """Key of the draws of its sender's broadcasts."""
+    draws: DrawKeys
+    """Keys of its draws."""
+    sending: DrawKeys
+    """Keys of the draws of its sender's broadcasts."""
     memory: LinkState
     times: Times
     """Its bursts and outages in seconds."""
@@ -58,7 +59,7 @@ class LinkSetup:
 
     def words(self, flight: Flight, block: int) -> tuple[int, ...]:
         """Return a further block of eight draws of a packet; block 0 are those of the named slots."""
-        return draw_words(self.key, flight.sequence, flight.copy | block << BLOCK_SHIFT)
+        return draw_words(self.draws.of(flight.channel), flight.draw, flight.copy | block << BLOCK_SHIFT)
 
     @property
     def is_radio(self) -> bool:

@@ -9,6 +9,9 @@ import msgspec
 
 from foosim.world.robot_packets import Delivered
 
+Numbers = tuple[int | str, ...]
+"""What decided a drop: numbers, and the names that belong to them; `rows_of_closing.DECIDING` has their fields."""
+
 
 class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The state of a link's stages, and its counts."""
@@ -27,10 +30,11 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Dropped packets by cause."""
     model: bytes = b""
     """The memory of a custom link model, as msgpack."""
-    under_way: list[tuple[int, int, tuple[int, ...]]] = []
+    under_way: list[tuple[int, int, Numbers]] = []
     """On links with a capacity: (sequence, copy, replaced by) of the packets in flight.
 
-    The last is empty, or sequence and copy of another packet and how many were under way when that came.
+    The last is empty, or sequence and copy of another packet, how many were under way when that came, and the channel
+    and the count by which it drew.
     """
 
 
@@ -51,7 +55,7 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     outcome: str = ""
     is_ready: bool = False
     """Whether the medium's result is there; the queue comes before it."""
-    decided_by: tuple[int, ...] = ()
+    decided_by: Numbers = ()
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -128,6 +132,10 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Whether it goes to all subscribers of its channel; else its sender named the receiver."""
     copy: int = 0
     """1 for a duplicate that the link made."""
+    draw: int = 0
+    """The number of its draws under the key of its link, and of a robot's channel (`draw_address`)."""
+    count: int = 0
+    """Of a robot's packet: how many it sent on the channel at that tick before."""
     due_ns: int = 0
     arrival_tick: int = -1
     """-1 until it is in flight, and for a packet that is dropped at sending."""
@@ -188,8 +196,8 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The delay that a custom link model adds."""
     outcome: str = ""
     """The result of medium and channel at sending; empty when it got through."""
-    decided_by: tuple[int, ...] = ()
-    """Further numbers that decided its drop; `rows_of_closing.DECIDING` has their names."""
+    decided_by: Numbers = ()
+    """Further numbers that decided its drop."""
 
 
 Counts = dict[int, int]

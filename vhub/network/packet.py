@@ -14,7 +14,7 @@ from msgspec import convert
 
 from foosim.common.limits import PACKET_HEAD_BYTES_MAX
 from foosim.protocol.messages import Received
-from foosim.vhub.network.memory import FlightState
+from foosim.vhub.network.memory import FlightState, Numbers
 from foosim.vhub.radio.noise import centi, level_of
 
 DELIVERED: Final = "delivered"
@@ -39,10 +39,12 @@ class Flight:
         published: bool = False,
         copy: int = 0,
     ) -> None:
+        """It draws by its sequence number, as a client's does: who makes a robot's packet sets `draw` and `count`."""
         self.source, self.destination, self.channel = source, destination, channel
         self.sequence, self.sent_ns, self.stamp_ns, self.payload = sequence, sent_ns, stamp_ns, payload
         self.published, self.copy = published, copy
-        self.due_ns = self.slots = self.released_wall_ns = 0
+        self.draw = sequence
+        self.count = self.due_ns = self.slots = self.released_wall_ns = 0
         self.arrival_tick = -1
         self.cause = self.rule = self.radio = self.outcome = ""
         self.words: tuple[int, ...] = ()
@@ -53,7 +55,7 @@ class Flight:
         self.is_bad = self.is_doubled = self.is_settled = False
         self.walls: tuple[str, ...] = ()
         self.by_factor: tuple[int, ...] = ()
-        self.decided_by: tuple[int, ...] = ()
+        self.decided_by: Numbers = ()
         self.distance_mm = self.walls_cdb = self.path_loss_cdb = self.shadowing_cdb = self.fading_cdb = 0
         self.received_cdbm = self.snr_cdb = self.interference = self.rate_bps = self.error_threshold = 0
         self.contenders = self.retries = self.air_start_ns = self.air_end_ns = 0

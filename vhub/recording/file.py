@@ -278,8 +278,8 @@ class CaptureFile:
         channels = declare_topics(mcap)
         content = {
             MODEL_HASH: model_hash(deployment),
-            **described.metadata,
             "format": str(FORMAT),
+            **described.metadata,
             "world": deployment.world,
             "seed": str(deployment.seed),
             "tick_ns": str(deployment.tick_ns),

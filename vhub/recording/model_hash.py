@@ -15,8 +15,10 @@ from typing import Final
 
 from msgspec import json
 
+from foosim.common.keyed_random import draw_words
 from foosim.deployment.network.impairments import TableJitter
 from foosim.deployment.schema import Deployment
+from foosim.vhub.network.draw_address import DrawKeys
 from foosim.vhub.network.memory import RadioState, Transmission
 from foosim.vhub.network.turns import Contest, Turn
 from foosim.vhub.radio.airtime import lora_airtime_ns, lrwpan_airtime_ns, wifi_ack_ns, wifi_airtime_ns
@@ -59,7 +61,7 @@ def model_hash(deployment: Deployment) -> str:
 
 @cache
 def _formulas() -> bytes:
-    return json.encode([list(_losses()), list(_errors()), list(_airtimes()), _lora(), list(_lte())])
+    return json.encode([list(_losses()), list(_errors()), list(_airtimes()), _lora(), list(_lte()), list(_draws())])
 
 
 def _losses() -> Iterator[object]:
@@ -117,3 +119,10 @@ def _lte() -> Iterator[object]:
     """Yield bit rates by ratio."""
     for snr in range(-1200, 3000, 300):
         yield lte_rate_bps(snr, 10_000_000, "down"), lte_rate_bps(snr, 10_000_000, "up")
+
+
+def _draws() -> Iterator[int]:
+    """Yield a draw of a client's packet and one of a robot's: by which address packets draw."""
+    for by_channel in (False, True):
+        keys = DrawKeys(1, "link", "a", "b", by_channel=by_channel)
+        yield draw_words(keys.of("news"), keys.number(2, 3, 4))[0]

@@ -132,10 +132,10 @@ DECIDING: Final[dict[str, tuple[str, ...]]] = {
     DUTY_CYCLE: ("duty_left_ns",),
     QUEUE_FULL: ("queue_packets",),
     CODEL: ("queue_packets", "codel_above_ns", "codel_drops"),
-    EVICTED: ("evicted_by", "evicted_by_copy", "under_way"),
+    EVICTED: ("evicted_by", "evicted_by_copy", "under_way", "evicted_by_channel", "evicted_by_count"),
     RECEIVER_FULL: ("room_left", "room_share"),
 }
-"""By cause of a drop, the fields of a row for the numbers of `Flight.decided_by`."""
+"""By cause of a drop, the fields of a row for what `Flight.decided_by` has."""
 _FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
 _LOSS: Final = int(Slot.LOSS)
 _JITTER: Final = int(Slot.JITTER)
@@ -168,6 +168,7 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.released_wall_ns,
         radio,
         flight.published,
+        flight.count,
         flight.queue_bytes,
         flight.queue_ns,
         flight.access_ns,

@@ -35,7 +35,8 @@ class Capacity(Stage):
         if len(flying) >= self._most:
             place = flying[self._setup.words(flight, CAPACITY_BLOCK)[0] * len(flying) >> 64]
             sequence, copy, _ = memory.under_way[place]
-            memory.under_way[place] = sequence, copy, (flight.sequence, flight.copy, len(flying))
+            by = flight.sequence, flight.copy, len(flying), flight.channel, flight.count
+            memory.under_way[place] = sequence, copy, by
         memory.under_way.append((flight.sequence, flight.copy, ()))
         return ""
 

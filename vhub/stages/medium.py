@@ -205,8 +205,9 @@ class OnAir(Stage):
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:
         """Return the draws of a packet's attempts, by block: those of a broadcast are the same for all receivers."""
-        key = self._setup.sending_key if broadcast else self._setup.key
-        return lambda block: draw_words(key, flight.sequence, flight.copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
+        draws = self._setup.sending if broadcast else self._setup.draws
+        key, number, copy = draws.of(flight.channel), flight.draw, flight.copy
+        return lambda block: draw_words(key, number, copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
 
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:

@@ -147,4 +147,4 @@ def make_residual(setup: LinkSetup) -> Residual | None:
 
 def _time_key(setup: LinkSetup, what: str) -> bytes:
     """Return the key of the lengths of a link's times."""
-    return draw_key(int.from_bytes(setup.key[:8], "little"), what)
+    return draw_key(int.from_bytes(setup.draws.key[:8], "little"), what)

@@ -20,6 +20,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric, Link
 from foosim.vhub.network.ages import Ages
+from foosim.vhub.network.draw_address import counts_within_channels, robot_number
 from foosim.vhub.network.memory import Age, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
@@ -34,6 +35,8 @@ from foosim.world.sampling import Sampling, are_answered
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
+Counted = tuple[RobotPacket, int]
+"""A robot's packet with its count within its channel."""
 
 
 class HubState:
@@ -97,11 +100,17 @@ class HubState:
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
     def close_world(
-        self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight], edits: Sequence[Edit] = ()
+        self,
+        frame: Frame,
+        packets: Sequence[RobotPacket],
+        fates: list[Flight],
+        edits: Sequence[Edit] = (),
+        counts: Sequence[int] | None = None,
     ) -> dict[str, list[Flight]]:
         """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` those of the frame.
 
-        Append the packets whose fate is final to `fates` and return what is released, by client.
+        `counts` are the packets' counts within their channels, None where `packets` are all that robots sent: then they
+        follow from these. Append the packets whose fate is final to `fates` and return what is released, by client.
         """
         tick = frame.tick
         assert tick == self.closed + 1, (tick, self.closed)
@@ -110,8 +119,10 @@ class HubState:
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)
-        for packet in self._in_phase(packets):
-            sequence = (tick << OUTBOX_SHIFT) + packet.index
+        if counts is None:
+            counts = counts_within_channels(packets)
+        for packet, count in self._in_phase(zip(packets, counts, strict=True)):
+            sequence, draw = (tick << OUTBOX_SHIFT) + packet.index, robot_number(tick, count)
             flights = []
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
@@ -119,7 +130,9 @@ class HubState:
                     continue
                 published = not packet.destination
                 what = sequence, sent_ns, 0, packet.payload, published
-                flights.append(Flight(packet.robot, receiver, packet.channel, *what))
+                flight = Flight(packet.robot, receiver, packet.channel, *what)
+                flight.draw, flight.count = draw, count
+                flights.append(flight)
             self._send(flights, tick, fates)
         released = self._arrive_at_clients(tick, fates)
         for name, member in self.members.items():
@@ -127,11 +140,12 @@ class HubState:
                 self.ages.used(name, tick)
         return released
 
-    def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
+    def _in_phase(self, packets: Iterable[Counted]) -> Iterable[Counted]:
         """Return packets in the order in which they reach their radios."""
         if not self.fabric.network.defaults.phase_ns:
             return packets
-        return sorted(packets, key=lambda packet: (self.fabric.phase_ns(packet.robot), packet.robot, packet.index))
+        phase_ns = self.fabric.phase_ns
+        return sorted(packets, key=lambda one: (phase_ns(one[0].robot), one[0].robot, one[0].index))
 
     def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
         """Phase two: judge the packets of clients, in (phase, source, sequence) order.
@@ -302,7 +316,9 @@ class HubState:
             if flight.is_doubled:
                 self.packets.copies += 1
                 what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
-                twins.append(Flight(flight.source, flight.destination, flight.channel, *what, copy=1))
+                twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
+                twin.draw, twin.count = flight.draw, flight.count
+                twins.append(twin)
         if twins:
             self._send(twins, tick, fates)
 
