@@ -481,8 +481,14 @@ class SupervisorCore:
             state.publish_epoch()
             if is_hub:
                 state.publish_tempo()
-        if heartbeat.lost and state.end is None:
+        if heartbeat.lost and state.end is None and (is_hub or self._is_of_now(heartbeat)):
             self.fail(heartbeat.lost)
+
+    def _is_of_now(self, heartbeat: Heartbeat) -> bool:
+        """Whether a node's heartbeat is of the present epoch, at a tick that a node can have reached."""
+        state = self.state
+        ahead = heartbeat.tick - state.frame.tick
+        return heartbeat.epoch == state.epoch and (state.epoch == 0 or 0 <= ahead <= limits.KEPT_TICKS)
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
         state = self.state

@@ -6,6 +6,7 @@ from itertools import count
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
+from foosim.common.batched.noise import NoiseKeys
 from foosim.node import tick as step
 from foosim.node.core import NodeCore
 from foosim.node.inputs import Inputs
@@ -14,7 +15,6 @@ from foosim.protocol import channels
 from foosim.protocol.handshake import Member
 from foosim.world.islands import Assignment
 from foosim.world.scenes.table_world import TableWorld
-from foosim.world.sensors import encoder
 from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
@@ -104,7 +104,11 @@ def _own_shares(planting: Planting) -> None:
 @register("noise from a running stream", "draws are keyed by tick, never taken from a running stream", 1)
 def _running_noise(planting: Planting) -> None:
     numbers = count()
-    before: Any = planting.swap(encoder, "draw_words", lambda key, tick: before(key, next(numbers)))
+
+    def normal(self: Any, counter: int, width: int, slot: int = 0) -> Any:
+        return before(self, next(numbers), width, slot)
+
+    before: Any = planting.swap(NoiseKeys, "normal", normal)
 
 
 @register("no quarantine", "a result that cannot be is not taken", 5)

@@ -6,13 +6,14 @@ are planted in `test_engine_partition.py`, faults of speaking and committing in 
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from foosim.common.batched.noise import NoiseKeys
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.engines.analytic import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -22,7 +23,6 @@ from foosim.world.frame import Frame
 from foosim.world.initial_state import initial_numbers, place_ball
 from foosim.world.islands import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
 from foosim.world.layout import build_layout
-from foosim.world.sensors import encoder
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 250
@@ -46,8 +46,8 @@ def differs() -> bool:
 
 def test_a_draw_from_a_running_generator_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not differs()
-    dice = random.Random(1)
-    monkeypatch.setattr(encoder, "gaussian", lambda word: dice.gauss(0.0, 1.0))
+    dice = np.random.default_rng(1)
+    monkeypatch.setattr(NoiseKeys, "normal", lambda self, counter, width, slot=0: dice.normal(size=(len(self), width)))
     assert differs()
 
 
