@@ -21,6 +21,7 @@ from foosim.common.units import PaceField, Quantity, custom_error
 from foosim.deployment.hosts import Host, Listen, Placed
 from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
+from foosim.deployment.text.file_schema import file_schema
 from foosim.world.scenery import mesh_files, read_contents
 from foosim.world.spec import WorldSpec
 
@@ -250,11 +251,11 @@ def places(deployment: Deployment) -> dict[str, str]:
 
 
 def deployment_schema() -> dict[str, Any]:
-    """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text."""
+    """The JSON Schema of a deployment in which nothing is abbreviated, which the checks and the reference go by."""
     schema = Deployment.model_json_schema(by_alias=True, mode="validation")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}
 
 
 def deployment_schema_text() -> str:
-    """What deploy/deployment.schema.json holds."""
-    return json.dumps(deployment_schema(), indent=2) + "\n"
+    """What deploy/deployment.schema.json holds: the JSON Schema of a deployment's file, for editors and for people."""
+    return json.dumps(file_schema(deployment_schema()), indent=2) + "\n"

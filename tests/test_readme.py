@@ -23,7 +23,7 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.rehearsal.run import rehearse

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.deployment.yaml import DEPTH_MAX, locate_in, measure, plain, read_tree, resolve, write_yaml
+from foosim.deployment.text.yaml import DEPTH_MAX, locate_in, measure, plain, read_tree, resolve, write_yaml
 
 
 def read(text: str) -> Any:
