@@ -12,7 +12,8 @@ from statistics import median
 from typing import Final
 
 from bench.runs import TABLE, watch
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.text.files import read_source_file
 from foosim.launcher.pki import certificates as pki
 from foosim.protocol.identity import identities_of
 
@@ -34,7 +35,7 @@ def certificates(seconds: float = 6.0, pairs: int = 5) -> Certificates:
     plain, secured = [], []
     with tempfile.TemporaryDirectory() as folder:
         pki.init(Path(folder))
-        pki.issue(Path(folder), identities_of(load_deployment(read_deployment_text(TABLE), TABLE.name)))
+        pki.issue(Path(folder), identities_of(load_deployment(read_source_file(TABLE), TABLE.name)))
         for _ in range(pairs):
             plain.append(_ticks_per_s(seconds, None))
             secured.append(_ticks_per_s(seconds, Path(folder)))

@@ -11,7 +11,8 @@ import typer
 
 from foosim.common.addresses import check_listen
 from foosim.common.json_text import encode_json
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.text.files import read_source_file
 from foosim.launcher.doctor.checks import HERE, Case, Finding, is_well
 from foosim.launcher.doctor.remote import examine_all
 from foosim.runtime.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
@@ -43,7 +44,7 @@ def doctor(
 
     Exit codes: 0 the deployment can run, 1 it cannot, 2 bad input.
     """
-    text = read_deployment_text(file)
+    text = apply_sets(read_source_file(file), str(file), ())
     deployment = load_deployment(text, str(file))
     address = deployment.listen if listen is None else listen
     check_listen(address, insecure, 2, pki is not None)

@@ -24,12 +24,13 @@ from foosim.client import control
 from foosim.common.errors import BadValue
 from foosim.common.json_text import encode_json
 from foosim.common.names import nearest_name
-from foosim.deployment.assets import pin_assets, read_files
-from foosim.deployment.loader import apply_sets, load_deployment, load_network, read_deployment_text
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment, load_network
 from foosim.deployment.network.presets import PRESETS, provenance
 from foosim.deployment.network.traces import check_files, network_files
 from foosim.deployment.overrides import nested
 from foosim.deployment.schema import places
+from foosim.deployment.text.files import read_files, read_source_file
 from foosim.protocol.channels import VHUB
 from foosim.protocol.messages import Answer
 from foosim.runtime.command import VersionOption, new_app, run_app
@@ -108,7 +109,7 @@ def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
 
     Raises DeploymentError or AssetError.
     """
-    name, text = str(file), read_deployment_text(file)
+    name, text = str(file), read_source_file(file)
     network = load_network(text, name, sets)
     if network is None:
         pinned, files = pin_assets(apply_sets(text, name, sets), name, file.parent)

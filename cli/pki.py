@@ -11,8 +11,9 @@ import typer
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
 from foosim.common.json_text import encode_json
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment, places
+from foosim.deployment.text.files import read_source_file
 from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.pki import certificates
 from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
@@ -64,7 +65,7 @@ def init(
     --send copies ca.pem, and the certificates, keys and passwords of the processes on a host, through ssh into the
     folder in the host's `pki` setting. Files there are replaced; only the ssh user can read them.
     """
-    deployment = load_deployment(read_deployment_text(file), str(file))
+    deployment = load_deployment(read_source_file(file), str(file))
     if send and not places(deployment):
         raise BadValue("--send: the deployment places nothing on a host", deployment.world)
     everybody = identities_of(deployment)

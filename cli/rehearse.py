@@ -17,7 +17,8 @@ from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
 from foosim.common.json_text import encode_json
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.text.files import read_source_file
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
@@ -148,8 +149,7 @@ def _told(result: dict[str, Any]) -> str:
 def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
     """Rehearse under the faults of some seeds; return the exit code."""
     file, duration, first = options.file, options.duration, 1 if options.seed is None else options.seed
-    text = read_deployment_text(file)
-    load_deployment(text, str(file))
+    text = apply_sets(read_source_file(file), str(file), ())
     ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration)).ticks
     if ticks < TICKS:
         raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)

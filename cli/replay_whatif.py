@@ -15,9 +15,9 @@ from foosim.capture.reader import CaptureData, open_capture
 from foosim.cli.options import Capture, Json, reading
 from foosim.common.errors import BadValue
 from foosim.common.json_text import encode_json
-from foosim.deployment.assets import read_files
-from foosim.deployment.loader import load_deployment, read_deployment_text, with_network
+from foosim.deployment.loader import Text, load_deployment, with_network
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.files import read_files, read_source_file
 from foosim.replay.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if
 from foosim.replay.what_if_chart import picture
 from foosim.vhub.network.custom_models import check_link_models, differing_models
@@ -85,10 +85,11 @@ def _deployment(capture: CaptureData, network: Path | None, settings: list[str])
     if network is None and not settings:
         return capture.deployment
     about = capture.about
-    other = None if network is None else (read_deployment_text(network), str(network))
+    other: tuple[Text, str] | None = None if network is None else (read_source_file(network), str(network))
     text = with_network(about.deployment_text, about.deployment_name, other, settings)
     deployment = load_deployment(text, about.deployment_name)
-    check_link_models(deployment.network, *(other or (about.deployment_text, about.deployment_name)), settings)
+    written, name = other or (about.deployment_text, about.deployment_name)
+    check_link_models(deployment.network, written, name, settings)
     lacking = {path: digest for path, digest in deployment.files().items() if path not in about.files}
     folder = Path() if network is None else network.parent
     return deployment.with_assets({**about.files, **(read_files(folder, ".", lacking) if lacking else {})})

@@ -1,10 +1,27 @@
 """A problem of a deployment, at its place in the data."""
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
+from foosim.common.errors import show
+
 Location = tuple[str | int, ...]
 """Keys and indices from the root of the data."""
+
+_PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
+
+
+def path_text(location: Location) -> str:
+    """A location as messages print it: `nodes.red.robots[1]`."""
+    text = ""
+    for step in location:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            name = step if _PLAIN_KEY.fullmatch(step) else show(step)
+            text += f".{name}" if text else name
+    return text
 
 
 @dataclass(frozen=True, slots=True)

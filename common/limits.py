@@ -31,6 +31,19 @@ SMALL_MESSAGE_BYTES_MAX: Final = 64 * 1024
 """One message without a list of packets, numbers or entities: the kinds that a new peer may send first."""
 PACKETS_PER_MESSAGE_MAX: Final = 65_536
 DEPLOYMENT_BYTES_MAX: Final = 64 * 1024
+"""A deployment's text, and each file that one includes."""
+EXPANDED_NODES_MAX: Final = 400_000
+"""Values and keys of a deployment whose templates and counts are expanded."""
+TEMPLATES_MAX: Final = 256
+LIKE_DEPTH_MAX: Final = 16
+"""Templates that are like one another, in a row."""
+INCLUDES_MAX: Final = 32
+"""Files that a deployment includes, also through others."""
+INCLUDE_DEPTH_MAX: Final = 8
+INCLUDED_BYTES_MAX: Final = 256 * 1024
+"""All included files of a deployment."""
+COMPARISONS_MAX: Final = 10_000_000
+"""Names that are compared with the selectors of one deployment."""
 TEXT_LENGTH_MAX: Final = 8 * 1024
 
 ASSET_BYTES_MAX: Final = 10 * 1024 * 1024

@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -22,6 +23,8 @@ from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 
 NS_PER_S: Final = 1_000_000_000
+NUMBERS_KEPT: Final = 4_096
+"""Quantities that are not read again: the robots of a fleet have most of theirs in common."""
 
 _NUMBER: Final = r"[+-]?[0-9]{1,20}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
 _RATIO: Final = r"[0-9]{1,20}/[1-9][0-9]{0,19}"
@@ -207,6 +210,10 @@ class Quantity:
     high: str
 
     def read(self, value: object) -> float | int | Fraction:
+        """Return the number; raises pydantic's error for a value that is no such quantity or out of bounds."""
+        return _number_of(self, value) if type(value) is str else self._number(value)
+
+    def _number(self, value: object) -> float | int | Fraction:
         dimension = self.dimension
         try:
             exact = parse(value, dimension)
@@ -244,6 +251,11 @@ class Quantity:
             "pattern": f"^{number} *({units})$".replace("(?:", "("),
             "description": f"{self.dimension.name}, {self.low} to {self.high}: {self.dimension.form}",
         }
+
+
+@lru_cache(maxsize=NUMBERS_KEPT)
+def _number_of(quantity: Quantity, text: str) -> float | int | Fraction:
+    return quantity._number(text)
 
 
 def custom_error(bad: BadValue) -> PydanticCustomError:

@@ -7,22 +7,22 @@ network_references.py, rates and offsets are in timing_references.py.
 """
 
 import re
-from collections.abc import Iterator, Mapping
-from fnmatch import fnmatchcase
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fnmatch import translate
 from fractions import Fraction
 from typing import Any, Final
 
-from foosim.common import names, units
-from foosim.common.errors import BadValue, show
-from foosim.common.finding import Finding, Location
+from foosim.common import limits, names, units
+from foosim.common.errors import BadValue
+from foosim.common.finding import Finding, Location, path_text
 from foosim.common.names import LINE_NAMES, nearest_name
+from foosim.deployment.text.selection import TooManyComparisons
 from foosim.world.forms.models import MODELS
 
 # Bounds of the checks; the schema refuses larger values.
 TEXTS_MAX: Final = 4096
-
-_PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
-
+NEAREST_MAX: Final = 128
+"""How often a nearest name is looked for: among thousands of names that takes 20 ms, and not all problems are shown."""
 
 WORLD_OF_MODEL: Final[Mapping[str, str]] = {"rod": "table", "camera": "table", "rover": "hall", "station": "hall"}
 """The kind of world that a model of robot is for."""
@@ -42,28 +42,20 @@ def quoted(nearest: str | None) -> str | None:
     return None if nearest is None else repr(nearest)
 
 
-def path_text(location: Location) -> str:
-    """A location as messages print it: `nodes.red.robots[1]`."""
-    text = ""
-    for step in location:
-        if isinstance(step, int):
-            text += f"[{step}]"
-        else:
-            name = step if _PLAIN_KEY.fullmatch(step) else show(step)
-            text += f".{name}" if text else name
-    return text
-
-
 class View:
     """Tolerant access to plain data: a value of an unexpected kind reads as empty."""
 
-    def __init__(self, data: object) -> None:
+    def __init__(self, data: object, endpoints: Sequence[str] | None = None) -> None:
         self.data = data
         self.robots = self.mapping("robots")
         self.hosts = self.mapping("hosts")
         self.nodes = self.mapping("nodes")
         self.players = self.mapping("players")
         self.clients = self.mapping("clients")
+        self.endpoints = [*self.robots, *self.players, *self.clients] if endpoints is None else endpoints
+        self._matched: dict[str, list[str]] = {}
+        self._compared = 0
+        self._nearest = 0
 
     def get(self, *path: str | int) -> Any:
         value = self.data
@@ -92,6 +84,22 @@ class View:
             return units.parse(self.get(world, *path), units.LENGTH)
         except BadValue:
             return None
+
+    def matched(self, glob: str) -> Sequence[str]:
+        """The endpoints that a selector matches, with which it is compared once. Raises TooManyComparisons."""
+        found = self._matched.get(glob)
+        if found is None:
+            self._compared += len(self.endpoints)
+            if self._compared > limits.COMPARISONS_MAX:
+                raise TooManyComparisons
+            match = re.compile(translate(glob)).match
+            found = self._matched[glob] = [name for name in self.endpoints if match(name)]
+        return found
+
+    def nearest(self, value: str, choices: Iterable[str]) -> str | None:
+        """The valid name most similar to a wrong one, in quotes; it is looked for so many times."""
+        self._nearest += 1
+        return quoted(nearest_name(value, choices)) if self._nearest <= NEAREST_MAX else None
 
     def tick_ns(self) -> int | None:
         try:
@@ -179,11 +187,11 @@ def _hosts(view: View) -> Iterator[Finding]:
     for place in (*places, ("vhub",)):
         host, label = view.get(*place, "host"), view.get(*place, "label")
         if isinstance(host, str) and host not in view.hosts:
-            yield Finding((*place, "host"), "unknown host", host, quoted(nearest_name(host, view.hosts)))
+            yield Finding((*place, "host"), "unknown host", host, view.nearest(host, view.hosts))
         if isinstance(label, str) and host is not None:
             yield Finding((*place, "label"), "a label beside a host: one of them says where", label)
         elif isinstance(label, str) and label not in labels:
-            nearest = quoted(nearest_name(label, labels))
+            nearest = view.nearest(label, labels)
             yield Finding((*place, "label"), "a label that no host has", label, nearest)
         if host is None and label is None and view.get(*place, "launch") == "systemd":
             yield Finding((*place, "launch"), "a unit of systemd needs a host or a label", "systemd")
@@ -199,7 +207,7 @@ def _robots(view: View) -> Iterator[Finding]:
         if not (isinstance(team, str) and isinstance(line, str)):
             continue
         if line in LINE_NAMES and isinstance(lines, dict) and line not in lines:
-            yield Finding(("robots", name, "line"), "not in table.lines", line, quoted(nearest_name(line, lines)))
+            yield Finding(("robots", name, "line"), "not in table.lines", line, view.nearest(line, lines))
         first = rods.setdefault((team, line), name)
         if first != name:
             yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
@@ -229,7 +237,7 @@ def _nodes(view: View) -> Iterator[Finding]:
         for index, robot in view.texts("nodes", node, "robots"):
             location = ("nodes", node, "robots", index)
             if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, quoted(nearest_name(robot, view.robots)))
+                yield Finding(location, "unknown robot", robot, view.nearest(robot, view.robots))
             elif robot in owner:
                 what = (
                     "listed twice" if owner[robot] == node else f"a robot with two owners, also of node {owner[robot]}"
@@ -247,7 +255,7 @@ def _players(view: View) -> Iterator[Finding]:
         for robot in view.mapping("players", player, "robots"):
             location: Location = ("players", player, "robots", robot)
             if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, quoted(nearest_name(robot, view.robots)), at="key")
+                yield Finding(location, "unknown robot", robot, view.nearest(robot, view.robots), at="key")
                 continue
             sensors = view.get("robots", robot, "sensors")
             if not isinstance(sensors, dict):
@@ -256,7 +264,7 @@ def _players(view: View) -> Iterator[Finding]:
             seen = set()
             for index, channel in view.texts(*location):
                 if channel not in channels:
-                    nearest = quoted(nearest_name(channel, channels))
+                    nearest = view.nearest(channel, channels)
                     yield Finding((*location, index), f"{robot} has no such channel", channel, nearest)
                 elif channel in seen:
                     yield Finding((*location, index), "a channel that is listed twice", channel)
@@ -265,23 +273,25 @@ def _players(view: View) -> Iterator[Finding]:
 
 def _hears(view: View) -> Iterator[Finding]:
     """A player's `hears`: selectors that match another endpoint, channels that one of these has."""
-    endpoints = [*view.robots, *view.players, *view.clients] if view.robots else []
-    for player in view.players if endpoints else ():
+    said: dict[str, set[str]] = {}
+    for player in view.players if view.robots else ():
         for glob in view.mapping("players", player, "hears"):
             location: Location = ("players", player, "hears", glob)
             if not names.is_selector(glob):
                 continue
-            matched = [name for name in endpoints if name != player and fnmatchcase(name, glob)]
-            if not matched:
-                nearest = quoted(nearest_name(glob, [name for name in endpoints if name != player]))
+            matched = view.matched(glob)
+            if all(name == player for name in matched):
+                nearest = view.nearest(glob, [name for name in view.endpoints if name != player])
                 yield Finding(location, "a selector that matches no other endpoint", glob, nearest, at="key")
                 continue
-            if any(name not in view.robots for name in matched):
+            if glob not in said:
+                said[glob] = {channel for name in matched for channel in view.mapping("robots", name, "sensors")}
+            if any(name not in view.robots and name != player for name in matched):
                 continue
-            sensors = {channel for robot in matched for channel in view.mapping("robots", robot, "sensors")}
+            sensors = said[glob]
             for index, channel in view.texts(*location):
                 if channel not in (*sensors, names.CHANNEL_ECHO):
-                    nearest = quoted(nearest_name(channel, [*sensors, names.CHANNEL_ECHO]))
+                    nearest = view.nearest(channel, [*sensors, names.CHANNEL_ECHO])
                     yield Finding((*location, index), f"{glob} has no such channel", channel, nearest)
 
 
@@ -291,7 +301,7 @@ def _on(view: View) -> Iterator[Finding]:
         for name in view.mapping(section) if view.robots else ():
             robot = view.get(section, name, "on")
             if isinstance(robot, str) and robot not in view.robots:
-                yield Finding((section, name, "on"), "unknown robot", robot, quoted(nearest_name(robot, view.robots)))
+                yield Finding((section, name, "on"), "unknown robot", robot, view.nearest(robot, view.robots))
 
 
 def _capture(view: View) -> Iterator[Finding]:

@@ -45,6 +45,8 @@ class _Reader:
     def __init__(self, data: Mapping[str, Any]) -> None:
         self._data = data
         self.findings: list[Finding] = []
+        self._read: dict[tuple[str, Any, int], Any] = {}
+        """What was read without findings: by form, model and the identity of the plain data, which lives as long."""
 
     def robot(self, location: Location, robot: Any) -> Any:
         """Return the data of a robot with the settings of its components read."""
@@ -64,6 +66,19 @@ class _Reader:
         return found
 
     def _component(
+        self, form: str, base: type[ComponentSettings], model: Any, location: Location, settings: Any
+    ) -> Any:
+        """Return the settings of one component. What many robots share, by a template, is read once."""
+        key = form, model, id(settings)
+        if key not in self._read:
+            count = len(self.findings)
+            read = self._read_component(form, base, model, location, settings)
+            if len(self.findings) > count:
+                return read
+            self._read[key] = read
+        return self._read[key]
+
+    def _read_component(
         self, form: str, base: type[ComponentSettings], model: Any, location: Location, settings: Any
     ) -> Any:
         """Return the settings of one component; what cannot be read is left as it is, for a finding tells."""

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 
 from foosim.common import limits, units
 from foosim.common.errors import Refused, describe
-from foosim.common.finding import Finding, Location
+from foosim.common.finding import Finding, Location, path_text
 from foosim.common.json_text import encode_json
-from foosim.deployment.checks import View, path_text
+from foosim.deployment.checks import View
 from foosim.deployment.network.impairments import Trace
 from foosim.deployment.network.rules import Event, Network
 from foosim.deployment.network.traces import file_settings
@@ -55,7 +55,7 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
     if "at" in data:
         return [Finding(("at",), "an event that is asked for happens at the next tick, it has no time", "at", at="key")]
     links = [rule.id for rule in deployment.network.links]
-    found = list(event_findings(View(data), (), data, deployment.endpoints(), links))
+    found = list(event_findings(View(data, deployment.endpoints()), (), data, links))
     try:
         event = Event.model_validate({**data, "at": f"{at_ns} ns"})
     except ValidationError as error:

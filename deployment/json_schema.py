@@ -4,6 +4,7 @@ import json
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
 from foosim.world.forms.settings import ActuatorSettings, ModifierSettings, SensorSettings
 
@@ -17,7 +18,7 @@ OWN: Final = "foosim."
 
 
 def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
-    """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text.
+    """The JSON Schema of a deployment in which nothing is abbreviated, which the checks and the reference go by.
 
     It has foosim's own components; with `installed` those of other packages, too.
     """
@@ -29,8 +30,8 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
 
 
 def deployment_schema_text(*, installed: bool = False) -> str:
-    """What deploy/deployment.schema.json holds."""
-    return json.dumps(deployment_schema(installed=installed), indent=2) + "\n"
+    """What deploy/deployment.schema.json holds: the JSON Schema of a deployment's file, for editors and for people."""
+    return json.dumps(file_schema(deployment_schema(installed=installed)), indent=2) + "\n"
 
 
 def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool) -> dict[str, Any]:

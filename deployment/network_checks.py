@@ -4,15 +4,13 @@ Like `checks`, it reads plain data and skips malformed values.
 """
 
 from collections.abc import Iterator, Sequence
-from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any, Final
 
 from foosim.common import names, units
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.common.names import nearest_name
-from foosim.deployment.checks import BODILESS, View, quoted
+from foosim.deployment.checks import BODILESS, View
 from foosim.deployment.network.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.deployment.network.rules import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
 from foosim.deployment.radio_checks import is_on_air, radio_findings
@@ -26,22 +24,21 @@ _LASTING: Final = ("partition", "clog", "chaos")
 def check_network(data: object) -> Iterator[Finding]:
     """All problems of the network's section, found lazily."""
     view = View(data)
-    endpoints = [*view.robots, *view.players, *view.clients]
     if not view.mapping("network") or not view.robots:
         return
     yield from _radios(view)
-    yield from _carriers(view, endpoints)
+    yield from _carriers(view)
     yield from _phase(view)
-    yield from _placeless(view, endpoints)
-    yield from _links(view, endpoints)
-    yield from _events(view, endpoints)
+    yield from _placeless(view)
+    yield from _links(view)
+    yield from _events(view)
 
 
 def check_network_alone(data: object) -> Iterator[Finding]:
     """All problems of a network's section without its deployment: the matches of its selectors are not checked."""
     view = View(data)
     for check in (_carriers, _links, _events):
-        yield from (finding for finding in check(view, ()) if finding.what != NO_ENDPOINT)
+        yield from (finding for finding in check(view) if finding.what != NO_ENDPOINT)
     yield from _radios(view)
 
 
@@ -50,11 +47,11 @@ def _count(view: View, key: str, at_most: int) -> range:
     return range(min(len(entries), at_most) if isinstance(entries, list) else 0)
 
 
-def _matches(view: View, location: Location, endpoints: Sequence[str], beside: Sequence[str] = ()) -> Iterator[Finding]:
+def _matches(view: View, location: Location, beside: Sequence[str] = ()) -> Iterator[Finding]:
     """Every selector of a list matches an endpoint."""
     for index, glob in view.texts(*location):
-        if glob not in beside and names.is_selector(glob) and not any(fnmatchcase(e, glob) for e in endpoints):
-            nearest = quoted(nearest_name(glob, [*endpoints, *beside]))
+        if glob not in beside and names.is_selector(glob) and not view.matched(glob):
+            nearest = view.nearest(glob, [*view.endpoints, *beside])
             yield Finding((*location, index), NO_ENDPOINT, glob, nearest)
 
 
@@ -65,19 +62,19 @@ def _radios(view: View) -> Iterator[Finding]:
         yield from radio_findings(view, location)
 
 
-def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+def _carriers(view: View) -> Iterator[Finding]:
     radios = view.mapping("network", "radios")
     for glob in list(view.mapping("network", "robots"))[:LINK_RULES_MAX]:
         location: Location = ("network", "robots", glob)
-        if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
-            nearest = quoted(nearest_name(glob, endpoints))
+        if names.is_selector(glob) and not view.matched(glob):
+            nearest = view.nearest(glob, view.endpoints)
             yield Finding(location, NO_ENDPOINT, glob, nearest, at="key")
         for index, radio in view.texts(*location):
             if radio not in radios:
-                yield Finding((*location, index), "unknown radio", radio, quoted(nearest_name(radio, radios)))
+                yield Finding((*location, index), "unknown radio", radio, view.nearest(radio, radios))
     for glob in list(view.mapping("network", "places"))[:LINK_RULES_MAX]:
-        if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
-            nearest = quoted(nearest_name(glob, endpoints))
+        if names.is_selector(glob) and not view.matched(glob):
+            nearest = view.nearest(glob, view.endpoints)
             yield Finding(("network", "places", glob), NO_ENDPOINT, glob, nearest, at="key")
 
 
@@ -92,14 +89,22 @@ def _phase(view: View) -> Iterator[Finding]:
         yield Finding(("network", "defaults", "phase"), "more than the tick", text, repr(units.format_ns(tick_ns)))
 
 
-def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+def _placeless(view: View) -> Iterator[Finding]:
     """An endpoint with a radio has a body, is on board of one, or has a place."""
     carried = [glob for glob in view.mapping("network", "robots") if names.is_selector(glob)]
-    places = view.mapping("network", "places")
-    for endpoint in endpoints:
-        glob = next((glob for glob in carried if fnmatchcase(endpoint, glob)), None)
-        on_air = [radio for _, radio in view.texts("network", "robots", glob or "") if is_on_air(view, radio)]
-        if not on_air or any(fnmatchcase(endpoint, place) for place in places):
+    glob_of: dict[str, str] = {}
+    for glob in carried:
+        for endpoint in view.matched(glob):
+            glob_of.setdefault(endpoint, glob)
+    radios = {
+        glob: [radio for _, radio in view.texts("network", "robots", glob) if is_on_air(view, radio)]
+        for glob in carried
+    }
+    placed = {endpoint for place in view.mapping("network", "places") for endpoint in view.matched(place)}
+    for endpoint in view.endpoints:
+        glob = glob_of.get(endpoint, "")
+        on_air = radios.get(glob)
+        if not on_air or endpoint in placed:
             continue
         section = next(one for one in ("players", "clients", "robots") if endpoint in view.mapping(one))
         robot = endpoint if section == "robots" else view.get(section, endpoint, "on")
@@ -107,14 +112,14 @@ def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
             continue
         what = f"carries the radio {on_air[0]}, but is nowhere: write network.places.{endpoint}"
         yield Finding(
-            ("network", "robots", glob or ""),
+            ("network", "robots", glob),
             what + (" or its `on`" if section != "robots" else ""),
             endpoint,
             at="key",
         )
 
 
-def _links(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+def _links(view: View) -> Iterator[Finding]:
     """Rules have names of their own and two ends, and go via radios that there are."""
     seen: dict[str, int] = {}
     radios = view.mapping("network", "radios")
@@ -132,10 +137,10 @@ def _links(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
             if side not in rule:
                 yield Finding((*location, side), "missing key", side, at="missing")
         for side in ("from", "to", "between"):
-            yield from _matches(view, (*location, side), endpoints)
+            yield from _matches(view, (*location, side))
         via = rule.get("via")
         if isinstance(via, str) and via not in radios:
-            yield Finding((*location, "via"), "unknown radio", via, quoted(nearest_name(via, radios)))
+            yield Finding((*location, "via"), "unknown radio", via, view.nearest(via, radios))
         yield from _impairments(view, location)
 
 
@@ -248,7 +253,7 @@ def _pareto(view: View, location: Location) -> Iterator[Finding]:
         yield Finding((*location, "mean"), f"above half of max, {jitter.get('max', PARETO_MAX)}", jitter.get("mean"))
 
 
-def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+def _events(view: View) -> Iterator[Finding]:
     """Each event has one action, existing targets, and a duration."""
     rules = [rule.get("id") for rule in view.get("network", "links") or () if isinstance(rule, dict)]
     links = [name for name in rules if isinstance(name, str)]
@@ -256,12 +261,10 @@ def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
         location: Location = ("network", "events", number)
         event = view.mapping(*location)
         if event:
-            yield from event_findings(view, location, event, endpoints, links)
+            yield from event_findings(view, location, event, links)
 
 
-def event_findings(
-    view: View, location: Location, event: Any, endpoints: Sequence[str], links: Sequence[str]
-) -> Iterator[Finding]:
+def event_findings(view: View, location: Location, event: Any, links: Sequence[str]) -> Iterator[Finding]:
     """The problems of one event, at its location."""
     actions = [key for key in ACTIONS if key in event]
     if not actions:
@@ -281,13 +284,13 @@ def event_findings(
     if action == "partition":
         groups = view.get(*location, "partition")
         for index in range(len(groups) if isinstance(groups, list) else 0):
-            yield from _matches(view, (*location, "partition", index), endpoints, (REST,))
+            yield from _matches(view, (*location, "partition", index), (REST,))
     for side in ("from", "to"):
-        yield from _matches(view, (*location, "clog", side), endpoints)
-    yield from _matches(view, (*location, "chaos", "among"), endpoints)
+        yield from _matches(view, (*location, "clog", side))
+    yield from _matches(view, (*location, "chaos", "among"))
     link = view.get(*location, "set", "link")
     if isinstance(link, str) and link not in links:
-        yield Finding((*location, "set", "link"), "unknown link rule", link, quoted(nearest_name(link, links)))
+        yield Finding((*location, "set", "link"), "unknown link rule", link, view.nearest(link, links))
     if view.mapping(*location, "set"):
         yield from _impairments(view, (*location, "set"))
 

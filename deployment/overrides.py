@@ -4,16 +4,35 @@ The path is made of keys joined by dots, as messages print it: `robots.red.goal.
 dots themselves, the longest key that fits is meant; a new one is written in double quotes. An entry of a list is named
 by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply in order; what they hold is placed at
 `--set:N:COLUMN`, N counting settings from 1.
+
+They apply to the file as it is written. A path may lead through what an entry has by a template or a count: then the
+entry gets keys of its own, as if they were written in the file.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
-from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
+from foosim.deployment.text.expand import ENTRIES, Expansion
+from foosim.deployment.text.report import Report, Stopped
+from foosim.deployment.text.templates import TEMPLATES
+from foosim.deployment.text.yaml import (
+    SETS_RANK,
+    Fields,
+    Items,
+    Leaf,
+    Place,
+    Problem,
+    Tree,
+    copied,
+    plain,
+    read_tree,
+)
 
 ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256
@@ -82,7 +101,7 @@ def _of_argument(text: str, problem: str) -> str:
 
 
 def _place(number: int, column: int) -> Place:
-    return Place(number, number, column, "--set")
+    return Place(SETS_RANK + number, number, column, "--set")
 
 
 def _read_path(text: str) -> tuple[list[tuple[str, int]], int]:
@@ -116,7 +135,7 @@ def _read_value(text: str, start: int, number: int) -> tuple[Tree | None, list[P
 
 def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int) -> None:
     """Replace or add the value at the path."""
-    node = tree
+    node, taken = tree, _Taken(tree)
     index = 0
     while True:
         if isinstance(node, Items):
@@ -126,39 +145,83 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
                 return
             node = node.items[entry]
             index += 1
+            taken.steps.append(entry)
             continue
         if not isinstance(node, Fields):
             raise _Misplaced(steps[index][1], describe("set inside a value that is no mapping", steps[index][0]))
-        key, used = _key(node, steps, index)
+        key, used = _key(node.values, steps, index) or _key(taken.names(), steps, index) or (steps[index][0], 1)
         if index + used == len(steps):
             node.keys[key] = _place(number, steps[index][1])
             node.values[key] = value
             return
         if key not in node.values:
-            _open(tree, node, key, steps, index, number)
+            _open(taken, node, key, steps, index, number)
         node = node.values[key]
         index += used
+        taken.steps.append(key)
 
 
-def _key(node: Fields, steps: Sequence[tuple[str, int]], index: int) -> tuple[str, int]:
-    """The longest key of the mapping that matches the rest of the path, and its number of steps."""
+@dataclass(slots=True)
+class _Taken:
+    """The way through a tree so far: what is there when templates and counts are expanded."""
+
+    tree: Tree
+    steps: list[str | int] = field(default_factory=list)
+
+    def names(self) -> Sequence[str]:
+        """The keys of the mapping at its end."""
+        if not self.steps or self.steps[0] not in (*ENTRIES, TEMPLATES) or not isinstance(self.tree, Fields):
+            return ()
+        if len(self.steps) == 1:
+            with suppress(Stopped):
+                return Expansion(self.tree, Report()).names(str(self.steps[0]))
+            return ()
+        there = self.at()
+        return list(there.values) if isinstance(there, Fields) else ()
+
+    def at(self, *more: str) -> Tree | None:
+        """The node at its end, or some steps further."""
+        node: Tree | None = None
+        way = [*self.steps, *more]
+        if isinstance(self.tree, Fields):
+            with suppress(Stopped):
+                node = Expansion(self.tree, Report()).entry(str(way[0]), str(way[1]))
+        for step in way[2:]:
+            if isinstance(node, Fields) and isinstance(step, str):
+                node = node.values.get(step)
+            elif isinstance(node, Items) and isinstance(step, int) and step < len(node.items):
+                node = node.items[step]
+            else:
+                return None
+        return node
+
+
+def _key(keys: Collection[str], steps: Sequence[tuple[str, int]], index: int) -> tuple[str, int] | None:
+    """The longest key of a mapping that matches the rest of the path, and its number of steps."""
     for used in range(len(steps) - index, 0, -1):
         key = ".".join(step for step, _ in steps[index : index + used])
-        if key in node.values:
+        if key in keys:
             return key, used
-    return steps[index][0], 1
+    return None
 
 
-def _open(tree: Tree, node: Fields, key: str, steps: Sequence[tuple[str, int]], index: int, number: int) -> None:
-    """Add an empty mapping for a section that the file leaves out; any other missing key on the way is an error."""
-    if node is tree and key in Deployment.model_fields:
-        node.keys[key] = _place(number, steps[index][1])
-        node.values[key] = Fields(_place(number, steps[index][1]))
+def _open(taken: _Taken, node: Fields, key: str, steps: Sequence[tuple[str, int]], index: int, number: int) -> None:
+    """Add the value that a key on the way has by a template or a count, or an empty mapping for a section that the file
+    leaves out; any other missing key on the way is an error."""
+    place = _place(number, steps[index][1])
+    names = taken.names()
+    if key in names:
+        there = taken.at(key)
+        node.keys[key] = place
+        node.values[key] = Fields(place) if there is None or isinstance(there, Fields) else copied(there)
+        return
+    if node is taken.tree and (key in Deployment.model_fields or key == TEMPLATES):
+        node.keys[key], node.values[key] = place, Fields(place)
         return
     nearest = None
     for stop in range(len(steps) - 1, index, -1):
         name = ".".join(step for step, _ in steps[index:stop])
-        if nearest is None and (nearest := nearest_name(name, node.values)) is not None:
+        if nearest is None and (nearest := nearest_name(name, {*node.values, *names})) is not None:
             key = name
     path = ".".join(step for step, _ in steps[:index])
     text = describe("unknown key", key, None if nearest is None else repr(nearest))

@@ -4,7 +4,11 @@ What a radio says by itself is checked as plain data, like all in `network_refer
 checked when the network is whole, for then it is known which radio the packets of a pair go by.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import translate
+from functools import cached_property
+from itertools import chain, islice, permutations
 from typing import Any, Final
 
 from foosim.common import units
@@ -38,6 +42,10 @@ _OF_MEDIUM: Final = {
     "gateway": "lora",
 }
 """Keys that one medium alone reads."""
+Kind = tuple[tuple[int, ...], tuple[str, ...]]
+"""What rules and radios know of an endpoint: the selectors that match it, by number, and the radios that it has."""
+PAIRS_MAX: Final = 200_000
+"""Pairs of endpoints that are looked at for settings without an effect: in a valid deployment that is no error."""
 _LIMITING: Final = {"rate_bps": "rate", "trace": "trace", "overhead_bytes": "overhead", "payload_max": "mtu"}
 """Fields of a rule that not every medium heeds, and their keys."""
 
@@ -137,58 +145,108 @@ def rule_findings(network: Network, ends: Sequence[str], carriers: Mapping[str, 
 
     `ends` are the endpoints, none where they are not known: then only a rule's `via` is known.
     """
-    profiles = Profiles(network, carriers)
+    ways = _Ways(network, ends, carriers)
     for number, rule in enumerate(network.links):
-        yield from _asked(profiles, rule, rule, ("network", "links", number), ends)
+        yield from ways.asked(rule, rule, ("network", "links", number))
     for number, event in enumerate(network.events):
-        yield from set_findings(network, event, ("network", "events", number), ends, carriers)
+        yield from ways.changed(event, ("network", "events", number))
 
 
 def set_findings(
     network: Network, event: Event, location: Location, ends: Sequence[str], carriers: Mapping[str, str]
 ) -> Iterator[Finding]:
     """Return which settings of an event the radios do not heed by which the packets go of the rule that it changes."""
-    change = event.set
-    rule = None if change is None else next((rule for rule in network.links if rule.id == change.link), None)
-    if change is not None and rule is not None:
-        yield from _asked(Profiles(network, carriers), rule, change, (*location, "set"), ends)
+    return _Ways(network, ends, carriers).changed(event, location)
 
 
-def _asked(
-    profiles: Profiles, rule: LinkRule, settings: Impairments, location: Location, ends: Sequence[str]
-) -> Iterator[Finding]:
-    asked = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
-    ways = list(dict.fromkeys(_ways(profiles, rule, ends))) if asked else []
-    for field in asked:
-        key = _LIMITING[field]
-        for way in ways:
-            radio = profiles.base(way)
-            what = unheeded(key, radio.medium)
-            if key == "mtu" and radio.medium == "lora":
-                longest = lora_longest(radio.spreading_factor) or 0
-                what = _too_long(radio.spreading_factor, longest) if (settings.payload_max or 0) > longest else None
-            if what is not None:
-                by = way or profiles.network.defaults.preset
-                yield Finding((*location, key), f"via {by}, {what}", key, at="key")
-                break
+class _Ways:
+    """By which radios the packets of rules go. Of the endpoints, one pair of each kind is looked at."""
 
+    def __init__(self, network: Network, ends: Sequence[str], carriers: Mapping[str, str]) -> None:
+        self._profiles = Profiles(network, carriers)
+        self._ends = ends
 
-def _ways(profiles: Profiles, rule: LinkRule, ends: Sequence[str]) -> Iterator[str]:
-    """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
+    def changed(self, event: Event, location: Location) -> Iterator[Finding]:
+        """Yield which settings of an event the radios do not heed."""
+        change = event.set
+        rules = self._profiles.network.links
+        rule = None if change is None else next((rule for rule in rules if rule.id == change.link), None)
+        if change is not None and rule is not None:
+            yield from self.asked(rule, change, (*location, "set"))
 
-    If there are only wires, which all support the same settings, only a rule's `via` counts.
-    """
-    if rule.via is not None:
-        yield rule.via
-        return
-    if not any(profiles.base(way).is_on_air for way in ("", *profiles.network.radios)):
-        return
-    for source in ends:
-        for destination in ends:
-            if source != destination and any(met is rule for met in profiles.rules_for(source, destination)):
+    def asked(self, rule: LinkRule, settings: Impairments, location: Location) -> Iterator[Finding]:
+        """Yield which of the settings of a rule, or of an event for it, the radios do not heed."""
+        asked = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
+        ways = list(dict.fromkeys(self._of(rule))) if asked else []
+        for field in asked:
+            key = _LIMITING[field]
+            for way in ways:
+                radio = self._profiles.base(way)
+                what = unheeded(key, radio.medium)
+                if key == "mtu" and radio.medium == "lora":
+                    longest = lora_longest(radio.spreading_factor) or 0
+                    too_long = (settings.payload_max or 0) > longest
+                    what = _too_long(radio.spreading_factor, longest) if too_long else None
+                if what is not None:
+                    by = way or self._profiles.network.defaults.preset
+                    yield Finding((*location, key), f"via {by}, {what}", key, at="key")
+                    break
+
+    def _of(self, rule: LinkRule) -> Iterator[str]:
+        """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
+
+        If there are only wires, which all support the same settings, only a rule's `via` counts.
+        """
+        profiles = self._profiles
+        if rule.via is not None:
+            yield rule.via
+            return
+        if not any(profiles.base(way).is_on_air for way in ("", *profiles.network.radios)):
+            return
+        for source, destination in self._pairs:
+            if any(met is rule for met in profiles.rules_for(source, destination)):
                 way = profiles.way(rule, source, destination)
                 if way is not None:
                     yield way
+
+    @cached_property
+    def _pairs(self) -> list[tuple[str, str]]:
+        """Directed pairs of endpoints, one for each two kinds; a pair on one body goes another way than one on two."""
+        kinds = _kinds(self._profiles, self._ends)
+        apart = permutations(_representatives(self._profiles, kinds), 2)
+        on_body: dict[str, list[str]] = {}
+        for end in self._ends:
+            on_body.setdefault(self._profiles.body(end), []).append(end)
+        together = {
+            (kinds[one], kinds[other]): (one, other)
+            for members in on_body.values()
+            for one, other in islice(permutations(members, 2), PAIRS_MAX)
+        }
+        return list(islice(chain(together.values(), apart), PAIRS_MAX))
+
+
+def _kinds(profiles: Profiles, ends: Sequence[str]) -> dict[str, Kind]:
+    """Return what rules and radios know of each endpoint: the selectors that match it, and its radios."""
+    rules = profiles.network.links
+    globs = sorted({glob for rule in rules for glob in (*(rule.from_ or ()), *(rule.to or ()), *(rule.between or ()))})
+    matches = [re.compile(translate(glob)).match for glob in globs]
+    found: dict[str, Kind] = {}
+    for end in ends:
+        matched = tuple(number for number, match in enumerate(matches) if match(end))
+        found[end] = matched, tuple(profiles.radios_of(end))
+    return found
+
+
+def _representatives(profiles: Profiles, kinds: Mapping[str, Kind]) -> list[str]:
+    """Return one endpoint of each kind, and one on another body where there is one, in their order."""
+    bodies: dict[Kind, list[str]] = {}
+    found = []
+    for end, kind in kinds.items():
+        known = bodies.setdefault(kind, [])
+        if len(known) < 2 and profiles.body(end) not in known:
+            known.append(profiles.body(end))
+            found.append(end)
+    return found
 
 
 def place_findings(deployment: Deployment) -> Iterator[Finding]:
@@ -196,12 +254,14 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
     network, ends = deployment.network, deployment.endpoints()
     profiles = Profiles(network, deployment.carriers())
     on_air = {way for way in ("", *network.radios) if profiles.base(way).is_on_air}
+    others: list[str] = []
     for end in ends if on_air else ():
         robot = deployment.robots.get(profiles.body(end))
         has_body = robot is not None and (deployment.is_hall or robot.model != BODILESS)
         if has_body or network.place_of(end) is not None:
             continue
-        pairs = [pair for other in ends if other != end for pair in ((end, other), (other, end))]
+        others = others or _representatives(profiles, _kinds(profiles, ends))
+        pairs = [pair for other in others if other != end for pair in ((end, other), (other, end))]
         met = ((rule, profiles.way(rule, *pair)) for pair in pairs for rule in profiles.rules_for(*pair))
         found = next(((rule, way) for rule, way in met if way in on_air), None)
         if found is not None:

@@ -3,23 +3,28 @@
 Like `checks`, it reads plain data and skips malformed values.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
+from itertools import chain
+from typing import Any
 
 from foosim.common import names, units
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.common.names import nearest_name
 from foosim.common.units import format_ns
-from foosim.deployment.checks import View, quoted
+from foosim.deployment.checks import View
+
+Said = dict[tuple[int, str], dict[str, list[str]]]
+"""By a player's `hears` (its id) and a selector: the channels that it subscribes to, with endpoints that have them."""
 
 
 def check_timing(data: object) -> Iterator[Finding]:
     """All problems of a deployment's times, found lazily."""
     view = View(data)
     yield from _clients(view)
+    known: Said = {}
     for player in view.players:
-        yield from _arrivals(view, player)
+        yield from _arrivals(view, player, known)
     tick_ns = view.tick_ns()
     if tick_ns is None:
         return
@@ -32,9 +37,12 @@ def check_timing(data: object) -> Iterator[Finding]:
 
 def _sampled(view: View) -> Iterator[Location]:
     """Sensors and lockstep clients: their ticks follow from rate and offset."""
+    seen: set[int] = set()
     for robot in view.robots:
-        for channel in view.mapping("robots", robot, "sensors"):
-            yield "robots", robot, "sensors", channel
+        sensors = view.mapping("robots", robot, "sensors")
+        if id(sensors) not in seen:  # robots that are like a template share its sensors
+            seen.add(id(sensors))
+            yield from (("robots", robot, "sensors", channel) for channel in sensors)
     for section, is_default in (("players", True), ("clients", False)):
         for name in view.mapping(section):
             if _in_lockstep(view, section, name, is_default=is_default):
@@ -108,8 +116,11 @@ def _clients(view: View) -> Iterator[Finding]:
             yield Finding((section, name, "offset"), what, "offset", at="key")
 
 
-def _arrivals(view: View, player: str) -> Iterator[Finding]:
-    """A client that acts at arrival is in lockstep, has no ticks of its own, and subscribes to its `arrivals`."""
+def _arrivals(view: View, player: str, known: Said) -> Iterator[Finding]:
+    """A client that acts at arrival is in lockstep, has no ticks of its own, and subscribes to its `arrivals`.
+
+    `known` keeps what is found out about the selectors.
+    """
     at: Location = ("players", player)
     arrivals = view.mapping(*at, "arrivals")
     if view.get(*at, "act") != "arrival":
@@ -125,31 +136,35 @@ def _arrivals(view: View, player: str) -> Iterator[Finding]:
         yield Finding((*at, "offset"), what, "offset", at="key")
     if not arrivals:
         yield Finding((*at, "arrivals"), "missing key of a player that acts at arrival", "arrivals", at="missing")
-    heard = _heard(view, player)
-    for glob in arrivals:
-        matched = {source for source in heard if names.is_selector(glob) and fnmatchcase(source, glob)}
-        if names.is_selector(glob) and not matched:
-            nearest = quoted(nearest_name(glob, heard))
+    robots, hears = view.mapping(*at, "robots"), view.mapping(*at, "hears")
+    for glob in filter(names.is_selector, arrivals):
+        said = known.get((id(hears), glob))
+        if said is None:  # players that are like a template share what they hear
+            said = known[id(hears), glob] = _said(view, hears, glob)
+        heard = {name for robot in robots if fnmatchcase(robot, glob) for _, name in view.texts(*at, "robots", robot)}
+        heard |= {channel for channel, sources in said.items() if any(source != player for source in sources)}
+        if not heard:
+            others = (name for each in hears for name in view.matched(each) if name != player)
+            nearest = view.nearest(glob, chain(robots, others))
             yield Finding((*at, "arrivals", glob), "a selector that matches nothing it hears", glob, nearest, at="key")
             continue
-        channels = sorted({channel for source in matched for channel in heard[source]})
         for index, channel in view.texts(*at, "arrivals", glob):
-            if matched and channel not in channels:
-                what = f"no channel that it hears of {glob}: valid are {', '.join(channels)}"
+            if channel not in heard:
+                what = f"no channel that it hears of {glob}: valid are {', '.join(sorted(heard))}"
                 yield Finding((*at, "arrivals", glob, index), what, channel)
 
 
-def _heard(view: View, player: str) -> dict[str, set[str]]:
-    """The channels that a player subscribes to, by endpoint."""
-    heard: dict[str, set[str]] = {}
-    for robot in view.mapping("players", player, "robots"):
-        heard.setdefault(robot, set()).update(name for _, name in view.texts("players", player, "robots", robot))
-    endpoints = [*view.robots, *view.players, *view.clients]
-    for glob in view.mapping("players", player, "hears"):
-        for endpoint in endpoints:
-            if names.is_selector(glob) and endpoint != player and fnmatchcase(endpoint, glob):
-                said = {name for _, name in view.texts("players", player, "hears", glob)}
-                if endpoint in view.robots:
-                    said &= {*view.mapping("robots", endpoint, "sensors"), names.CHANNEL_ECHO}
-                heard.setdefault(endpoint, set()).update(said)
-    return {endpoint: channels for endpoint, channels in heard.items() if channels}
+def _said(view: View, hears: Mapping[str, Any], glob: str) -> dict[str, list[str]]:
+    """The channels to which `hears` subscribes of endpoints that a selector matches, each with two of these."""
+    said: dict[str, list[str]] = {}
+    matched = {*view.matched(glob)}
+    for selector, channels in hears.items():
+        texts = [name for name in (channels if isinstance(channels, list) else ()) if isinstance(name, str)]
+        for source in view.matched(selector) if names.is_selector(selector) and texts else ():
+            if source not in matched:
+                continue
+            own = (*view.mapping("robots", source, "sensors"), names.CHANNEL_ECHO) if source in view.robots else texts
+            for channel in texts:
+                if channel in own and len(sources := said.setdefault(channel, [])) < 2 and source not in sources:
+                    sources.append(source)
+    return {channel: sources for channel, sources in said.items() if sources}

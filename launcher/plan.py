@@ -15,10 +15,11 @@ from foosim.common.addresses import Address, check_listen
 from foosim.common.errors import BadValue, Refused, read_at
 from foosim.common.units import Pace, parse_ns, parse_pace
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text, refuse_findings
+from foosim.deployment.loader import apply_sets, load_deployment, refuse_findings
 from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import VHUB, Deployment, places
 from foosim.deployment.table_clearance import clearance_findings
+from foosim.deployment.text.files import read_source_file
 from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.protocol import identity
 from foosim.runtime.run_folder import RunFolder
@@ -90,7 +91,7 @@ def check_models_here(plan: Plan) -> None:
 
     if VHUB not in places(plan.deployment):
         file, network = plan.options.file, plan.deployment.network
-        check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
+        check_link_models(network, read_source_file(file), str(file), plan.options.all_sets)
 
 
 def check_players_here(plan: Plan) -> None:
@@ -101,27 +102,27 @@ def check_players_here(plan: Plan) -> None:
     findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
     if findings:
         file = plan.options.file
-        refuse_findings(read_deployment_text(file), str(file), findings, plan.options.all_sets)
+        refuse_findings(read_source_file(file), str(file), findings, plan.options.all_sets)
 
 
 def check_meshes(deployment: Deployment, options: RunOptions) -> None:
     """Raise DeploymentError for meshes that bodies start in or pass through. Their files must have been read."""
     findings = [*start_findings(deployment), *clearance_findings(deployment)]
     if findings:
-        refuse_findings(read_deployment_text(options.file), str(options.file), findings, options.all_sets)
+        refuse_findings(read_source_file(options.file), str(options.file), findings, options.all_sets)
 
 
 def make_plan(options: RunOptions) -> Plan:
     """Check all options before any process is started; raises Refused."""
     name = str(options.file)
-    text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
+    text = apply_sets(read_source_file(options.file), name, options.all_sets)
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     if any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values()):
         from foosim.node.engines.mesh_trial import check_models
 
         check_models(deployment, name, text)
-    check_meshes(deployment, options)
+        check_meshes(deployment, options)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else read_at("--pace", parse_pace, options.pace)

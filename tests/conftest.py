@@ -18,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
-from foosim.deployment.loader import apply_sets
+from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime.roles.loop import GC_THRESHOLDS
 from tests.meter import Burden, Meter
@@ -84,7 +84,7 @@ WAREHOUSE = Path(__file__).parent.parent / "deploy" / "warehouse.yaml"
 def fleet_text() -> Callable[..., str]:
     """The text of a small hall: so many of the warehouse's rovers, with their controllers, and settings."""
 
-    tree, _ = read_tree(WAREHOUSE.read_text(), locate_in(WAREHOUSE.name))
+    tree, _ = read_tree(expanded_text(WAREHOUSE.read_text(), WAREHOUSE.name), locate_in(WAREHOUSE.name))
     assert tree is not None
     whole: Any = plain(tree)
 

@@ -30,21 +30,24 @@ _COMPONENT: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _LETTERS: Final = "letters, digits, _, - and . (not at the beginning)"
 
 
-def path_problem(path: str) -> str:
-    """Return why a text is no path inside a folder; empty if it is one. The file system is not read."""
+def path_problem(path: str, folder: str = "the asset folder") -> str:
+    """Return why a text is no path inside a folder, as messages call it; empty if it is one.
+
+    The file system is not read.
+    """
     if len(path) > PATH_LENGTH_MAX:
         return f"a path of more than {PATH_LENGTH_MAX} characters"
     if ":" in path:
-        return "a path inside the asset folder has no scheme and no drive"
+        return f"a path inside {folder} has no scheme and no drive"
     if path.startswith(("/", "\\", "~")):
-        return "a path inside the asset folder is relative"
+        return f"a path inside {folder} is relative"
     components = path.split("/")
     if any(component in ("", ".", "..") for component in components):
-        return "a path inside the asset folder has no empty component, no . and no .."
+        return f"a path inside {folder} has no empty component, no . and no .."
     if len(components) > PATH_DEPTH_MAX:
         return f"a path of more than {PATH_DEPTH_MAX} components"
     if not all(_COMPONENT.fullmatch(component) for component in components):
-        return f"a path inside the asset folder has {_LETTERS} between its slashes"
+        return f"a path inside {folder} has {_LETTERS} between its slashes"
     return ""
 
 

@@ -11,7 +11,8 @@ from foosim.common.errors import BadValue, Refused
 from foosim.common.units import format_ns
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import Answered
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.text.files import read_source_file
 
 
 def branch_answer(recording: Recording, tick: int) -> Answered:
@@ -40,7 +41,7 @@ def _near(path: Path) -> Path:
 def _remark(recording: Recording, file: Path) -> str:
     """Return a note about the deployment's file, empty when it is the captured one."""
     try:
-        there = load_deployment(read_deployment_text(file), str(file))
+        there = load_deployment(read_source_file(file), str(file))
     except Refused:
         return f"  # {file} is not here: name the file that the run was started with"
     if there.model_dump() != recording.deployment.model_dump():

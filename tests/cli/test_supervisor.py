@@ -11,8 +11,9 @@ import pytest
 
 from foosim.cli import supervisor
 from foosim.common.errors import Refused
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Capture
+from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher.new_capture import check_capture, check_rooms
 from foosim.launcher.pki import certificates
 from foosim.node.main import main as run_node

@@ -27,6 +27,7 @@ from foosim.world.robots.foosball_rod import RodRobot
 from foosim.world.robots.overhead_camera import CameraRobot
 from foosim.world.sensors.ball import BallSettings
 from foosim.world.sensors.encoder import EncoderSettings
+from tests.deployment.halls import BATTERY, PATROL, POSE, hall
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
@@ -186,6 +187,57 @@ def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse() ->
             inner = inner[int(step)] if step.isdigit() else inner[step]
         inner[last] = data_of(value)
         assert list(validator.iter_errors(data)), change
+
+
+def refused_by_schema(text: str) -> bool:
+    """Whether the JSON Schema refuses a text."""
+    return bool(list(Draft202012Validator(json.loads(deployment_schema_text())).iter_errors(data_of(text))))
+
+
+SHORT = hall(
+    f"""\
+include: [a.yaml]
+templates:
+  rover: {{model: rover, sensors: {{pose: {POSE}, battery: {BATTERY}}}}}
+  bare: {{like: rover, sensors: {{battery: null, pose: {{rate: 1 Hz}}}}}}
+  shelf: {{shape: box, height: 1 m}}
+  pilot: {{class: '{PATROL}', on: $robot, process: fleet-$node, robots: {{$robot: [pose], 'x-*': []}}}}
+robots:
+  a: {{like: bare, x: 1 m, y: 1 m}}
+  r: {{like: rover, count: 3, spacing: {{x: 1 m}}, x: 1 m, y: 1 m}}
+  r-2: {{charge: 1 %}}
+  s: {{model: station, x: 1 m, y: 1 m, count: 2}}
+scenery: {{t: {{like: shelf, count: 2, length: 1 m}}}}
+nodes: {{one: {{robots: [a, 'r-*', s-1..2, rest]}}}}
+players: {{pilot$1: {{like: pilot, each: r-*}}, pilot2: {{rate: 1 Hz}}}}
+clients: {{c-$robot: {{each: 'r-?', on: $robot}}}}
+"""
+)
+
+
+def test_the_json_schema_takes_what_is_abbreviated() -> None:
+    assert not refused_by_schema(SHORT)
+    for name in ("warehouse.yaml", "cluster.yaml"):
+        assert not refused_by_schema((DEPLOY / name).read_text())
+    for given, wrong in (
+        ("like: bare", "lik: bare"),
+        ("like: bare", "like: 5"),
+        ("count: 3", "count: 0"),
+        ("count: 3", "count: many"),
+        ("spacing: {x: 1 m}", "spacing: {w: 1 m}"),
+        ("charge: 1 %", "charge: 1 m"),
+        ("charge: 1 %", "charg: 1 %"),
+        ("model: station, x: 1 m", "model: station"),
+        ("rate: 1 Hz}}}", "rate: 1 kg}}}"),
+        ("shape: box", "shap: box"),
+        ("each: r-*", "each: [r-1]"),
+        ("process: fleet-$node", "process: Fleet"),
+        ("'r-*', s-1", "'R-*', s-1"),
+        ("include: [a.yaml]", "include: {a: 1}"),
+    ):
+        assert given in SHORT
+        assert refused_by_schema(SHORT.replace(given, wrong)), wrong
+    assert refused_by_schema(SHORT.replace("include: [a.yaml]\n", "").replace("seed: 1\n", ""))
 
 
 def test_the_defaults_in_the_json_schema_are_written_as_in_a_file() -> None:

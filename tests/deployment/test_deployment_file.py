@@ -14,7 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
-from foosim.deployment.loader import PROBLEMS_MAX, apply_sets, load_deployment, read_deployment_text
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.text.files import read_deployment_text
+from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 
 CASES = Path(__file__).with_name("deployment_problems.txt")

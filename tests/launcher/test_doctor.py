@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 
 from foosim.cli.doctor import app
 from foosim.common.errors import Refused
-from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Capture, Deployment
+from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher.doctor import checks as doctor
 from foosim.launcher.doctor.checks import CHECKS, Case, Finding, examine, is_well
 from foosim.launcher.new_capture import check_rooms

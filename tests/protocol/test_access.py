@@ -11,8 +11,9 @@ import zenoh
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.files import read_deployment_text
 from foosim.protocol.access import access_control, access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
 from foosim.protocol.identity import ROLES, identities_of

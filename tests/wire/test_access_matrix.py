@@ -18,8 +18,9 @@ import yaml
 import zenoh
 
 from foosim.common.addresses import parse_address
-from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher.pki import certificates
 from foosim.protocol.access import access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane

@@ -16,7 +16,7 @@ from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.deployment.checks import quoted
-from foosim.deployment.loader import refuse_findings
+from foosim.deployment.loader import Text, refuse_findings
 from foosim.deployment.network.impairments import OwnModel
 from foosim.deployment.network.rules import Network
 from foosim.world.scene import Vector
@@ -164,7 +164,7 @@ def models_of(network: Network) -> Iterator[tuple[Location, OwnModel]]:
             yield ("network", "links", number, "model"), rule.model
 
 
-def check_link_models(network: Network, text: str, name: str, sets: Sequence[str] = ()) -> None:
+def check_link_models(network: Network, text: Text, name: str, sets: Sequence[str] = ()) -> None:
     """Refuse link models that cannot be loaded here, each with its place in the file.
 
     `text`, `name` and `sets` are what the network was loaded from. Raises DeploymentError.

@@ -1,0 +1,116 @@
+"""Where the problems of an expanded deployment are in its text, and which of them are one.
+
+Findings name locations in the expanded data. The place is that of what was written there: a template's line for what an
+entry has from it. What is wrong with a template would be found again with each entry that is like it, and with each
+member of a fleet; it is reported once, at its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import Final
+
+from foosim.common.errors import describe
+from foosim.common.finding import Finding, Location, path_text
+from foosim.deployment.text.expand import ENTRIES
+from foosim.deployment.text.templates import TEMPLATES
+from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree
+
+FINDINGS_MAX: Final = 2_000
+"""Findings that are looked at, also of those that are the same problem: each may have thousands of names to compare."""
+_AS_WRITTEN: Final = (TEMPLATES, "nodes")
+"""Sections whose locations are those in the text: an index of a node's list has no meaning when it is expanded."""
+
+Key = tuple[Place, str]
+
+
+class Places:
+    """The places of one deployment's findings.
+
+    `written` is the tree as it is in the text, `expanded` what the findings are about.
+    """
+
+    def __init__(self, written: Tree, expanded: Tree, templates: Mapping[str, tuple[Fields, Place]]) -> None:
+        self._written = written
+        self._expanded = expanded
+        if templates and isinstance(expanded, Fields):
+            entries = Fields(expanded.place, {name: whole for name, (whole, _) in templates.items()})
+            entries.keys = {name: place for name, (_, place) in templates.items()}
+            values, keys = {**expanded.values, TEMPLATES: entries}, {**expanded.keys, TEMPLATES: expanded.place}
+            self._expanded = Fields(expanded.place, values, keys)
+
+    def problem(self, finding: Finding, *, is_made: bool = False) -> Problem:
+        """Return the problem that a finding is. `is_made`: it is one of an entry as it is made, whatever made it."""
+        place, is_key, depth = self._find(finding)
+        if finding.other is not None:
+            there = self._find(finding.other)
+            if place.rank < there[0].rank and there[0].rank > SETS_RANK:  # it was set after the file
+                finding, (place, is_key, depth) = finding.other, there
+        location = finding.location
+        written = (self._keys if is_key else self._values).get(place, ())
+        if written[:1] and written[0] in _AS_WRITTEN and not (is_made and written[0] == TEMPLATES):
+            location = (*written, *location[depth:])
+        path = path_text(location if finding.at == "value" else location[:-1])
+        text = describe(finding.what, finding.value, finding.nearest)
+        return Problem(place, f"{path}: {text}" if path else text)
+
+    def distinct(self, findings: Iterable[Finding], broken: Collection[Location]) -> Iterator[Finding]:
+        """Yield the findings that are no other's problem, and not of broken entries; lazily, and so many at most."""
+        met: set[Key] = set()
+        for number, finding in enumerate(findings):
+            if number == FINDINGS_MAX:
+                return
+            key = self._find(finding)[0], _nameless(finding)
+            if key not in met and finding.location[:2] not in broken:
+                met.add(key)
+                yield finding
+
+    def _find(self, finding: Finding) -> tuple[Place, bool, int]:
+        """Return the place of the value, the key, or the mapping without the key; the nearest enclosing one of none.
+
+        Also whether it is a key's, and how many steps of the location lead there.
+        """
+        node, place, depth = self._expanded, self._expanded.place, 0
+        is_key = False
+        for step in finding.location:
+            if isinstance(node, Fields) and isinstance(step, str) and step in node.values:
+                place, node, is_key = node.keys[step], node.values[step], True
+            elif isinstance(node, Items) and isinstance(step, int) and step < len(node.items):
+                node = node.items[step]
+                place, is_key = node.place, False
+            else:
+                return node.place, False, depth
+            depth += 1
+        return (place, is_key, depth) if finding.at == "key" else (node.place, False, depth)
+
+    @cached_property
+    def _values(self) -> dict[Place, Location]:
+        return {place: location for place, is_key, location in _walk(self._written, ()) if not is_key}
+
+    @cached_property
+    def _keys(self) -> dict[Place, Location]:
+        return {place: location for place, is_key, location in _walk(self._written, ()) if is_key}
+
+
+def _walk(node: Tree, location: Location) -> Iterator[tuple[Place, bool, Location]]:
+    """Yield the place of each value and key of a tree, whether it is a key's, and the location."""
+    yield node.place, False, location
+    if isinstance(node, Fields):
+        for key, value in node.values.items():
+            yield node.keys[key], True, (*location, key)
+            yield from _walk(value, (*location, key))
+    elif isinstance(node, Items):
+        for index, item in enumerate(node.items):
+            yield from _walk(item, (*location, index))
+
+
+def _nameless(finding: Finding) -> str:
+    """Return what a finding says, without the names of the entry that it is about, and of what that is for."""
+    if finding.location[:1] == ("nodes",):
+        return finding.what  # of each robot that a selector matches
+    text = describe(finding.what, finding.value)
+    if finding.location[:1] and finding.location[0] in ENTRIES:
+        for name in (*finding.location[1:2], *finding.location[3:4]):
+            text = text.replace(str(name), "*") if isinstance(name, str) else text
+    return text

@@ -1,0 +1,150 @@
+"""Templates: what entries have that are `like` one of them.
+
+`templates:` of a deployment has partial entries by name. An entry that is `like` a template has the template's keys;
+its own come over them: a mapping over a mapping is merged key by key, anything else replaces what the template has, and
+`null` takes it away. A template may be like another one. Nodes are shared, so that an entry without keys of its own
+costs nothing, and keep their places: what is wrong with a template is wrong there.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.common import limits
+from foosim.common.finding import Location
+from foosim.common.names import NAME_RULE, is_name, nearest_name
+from foosim.deployment.text.report import Report
+from foosim.deployment.text.yaml import Fields, Leaf, Place, Tree, plain
+
+TEMPLATES: Final = "templates"
+LIKE: Final = "like"
+OF_ENTRIES: Final = ("count", "spacing", "each")
+"""Keys that an entry has, and no template: how many there are is said where they are."""
+
+
+def merged(base: Tree, own: Tree) -> Tree:
+    """Return a node over another one; neither is changed, and what only one of them has is shared."""
+    if not (isinstance(base, Fields) and isinstance(own, Fields)):
+        return own
+    fields = Fields(own.place, dict(base.values), dict(base.keys))
+    for key, value in own.values.items():
+        if key not in base.values:
+            fields.values[key], fields.keys[key] = value, own.keys[key]
+        elif isinstance(value, Leaf) and value.value is None:
+            del fields.values[key], fields.keys[key]
+        else:
+            fields.values[key], fields.keys[key] = merged(base.values[key], value), own.keys[key]
+    return fields
+
+
+def without(fields: Fields, *keys: str) -> Fields:
+    """Return a mapping without some keys; its nodes are shared."""
+    left = {key: value for key, value in fields.values.items() if key not in keys}
+    return Fields(fields.place, left, {key: fields.keys[key] for key in left})
+
+
+class Templates:
+    """The templates of a deployment's tree. What is wrong with them goes into the report, once."""
+
+    def __init__(self, tree: Fields, report: Report) -> None:
+        self._report = report
+        self._written: dict[str, Fields] = {}
+        self._keys: dict[str, Place] = {}
+        self._refused: set[str] = set()
+        self._whole: dict[str, Fields | None] = {}
+        self._sections: dict[str, set[str]] = {}
+        self._reported: set[Place] = set()
+        section = tree.values.get(TEMPLATES)
+        if isinstance(section, Fields):
+            self._read(section)
+        elif section is not None:
+            report.add(section.place, (TEMPLATES,), "not a mapping", plain(section))
+
+    def _read(self, section: Fields) -> None:
+        if len(section.values) > limits.TEMPLATES_MAX:
+            what = f"more than {limits.TEMPLATES_MAX} templates"
+            self._report.add(section.place, (TEMPLATES,), what, len(section.values))
+            self._report.stop()
+        for name, template in section.values.items():
+            path: Location = (TEMPLATES, name)
+            if not is_name(name):
+                self._report.add(section.keys[name], (TEMPLATES,), f"not a template's name ({NAME_RULE})", name)
+            elif not isinstance(template, Fields):
+                self._report.add(template.place, path, "not a mapping", plain(template))
+            else:
+                for key in OF_ENTRIES:
+                    if key in template.values:
+                        what = "a key of entries, which a template does not have"
+                        self._report.add(template.keys[key], path, what, key)
+                self._written[name] = without(template, *OF_ENTRIES)
+                self._keys[name] = section.keys[name]
+                continue
+            self._refused.add(name)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the templates."""
+        return list(self._written)
+
+    def applied(self, entry: Tree, path: tuple[str, str]) -> Tree:
+        """Return an entry of a section with what it is like. Where that cannot be said the entry is broken."""
+        like = entry.values.get(LIKE) if isinstance(entry, Fields) else None
+        if like is None or not isinstance(entry, Fields):
+            return entry
+        template, own = self._meant(like, (*path, LIKE), ()), without(entry, LIKE)
+        if template is None:
+            self._report.broken.add(path)
+            return own
+        self._use(like, path[0])
+        return merged(template, own)
+
+    def whole(self, name: str, chain: tuple[str, ...] = ()) -> Fields | None:
+        """Return a template with what it is like; None, reported, where that cannot be said."""
+        if name not in self._whole:
+            template = self._written[name]
+            like = template.values.get(LIKE)
+            found: Tree | None = template
+            if like is not None:
+                base = self._meant(like, (TEMPLATES, name, LIKE), (*chain, name))
+                found = None if base is None else merged(base, without(template, LIKE))
+            assert found is None or isinstance(found, Fields), "two mappings"
+            self._whole[name] = found
+        return self._whole[name]
+
+    def _meant(self, like: Tree, path: Location, chain: tuple[str, ...]) -> Fields | None:
+        """Return the whole template that `like` names, at a path; `chain` are the templates that are like it."""
+        name, nearest = plain(like), None
+        if not isinstance(name, str):
+            what = "not the name of a template"
+        elif name in self._refused:
+            return None
+        elif name not in self._written:
+            what, nearest = "unknown template", nearest_name(name, self._written)
+        elif name in chain:
+            what = f"a template that is like itself ({' is like '.join([*chain[chain.index(name) :], name])})"
+        elif len(chain) >= limits.LIKE_DEPTH_MAX:
+            what = f"more than {limits.LIKE_DEPTH_MAX} templates that are like one another"
+        else:
+            return self.whole(name, chain)
+        if like.place not in self._reported:  # by another entry of a fleet
+            self._reported.add(like.place)
+            self._report.add(like.place, path, what, name, None if nearest is None else repr(nearest))
+        return None
+
+    def _use(self, like: Tree, section: str) -> None:
+        """Note that an entry of a section is like a template, and with it like those that this is like."""
+        while isinstance(like, Leaf) and isinstance(like.value, str) and like.value in self._written:
+            known = self._sections.setdefault(like.value, set())
+            if section in known:
+                return
+            known.add(section)
+            next_like = self._written[like.value].values.get(LIKE)
+            if next_like is None:
+                return
+            like = next_like
+
+    def unused(self) -> dict[str, tuple[Fields, Place]]:
+        """Return the whole templates that no entry is like, each with the place of its name."""
+        left = [name for name in self._written if name not in self._sections]
+        found = {name: (self.whole(name), self._keys[name]) for name in left}
+        return {name: (whole, place) for name, (whole, place) in found.items() if whole is not None}

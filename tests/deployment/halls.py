@@ -1,0 +1,72 @@
+"""Small halls for tests of what is abbreviated in a deployment: their text, and what is said about a bad one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import Text, apply_sets, load_deployment
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
+
+WAREHOUSE = Path(__file__).parents[2] / "deploy" / "warehouse.yaml"
+
+
+def head() -> str:
+    """Everything of a hall but its robots, nodes and players, in eight lines; the hall is that of the warehouse."""
+    tree, _ = read_tree(WAREHOUSE.read_text(), locate_in("warehouse.yaml"))
+    assert tree is not None
+    return f"""\
+format: 1
+world: small
+seed: 1
+tick: 20 ms
+substeps: 1
+engine: pure
+pace: fast
+hall: {json.dumps(plain(tree)["hall"])}
+"""
+
+
+HEAD = head()
+HEAD_LINES = HEAD.count("\n")
+POSE = "{kind: pose, rate: 5 Hz, position_noise: 20 mm, heading_noise: 1 deg}"
+BATTERY = "{kind: battery, rate: 1 Hz, noise: 50 mV}"
+ALL_ON_ONE = "nodes: {one: {robots: ['*']}}\n"
+PATROL = "foosim.players.warehouse_rover:Patrol"
+
+
+def hall(rest: str, *, head: str = HEAD) -> str:
+    """Return the text of a hall; robots are on one node unless `rest` has nodes."""
+    return head + rest + ("" if "\nnodes:" in f"\n{rest}" else ALL_ON_ONE)
+
+
+def long_robot(x: str, y: str, **more: object) -> dict[str, object]:
+    """Return a rover that is written out, with a pose and a battery."""
+    sensors = {
+        "pose": {"kind": "pose", "rate": "5 Hz", "position_noise": "20 mm", "heading_noise": "1 deg"},
+        "battery": {"kind": "battery", "rate": "1 Hz", "noise": "50 mV"},
+    }
+    return {"model": "rover", "x": x, "y": y, "sensors": sensors, **more}
+
+
+def same(short: str, robots: dict[str, object], **sections: object) -> None:
+    """Assert that a hall is the same as one whose robots and other sections are written out."""
+    written = "".join(f"{name}: {json.dumps(value)}\n" for name, value in {"robots": robots, **sections}.items())
+    assert load_deployment(hall(short), "short").model_dump() == load_deployment(hall(written), "long").model_dump()
+
+
+def problems_of(text: Text, sets: Sequence[str] = (), name: str = "f") -> list[str]:
+    """Return the lines of the report on a bad text; places of its own are counted from behind the head."""
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(text, name, sets)
+    assert str(error.value) == "\n".join(error.value.problems)
+    return [_behind_head(line, name) for line in error.value.problems]
+
+
+def _behind_head(line: str, name: str) -> str:
+    file, number, rest = f"{line}::".split(":", 2)
+    return f"{int(number) - HEAD_LINES}:{rest}".removesuffix("::") if file == name else line

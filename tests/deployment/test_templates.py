@@ -1,0 +1,294 @@
+"""Templates: what is `like` one has its keys, its own come over them, and what is wrong is said where it is written."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foosim.common import limits
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
+from foosim.deployment.text.expand import expand
+from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
+from tests.deployment.halls import BATTERY, PATROL, POSE, WAREHOUSE, hall, long_robot, problems_of, same
+
+ROVER = f"""\
+templates:
+  rover:
+    model: rover
+    sensors:
+      pose: {POSE}
+      battery: {BATTERY}
+"""
+
+
+def test_a_robot_has_the_keys_of_its_template_and_its_own_over_them() -> None:
+    same(
+        ROVER + "robots: {a: {like: rover, x: 1 m, y: 2 m}, b: {like: rover, x: 3 m, y: 2 m, charge: 50 %}}\n",
+        {"a": long_robot("1 m", "2 m"), "b": long_robot("3 m", "2 m", charge="50 %")},
+    )
+
+
+def test_mappings_are_merged_key_by_key_and_all_else_replaces() -> None:
+    with_scenery = ROVER + "  shelf: {shape: box, length: 1 m, width: 1 m, height: 1 m, radio: {loss: 12 dB}}\n"
+    own = "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {pose: {rate: 10 Hz}}}}\n"
+    robot: Any = long_robot("1 m", "2 m")
+    robot["sensors"]["pose"]["rate"] = "10 Hz"
+    box = {"shape": "box", "length": "1 m", "width": "1 m", "height": "1 m"}
+    things = {"s": {**box, "y": "9 m", "radio": "wood"}, "t": {**box, "y": "7 m", "radio": {"loss": "3 dB"}}}
+    scenery = "scenery: {s: {like: shelf, y: 9 m, radio: wood}, t: {like: shelf, y: 7 m, radio: {loss: 3 dB}}}\n"
+    same(with_scenery + own + scenery, {"a": robot}, scenery=things)
+
+
+def test_null_takes_away_what_the_template_has() -> None:
+    robot: Any = long_robot("1 m", "2 m")
+    del robot["sensors"]["battery"]
+    same(ROVER + "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {battery: null}}}\n", {"a": robot})
+    null = "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {other: null}}}\n"
+    assert problems_of(hall(ROVER + null)) == ["7:60: robots.a.sensors.other: not a mapping, null"]
+
+
+def test_a_template_may_be_like_another_one() -> None:
+    heavy = "  heavy: {like: rover, charge: 40 %, sensors: {battery: {noise: 10 mV}}}\n  slow: {like: heavy, y: 2 m}\n"
+    robot: Any = long_robot("1 m", "2 m", charge="40 %")
+    robot["sensors"]["battery"]["noise"] = "10 mV"
+    same(ROVER + heavy + "robots: {a: {like: slow, x: 1 m}}\n", {"a": robot})
+
+
+def test_players_and_clients_may_be_like_templates() -> None:
+    short = (
+        ROVER
+        + f"  driver: {{class: '{PATROL}', rate: 10 Hz, hears: {{a: [pose]}}, parameters: {{rover: a}}}}\n"
+        + "  ear: {lockstep: true, rate: 5 Hz}\n"
+        + "robots: {a: {like: rover, x: 1 m, y: 2 m}}\n"
+        + "players: {p: {like: driver, on: a, robots: {a: [battery]}}}\nclients: {c: {like: ear, rate: 10 Hz}}\n"
+    )
+    player = {"class": PATROL, "rate": "10 Hz", "hears": {"a": ["pose"]}, "parameters": {"rover": "a"}}
+    same(
+        short,
+        {"a": long_robot("1 m", "2 m")},
+        players={"p": {**player, "on": "a", "robots": {"a": ["battery"]}}},
+        clients={"c": {"lockstep": True, "rate": "10 Hz"}},
+    )
+
+
+# --- what is wrong ----------------------------------------------------------------------------------------------------
+
+TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\n" for n in range(20))
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (("rate: 5 Hz", "rate: 5 Hx"),
+         "5:32: templates.rover.sensors.pose.rate: not a rate (a number and one of Hz, kHz, mHz), '5 Hx', "
+         "nearest is '5 Hz'"),
+        (("rate: 5 Hz", "rate: 3 Hz"),
+         "5:32: templates.rover.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
+         "nearest is '50/17 Hz' and '3.125 Hz'"),
+        (("heading_noise", "hading_noise: 1 deg, heading_noise"),
+         "5:61: templates.rover.sensors.pose: unknown key, 'hading_noise', nearest is 'heading_noise'"),
+        (("position_noise: 20 mm, ", ""),
+         "5:13: templates.rover.sensors.pose: missing key, 'position_noise'"),
+        (("    model: rover", "    model: rovr"),
+         "3:12: templates.rover.model: not one of camera, rod, rover, station, 'rovr', nearest is 'rover'"),
+        (("    model: rover", "    model: rover\n    colour: red"),
+         "4:5: templates.rover: unknown key, 'colour'"),
+        (("      pose:", "      echo:"),
+         "5:7: robots.r0.sensors: a reserved name, 'echo'"),
+        (("    model: rover", "    model: rover\n    heading: 400 deg"),
+         "4:14: templates.rover.heading: out of range -360 deg to 360 deg, '400 deg'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_template_is_said_there_once(change: tuple[str, str], problem: str) -> None:
+    text = ROVER.replace(*change)
+    assert problems_of(hall(text + TWENTY)) == [problem]
+
+
+def test_what_an_entry_has_beside_its_template_is_wrong_there() -> None:
+    bad = TWENTY.replace("r7: {like: rover, x: -3 m", "r7: {like: rover, x: -3 mm/s")
+    bad = bad.replace("r8: {like: rover, x: -2 m, ", "r8: {like: rover, sensors: {pose: {rate: 3 Hz}}, ")
+    assert problems_of(hall(ROVER + bad)) == [
+        "15:24: robots.r7.x: not a length (a number and one of m, cm, mm, um, km), '-3 mm/s', nearest is '-3 mm'",
+        "16:7: robots.r8: missing key, 'x'",
+        "16:44: robots.r8.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
+        "nearest is '50/17 Hz' and '3.125 Hz'",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rest", "problems"),
+    [
+        ("robots: {a: {like: rovr, x: 1 m, y: 1 m}}\n",
+         ["7:20: robots.a.like: unknown template, 'rovr', nearest is 'rover'"]),
+        ("robots: {a: {like: 7, x: 1 m, y: 1 m}}\n", ["7:20: robots.a.like: not the name of a template, 7"]),
+        ("robots: {a: {like: [rover], x: 1 m, y: 1 m}}\n",
+         ["7:20: robots.a.like: not the name of a template, a list of 1"]),
+        ("  a: {like: b}\n  b: {like: c}\n  c: {like: a}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
+         ["9:13: templates.c.like: a template that is like itself (a is like b is like c is like a), 'a'"]),
+        ("  a: {like: a}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
+         ["7:13: templates.a.like: a template that is like itself (a is like a), 'a'"]),
+        ("  a: 5\n  Big: {}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
+         ["7:6: templates.a: not a mapping, 5",
+          "8:3: templates: not a template's name (a name is a lower case letter, then lower case letters, digits, - "
+          "and _, at most 32 in all), 'Big'"]),
+        ("  a: {like: rover, count: 3, spacing: {x: 1 m}, each: '*'}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
+         ["7:20: templates.a: a key of entries, which a template does not have, 'count'",
+          "7:30: templates.a: a key of entries, which a template does not have, 'spacing'",
+          "7:49: templates.a: a key of entries, which a template does not have, 'each'"]),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_like_something_is_refused_without_consequences(rest: str, problems: list[str]) -> None:
+    assert problems_of(hall(ROVER + rest)) == problems
+
+
+def test_templates_are_a_mapping() -> None:
+    bad = "templates: [a]\nrobots: {base: {model: station, x: 0 m, y: 0 m}}\n"
+    assert problems_of(hall(bad)) == ["1:12: templates: not a mapping, a list of 1"]
+
+
+def test_templates_that_are_like_one_another_end_somewhere() -> None:
+    depth = limits.LIKE_DEPTH_MAX
+    chain = "".join(f"  t{n}: {{like: t{n + 1}}}\n" for n in range(depth + 1)) + f"  t{depth + 1}: {{like: rover}}\n"
+    robots = "robots: {r: {like: t0, x: 1 m, y: 1 m}}\n"
+    assert problems_of(hall(ROVER + chain + robots)) == [
+        f"{6 + depth}:15: templates.t{depth - 1}.like: more than {depth} templates that are like one another, "
+        f"'t{depth}'"
+    ]
+    load_deployment(hall(ROVER + chain + robots.replace("t0", "t3")), "f")
+
+
+@pytest.mark.parametrize(
+    ("template", "problems"),
+    [
+        ("  other: {model: rover, charg: 1 %}\n", ["7:25: templates.other: unknown key, 'charg', nearest is 'charge'"]),
+        ("  other: {model: rover, sensors: {p: {kind: pose, rate: 3 Hz}}}\n",
+         ["7:57: templates.other.sensors.p.rate: not a whole number of ticks of 20 ms, '3 Hz', "
+          "nearest is '50/17 Hz' and '3.125 Hz'"]),
+        ("  other: {model: rower}\n",
+         ["7:18: templates.other.model: not one of camera, rod, rover, station, 'rower', nearest is 'rover'"]),
+        ("  other: {class: 'a.b:C', rate: 1 Hx}\n",
+         ["7:33: templates.other.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', nearest is '1 Hz'"]),
+        ("  other: {shape: box, length: 1 kg}\n",
+         ["7:31: templates.other.length: not a length (a number and one of m, cm, mm, um, km), '1 kg', "
+          "nearest is '1 km'"]),
+        ("  other: {like: rovr}\n", ["7:17: templates.other.like: unknown template, 'rovr', nearest is 'rover'"]),
+        ("  other: {model: rover}\n  third: {x: 1 m}\n", []),
+    ],
+)  # fmt: skip
+def test_a_template_that_nobody_is_like_is_checked_as_far_as_it_goes(template: str, problems: list[str]) -> None:
+    text = hall(ROVER + template + "robots: {a: {like: rover, x: 1 m, y: 1 m}}\n")
+    if problems:
+        assert problems_of(text) == problems
+    else:
+        load_deployment(text, "f")
+
+
+def test_a_robot_in_a_shelf_is_named_whatever_it_is_like() -> None:
+    shelf = "scenery: {shelf: {shape: box, length: 2 m, width: 2 m, height: 2 m}}\n"
+    robots = "robots: {a: {like: rover, x: 5 m}, b: {like: rover, x: 0 m}}\n"
+    text = hall(ROVER + "    y: 0 m\n" + shelf + robots)
+    assert problems_of(text) == ["9:56: robots.b.x: the rover starts in scenery.shelf, '0 m, 0 m'"]
+
+
+# --- canonical text ---------------------------------------------------------------------------------------------------
+
+
+def test_the_canonical_text_has_its_templates_and_is_its_own() -> None:
+    text = hall(ROVER + TWENTY)
+    canonical = apply_sets(text, "f", [])
+    assert canonical.count("position_noise") == 1
+    assert apply_sets(canonical, "c", []) == canonical
+    assert load_deployment(canonical, "c") == load_deployment(text, "f")
+
+
+def test_the_expanded_text_has_none_and_is_the_same_deployment() -> None:
+    expanded = expanded_text(WAREHOUSE.read_text(), "w")
+    assert "templates" not in expanded and "like" not in expanded and "$" not in expanded
+    assert load_deployment(expanded, "e") == load_deployment(WAREHOUSE.read_text(), "w")
+
+
+def test_the_warehouse_is_what_it_would_be_written_out() -> None:
+    """Written out by this test: each entry with its template's keys, its own instead of them."""
+    tree, _ = read_tree(WAREHOUSE.read_text(), locate_in("w"))
+    assert tree is not None
+    data = plain(tree)
+    templates = data.pop("templates")
+    rovers = [f"rover{number:02}" for number in range(1, 21)]
+    assert [name for name in data["robots"] if name != "base"] == rovers
+    for section in ("robots", "scenery"):
+        for name, entry in data[section].items():
+            data[section][name] = {**templates.get(entry.pop("like", ""), {}), **entry}
+    pillar = data["scenery"].pop("pillar")
+    for key in ("count", "spacing"):
+        pillar.pop(key)
+    data["scenery"] |= {f"pillar-{n + 1}": {**pillar, "x": f"{x} m"} for n, x in enumerate((-15, -10, -5, 0))}
+    data["nodes"]["west"]["robots"] = ["base", *rovers[:10]]
+    data["nodes"]["east"]["robots"] = rovers[10:]
+    data["players"] = {"dispatch": data["players"]["dispatch"]}
+    for number, rover in enumerate(rovers, 1):
+        pilot = json.loads(json.dumps(templates["pilot"]).replace("$robot", rover))
+        data["players"][f"pilot{number:02}"] = {**pilot, "process": "fleet-west" if number <= 10 else "fleet-east"}
+    long = load_deployment(write_yaml(data), "long").model_dump()
+    assert load_deployment(WAREHOUSE.read_text(), "short").model_dump() == long
+
+
+def test_a_further_rover_of_the_warehouse_is_one_line() -> None:
+    text = WAREHOUSE.read_text()
+    line = "  rover20: {like: rover, x: 13.75 m, y: -6.25 m, heading: 90 deg, charge: 61 %}\n"
+    assert line in text
+    more = load_deployment(text.replace(line, f"{line}  rover21: {{like: rover, x: 17 m, y: -4 m}}\n"), "w")
+    assert more.owners()["rover21"] == "east"
+    assert (more.players["pilot21"].on, more.players["pilot21"].process) == ("rover21", "fleet-east")
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-9, 9) | st.sampled_from(["x", "$robot", "1 m"]),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.sampled_from("abc"), inner, max_size=3),
+    max_leaves=6,
+)
+ENTRIES = st.dictionaries(st.sampled_from("abc"), VALUES, max_size=3)
+NAMES = st.sampled_from(["t0", "t1", "t2", "t3"])
+
+
+@given(st.dictionaries(NAMES, ENTRIES, max_size=4), st.lists(st.tuples(NAMES | st.none(), ENTRIES), max_size=3))
+def test_expanding_is_merging(templates: dict[str, Any], robots: list[tuple[str | None, Any]]) -> None:
+    """Templates are each like the next one; null takes away; compared with merging plain data."""
+    names = sorted(templates)
+    data: dict[str, Any] = {"templates": {}, "robots": {}}
+    for name, after in zip(names, [*names[1:], None], strict=False):
+        data["templates"][name] = templates[name] | ({"like": after} if after else {})
+    for number, (like, entry) in enumerate(robots):
+        data["robots"][f"r{number}"] = entry | ({"like": like} if like in templates else {})
+    tree, _ = read_tree(write_yaml(data), locate_in("f"))
+    assert tree is not None
+    expanded = expand(tree)
+    assert expanded.problems == [] and isinstance(expanded.tree, Fields)
+
+    def over(base: Any, own: Any) -> Any:
+        if not (isinstance(base, dict) and isinstance(own, dict)):
+            return own
+        kept = {key: value for key, value in base.items() if key not in own or own[key] is not None}
+        return kept | {key: over(kept[key], own[key]) if key in kept else own[key] for key in own if not
+                       (key in base and own[key] is None)}  # fmt: skip
+
+    for number, (like, entry) in enumerate(robots):
+        found: Any = {}
+        for name in reversed(names[names.index(like) :] if like in templates else []):
+            found = over(found, templates[name])
+        found = over(found, entry) if like in templates else entry
+        assert plain(expanded.tree)["robots"][f"r{number}"] == found
+
+
+@given(st.text("ab:{}[]'\" \n$-.*1~", max_size=40))
+def test_any_entry_is_expanded_or_refused(text: str) -> None:
+    whole = hall(
+        f"templates: {{t: {text}}}\nrobots: {{r: {{like: t, {text}}}, s: {text}}}\nplayers: {{'p$1': {text}}}\n"
+    )
+    with suppress(DeploymentError):
+        load_deployment(whole, "f")
