@@ -33,7 +33,7 @@ TICKS: Final = 2_000
 MS: Final = 1_000_000
 LINK: Final = "delay: 1 ms, jitter: {shape: gamma, mean: 1 ms, sd: 1 ms}, loss: 20 %, duplicate: 10 %, order: free"
 LOSSY: Final = f"network.links=[{{id: everything, from: '*', to: '*', {LINK}}}]"
-BUMPER: Final = "kind: encoder, position_noise: 1 mm, angle_noise: 1 deg"
+BUMPER: Final = "kind: encoder, modifiers: [{kind: gaussian_noise, std: {slide: 1 mm, spin: 1 deg}}]"
 BEFORE: Final = (
     f"robots.red.goal.sensors.bumper={{{BUMPER}, rate: 100 Hz}}",
     f"robots.blue.attack.sensors.bumper={{{BUMPER}, rate: 250 Hz}}",
