@@ -20,7 +20,7 @@ def head() -> str:
     tree, _ = read_tree(WAREHOUSE.read_text(), locate_in("warehouse.yaml"))
     assert tree is not None
     return f"""\
-format: 1
+format: 2
 world: small
 seed: 1
 tick: 20 ms
@@ -33,8 +33,8 @@ hall: {json.dumps(plain(tree)["hall"])}
 
 HEAD = head()
 HEAD_LINES = HEAD.count("\n")
-POSE = "{kind: pose, rate: 5 Hz, position_noise: 20 mm, heading_noise: 1 deg}"
-BATTERY = "{kind: battery, rate: 1 Hz, noise: 50 mV}"
+POSE = "{kind: pose, rate: 5 Hz, offset: 0 s}"
+BATTERY = "{kind: battery, rate: 1 Hz, offset: 0 s}"
 ALL_ON_ONE = "nodes: {one: {robots: ['*']}}\n"
 PATROL = "foosim.players.warehouse_rover:Patrol"
 
@@ -47,8 +47,8 @@ def hall(rest: str, *, head: str = HEAD) -> str:
 def long_robot(x: str, y: str, **more: object) -> dict[str, object]:
     """Return a rover that is written out, with a pose and a battery."""
     sensors = {
-        "pose": {"kind": "pose", "rate": "5 Hz", "position_noise": "20 mm", "heading_noise": "1 deg"},
-        "battery": {"kind": "battery", "rate": "1 Hz", "noise": "50 mV"},
+        "pose": {"kind": "pose", "rate": "5 Hz", "offset": "0 s"},
+        "battery": {"kind": "battery", "rate": "1 Hz", "offset": "0 s"},
     }
     return {"model": "rover", "x": x, "y": y, "sensors": sensors, **more}
 

@@ -67,7 +67,7 @@ HOSTILE = {
     ),
     "selectors of links": (ROVER + rows(8, 512) + f"network:\n  links:\n{LINKS}", TOO_MANY),
     "a template that is wrong for each": (
-        ROVER.replace("5 Hz", "5 Hx").replace("noise: 50", "nois: 50") + rows(8, 512), "not a rate"
+        ROVER.replace("5 Hz", "5 Hx").replace("1 Hz, offset", "1 Hz, ofset") + rows(8, 512), "not a rate"
     ),
     "unknown robots for each": (
         ROVER + pilots(robots="{x-$1-$2: [pose], y-$1-$2: [pose]}") + rows(2, 512) + EACH, "unknown robot, 'x-0-1'"

@@ -54,9 +54,9 @@ def test_null_takes_away_what_the_template_has() -> None:
 
 
 def test_a_template_may_be_like_another_one() -> None:
-    heavy = "  heavy: {like: rover, charge: 40 %, sensors: {battery: {noise: 10 mV}}}\n  slow: {like: heavy, y: 2 m}\n"
+    heavy = "  heavy: {like: rover, charge: 40 %, sensors: {battery: {offset: 20 ms}}}\n  slow: {like: heavy, y: 2 m}\n"
     robot: Any = long_robot("1 m", "2 m", charge="40 %")
-    robot["sensors"]["battery"]["noise"] = "10 mV"
+    robot["sensors"]["battery"]["offset"] = "20 ms"
     same(ROVER + heavy + "robots: {a: {like: slow, x: 1 m}}\n", {"a": robot})
 
 
@@ -91,10 +91,10 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
         (("rate: 5 Hz", "rate: 3 Hz"),
          "5:32: templates.rover.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
          "nearest is '50/17 Hz' and '3.125 Hz'"),
-        (("heading_noise", "hading_noise: 1 deg, heading_noise"),
-         "5:61: templates.rover.sensors.pose: unknown key, 'hading_noise', nearest is 'heading_noise'"),
-        (("position_noise: 20 mm, ", ""),
-         "5:13: templates.rover.sensors.pose: missing key, 'position_noise'"),
+        (("5 Hz, offset", "5 Hz, ofset"),
+         "5:38: templates.rover.sensors.pose: unknown key, 'ofset', nearest is 'offset'"),
+        (("kind: pose, rate: 5 Hz, ", "kind: pose, "),
+         "5:13: templates.rover.sensors.pose: missing key, 'rate'"),
         (("    model: rover", "    model: rovr"),
          "3:12: templates.rover.model: not one of camera, rod, rover, station, 'rovr', nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
@@ -202,7 +202,7 @@ def test_a_robot_in_a_shelf_is_named_whatever_it_is_like() -> None:
 def test_the_canonical_text_has_its_templates_and_is_its_own() -> None:
     text = hall(ROVER + TWENTY)
     canonical = apply_sets(text, "f", [])
-    assert canonical.count("position_noise") == 1
+    assert canonical.count("kind: pose") == 1
     assert apply_sets(canonical, "c", []) == canonical
     assert load_deployment(canonical, "c") == load_deployment(text, "f")
 
