@@ -126,7 +126,7 @@ class _Partial:
 
     def _of_model(self, name: str) -> Schema:
         partial = name + _PARTIAL
-        if "properties" not in self._models[name]:
+        if not self._models[name].keys() & {"properties", "oneOf"}:
             return {"$ref": _REF + name}
         if partial not in self._models:
             self._models[partial] = {}  # it may hold itself
