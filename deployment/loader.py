@@ -10,7 +10,7 @@ that is `file:line:column: what, value, nearest valid name`, in the order of the
 line are placed in the same tree first: overrides.py.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import chain, islice
@@ -29,6 +29,7 @@ from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
 from foosim.deployment.table_clearance import clearance_findings
+from foosim.deployment.text.each import without_places_by_node
 from foosim.deployment.text.expand import Expanded, expand
 from foosim.deployment.text.includes import Source, read_source
 from foosim.deployment.text.places import Places
@@ -39,6 +40,9 @@ from foosim.deployment.text.yaml import (
     DEPTH_MAX,
     NODES_MAX,
     Fields,
+    Items,
+    Leaf,
+    Place,
     Problem,
     Tree,
     measure,
@@ -103,17 +107,36 @@ def apply_sets(text: Text, name: str, sets: Sequence[str]) -> str:
     travels in the handshake and is attached to the capture. Loading it gives the changed deployment, and its own
     canonical text is itself.
     """
-    return _applied(text, name, tuple(sets))
+    return _applied(text, name, (), tuple(sets))
+
+
+def with_owners(text: Text, name: str, owners: Mapping[str, Sequence[str]], sets: Sequence[str] = ()) -> str:
+    """The canonical text of the same world on other nodes, each with its robots, and after settings.
+
+    What runs where its robot's node is (`$node`) runs anywhere: the nodes have other names. Raises DeploymentError.
+    """
+    return _applied(text, name, tuple((node, tuple(robots)) for node, robots in owners.items()), tuple(sets))
 
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
-def _applied(text: Text, name: str, sets: tuple[str, ...]) -> str:
-    """The result of `apply_sets`, cached for repeated rehearsals."""
-    tree, problems = _with_sets(*read_source(text, name), sets)
+def _applied(text: Text, name: str, owners: tuple[tuple[str, tuple[str, ...]], ...], sets: tuple[str, ...]) -> str:
+    """The result of `apply_sets` and `with_owners`, cached for repeated rehearsals."""
+    tree, problems = read_source(text, name)
+    if owners and isinstance(tree, Fields):
+        without_places_by_node(tree)
+        place = tree.keys.get("nodes", tree.place)
+        nodes: dict[str, Tree] = {node: _listed(robots, place) for node, robots in owners}
+        tree.values["nodes"], tree.keys["nodes"] = Fields(place, nodes, dict.fromkeys(nodes, place)), place
+    tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
     deployment = _check(tree, problems)
     _keep(canonical, name, deployment)
     return canonical
+
+
+def _listed(robots: Sequence[str], place: Place) -> Fields:
+    """A node with a list of robots."""
+    return Fields(place, {"robots": Items(place, [Leaf(place, robot) for robot in robots])}, {"robots": place})
 
 
 def _canonical(tree: Tree | None) -> str:
@@ -275,9 +298,19 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
             continue
         alone = {"tick": data.get("tick"), section: {name: plain(whole)}}
         timing = (finding for finding in check_timing(alone) if finding.location[-1] in ("rate", "offset"))
-        for finding in chain(_validated(alone)[1], timing):
+        for finding in chain(_schema_findings_of(alone, (section, name)), timing):
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
+
+
+def _schema_findings_of(data: Any, entry: tuple[str, str]) -> Iterator[Finding]:
+    """What the schema refuses, unless all that it refuses is that something is missing from an entry."""
+    try:
+        Deployment.model_validate(data)
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False)
+        if any(detail["loc"][:2] == entry and detail["type"] != "missing" for detail in details):
+            yield from schema_findings(error)
 
 
 def _report(found: Sequence[Problem]) -> list[str]:

@@ -16,7 +16,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import first_there
 from foosim.common.units import Pace
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment, with_owners
 from foosim.deployment.schema import Deployment
 from foosim.node.engines.mesh_trial import check_models
 from foosim.protocol.fingerprint import library_fingerprint
@@ -52,9 +52,8 @@ def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
 
 def with_nodes(text: str, name: str, nodes: int, sets: Sequence[str] = ()) -> str:
     """Return a deployment text with its robots on nodes n1 to nN."""
-    dealt = deal_robots(load_deployment(text, name), nodes)
-    flow = ", ".join(f"{node}: {{robots: [{', '.join(robots)}]}}" for node, robots in dealt.items())
-    return apply_sets(text, name, [f"nodes={{{flow}}}", *sets])
+    owners = {"n1": ["*"]} if nodes == 1 else deal_robots(load_deployment(text, name), nodes)
+    return with_owners(text, name, owners, sets)
 
 
 def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword

@@ -1,7 +1,8 @@
 """What benches decide themselves, without a run."""
 
-from bench import hot, shapes
+from bench import hot, shapes, validate
 from bench.vhub_loss import CALM_S, KILLS, Killer
+from foosim.deployment.loader import load_deployment
 
 
 def test_the_vhub_is_killed_by_simulated_time() -> None:
@@ -32,3 +33,10 @@ def test_two_checkouts_are_compared_by_the_ratios_of_their_rounds() -> None:
     assert shapes.with_ratio(by)["ratio"] == {"tick b": [0.5, 0.75, 1.0]}
     assert "ratio" not in shapes.with_ratio({"now": by["now"]})
     assert shapes.spread([3.0, 1.0, 2.0]) == [2.0, 1.0, 3.0] and shapes.spread([]) == []
+
+
+def test_the_fleet_that_is_validated_is_the_same_by_counts_and_by_lines() -> None:
+    by_counts, by_lines = (load_deployment(validate.fleet_text(by_line=by_line), "f") for by_line in (False, True))
+    assert by_counts == by_lines
+    assert len(by_counts.robots) == len(by_counts.players) == validate.ROVERS + 1
+    assert len(by_counts.nodes) == validate.NODES

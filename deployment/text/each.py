@@ -1,8 +1,9 @@
 """Entries with `each: SELECTOR`: one for each robot that the selector matches, such as the controller of each rover.
 
-In the name, in texts and in keys of such an entry `$robot` stands for the robot's name, `$node` for the node that owns
-it at the start, `$1`, `$2`... for what the wildcards of the selector match in it, and `$$` for a dollar sign. An entry
-that is written under a name that is so made holds what is different about that one.
+In the name, in texts and in keys of such an entry `$robot` stands for the robot's name, `$1`, `$2`... for what the
+wildcards of the selector match in it, and `$$` for a dollar sign. Where it runs may also follow from `$node`, the node
+that owns the robot at the start: nothing else, since the world does not depend on nodes. An entry that is written under
+a name that is so made holds what is different about that one.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from foosim.common.errors import BadValue
 from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Tree
 
 EACH: Final = "each"
+NODE: Final = "$node"
+PLACES: Final = ("process", "host", "label")
+"""Keys of an entry that say where it runs."""
 
 _SIGN: Final = re.compile(r"\$([a-z]+|[0-9]|\$)?")
 
@@ -27,10 +31,9 @@ class Each:
     path: tuple[str, str]
     raw: Fields
 
-    def values(self, robot: str, parts: tuple[str, ...], node: str | None) -> dict[str, str]:
+    def values(self, robot: str, parts: tuple[str, ...]) -> dict[str, str]:
         """Return what is put in for each sign, for one robot."""
-        values = {"$": "$", "robot": robot} | {str(number): part for number, part in enumerate(parts, 1)}
-        return values if node is None else {**values, "node": node}
+        return {"$": "$", "robot": robot} | {str(number): part for number, part in enumerate(parts, 1)}
 
 
 class BadSign(Exception):
@@ -62,6 +65,19 @@ class Filling:
         self._with_signs: dict[int, bool] = {}
         self._looked: list[Tree] = []
 
+    def entry(self, entry: Tree, values: Mapping[str, str], node: str | None) -> Tree:
+        """Return an entry with values in place of all signs, and the name of a node where it says where it runs.
+
+        Raises BadSign.
+        """
+        if not isinstance(entry, Fields) or node is None or not any(key in entry.values for key in PLACES):
+            return self.fill(entry, values)
+        placed = {**values, NODE.removeprefix("$"): node}
+        filled = Fields(entry.place, keys=dict(entry.keys))
+        for key, value in entry.values.items():
+            filled.values[key] = self.fill(value, placed if key in PLACES else values)
+        return filled
+
     def fill(self, node: Tree, values: Mapping[str, str]) -> Tree:
         """Return a node with values in place of all signs; raises BadSign."""
         if not self._has_signs(node):
@@ -90,3 +106,16 @@ class Filling:
             self._with_signs[id(node)] = known
             self._looked.append(node)  # it is known by its id
         return known
+
+
+def without_places_by_node(tree: Fields) -> None:
+    """Take away from a tree as it is written where entries run that follows from their robots' nodes."""
+    for name in ("templates", "players"):
+        section = tree.values.get(name)
+        for entry in section.values.values() if isinstance(section, Fields) else ():
+            if not isinstance(entry, Fields):
+                continue
+            for key in PLACES:
+                value = entry.values.get(key)
+                if isinstance(value, Leaf) and isinstance(value.value, str) and NODE in value.value:
+                    del entry.values[key], entry.keys[key]

@@ -72,9 +72,8 @@ def expand(tree: Tree) -> Expanded:
 def _example(template: Fields) -> Fields:
     """Return a template as it could be for a robot; itself where its signs are wrong."""
     with suppress(BadSign):
-        example = Filling().fill(
-            template, {"$": "$", "robot": "robot", "node": "node"} | dict.fromkeys("123456789", "1")
-        )
+        signs = {"$": "$", "robot": "robot"} | dict.fromkeys("123456789", "1")
+        example = Filling().entry(template, signs, "node")
         return example if isinstance(example, Fields) else template
     return template
 
@@ -296,8 +295,9 @@ class Expansion:
         if path in self._report.broken:
             self._report.broken.add((section, name))
         try:
-            filled = self._filling.fill(whole, values)
-            return filled if own is None else merged(filled, self._filling.fill(own, values))
+            node = self._owners.get(values["robot"])
+            filled = self._filling.entry(whole, values, node)
+            return filled if own is None else merged(filled, self._filling.entry(own, values, node))
         except BadSign as sign:
             self._report.add_value(sign.place, path, sign.bad)
             self._report.stop()
@@ -324,8 +324,7 @@ class Expansion:
         elif self._population.names:
             each = Each(path, without(entry, EACH))
             for robot, parts in self._chosen(text, node.place, (*path, EACH)):
-                values = each.values(robot, parts, self._owners.get(robot))
-                if not self._add(each, values, place, found):
+                if not self._add(each, each.values(robot, parts), place, found):
                     break
         if len(self._report.problems) > problems:
             self._report.stop()
@@ -364,7 +363,7 @@ class Expansion:
                 names = [key]
                 if is_several(key):
                     chosen = self._chosen(key, place, (*path, ROBOTS))
-                    names = [name for name, _ in chosen if name not in named.values and name not in robots.values]
+                    names = [name for name, _ in chosen if name not in named.values]
                 for name in names:
                     named.values[name], named.keys[name] = channels, place
             self._named_robots[id(robots)] = robots, named

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from foosim.common import limits
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment, with_owners
 from tests.deployment.halls import PATROL, hall, long_robot, problems_of, same
 from tests.deployment.test_templates import ROVER
 
@@ -30,7 +30,7 @@ def test_there_is_a_player_for_each_robot() -> None:
 
 
 def test_signs_stand_for_robot_node_and_wildcards_in_names_keys_and_texts() -> None:
-    clause = "parameters: {rover: $robot, 'x$$$1': [$node, '$1-$2', 5, '$$']}, process: on-$node"
+    clause = "parameters: {rover: $robot, 'x$$$1': ['$1-$2', 5, '$$']}, process: on-$node"
     same(
         ROVER
         + PILOT
@@ -43,7 +43,7 @@ def test_signs_stand_for_robot_node_and_wildcards_in_names_keys_and_texts() -> N
         players={
             f"r-{n}-pilot": pilot(
                 f"r-{n}",
-                parameters={"rover": f"r-{n}", "x$-": [node, f"--{n}", 5, "$"]},
+                parameters={"rover": f"r-{n}", "x$-": [f"--{n}", 5, "$"]},
                 process=f"on-{node}",
             )
             for n, node in ((1, "east"), (2, "west"))
@@ -101,11 +101,15 @@ def test_what_is_made_is_in_the_place_of_its_entry() -> None:
          ["10:3: players.p: the name of what is made for each robot has $robot or $1 in it, 'p', "
           "nearest is 'p-$robot'"]),
         ("p$2: {like: pilot, each: r-*}",
-         ["10:3: players.'p$2': a $ that stands for nothing here (valid are $$, $robot, $1, $node), 'p$2'"]),
+         ["10:3: players.'p$2': a $ that stands for nothing here (valid are $$, $robot, $1), 'p$2'"]),
         ("p$1: {like: pilot, each: r-*, process: $rover}",
          ["10:42: players.'p$1': a $ that stands for nothing here (valid are $$, $robot, $1, $node), '$rover'"]),
+        ("p$1: {like: pilot, each: r-*, process: on-$node, parameters: {node: $node}}",
+         ["10:71: players.'p$1': a $ that stands for nothing here (valid are $$, $robot, $1), '$node'"]),
+        ("$node-$1: {like: pilot, each: r-*}",
+         ["10:3: players.'$node-$1': a $ that stands for nothing here (valid are $$, $robot, $1), '$node-$1'"]),
         ("p$1: {like: pilot, each: r-*, parameters: {$: 1}}",
-         ["10:46: players.'p$1': a $ that stands for nothing here (valid are $$, $robot, $1, $node), '$'"]),
+         ["10:46: players.'p$1': a $ that stands for nothing here (valid are $$, $robot, $1), '$'"]),
         ("p$1: {like: pilot, each: r-*, parameters: {$robot: 1, r-2: 2}}",
          ["10:57: players.'p$1': a key that is given twice for r-2, 'r-2'"]),
         ("p$1: {like: pilot, each: r*-*}", ["10:3: players.'p$1': a name that is made twice, also by p$1, 'p'"]),
@@ -152,6 +156,21 @@ def test_a_node_that_is_unknown_is_no_sign() -> None:
     assert problems_of(text) == [
         "10:50: players.'p$1': a $ that stands for nothing here (valid are $$, $robot, $1), '$node'"
     ]
+
+
+def test_on_other_nodes_what_is_placed_by_the_node_is_not_placed() -> None:
+    """Else a rehearsal on nodes n1 and n2 would need hosts of these names."""
+    hosts = "hosts: {east: {address: 10.0.0.1}, west: {address: 10.0.0.2}}\n"
+    players = "players: {p$1: {like: pilot, each: r-*, host: $node, process: on-$node}, p2: {process: own}}\n"
+    text = hall(ROVER + PILOT + hosts + TWO + "nodes: {east: {robots: [r-1]}, west: {robots: [rest]}}\n" + players)
+    declared = load_deployment(text, "f")
+    assert [player.host for player in declared.players.values()] == ["east", "west"]
+    others = load_deployment(with_owners(text, "f", {"n1": ["r-2"], "n2": ["r-1"]}, ["seed=7"]), "f")
+    assert (others.owners(), others.seed) == ({"r-1": "n2", "r-2": "n1"}, 7)
+    assert {name: player.process for name, player in others.players.items()} == {"p1": None, "p2": "own"}
+    assert {player.host for player in others.players.values()} == {None}
+    assert {**others.model_dump(), "nodes": 0, "players": 0, "seed": 0} == {
+        **declared.model_dump(), "nodes": 0, "players": 0, "seed": 0}  # fmt: skip
 
 
 def test_the_canonical_text_is_not_expanded() -> None:

@@ -11,7 +11,7 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.expand import expand
 from foosim.deployment.text.report import PROBLEMS_MAX
-from foosim.deployment.text.yaml import locate_in, read_tree
+from foosim.deployment.text.yaml import locate_in, plain, plain_shared, read_tree
 from tests.deployment.halls import HEAD, PATROL, POSE, hall, problems_of
 from tests.deployment.test_templates import ROVER
 
@@ -134,6 +134,9 @@ def test_what_many_have_in_common_is_expanded_to_one_node() -> None:
     assert expanded is not None
     robots = getattr(expanded, "values")["robots"].values  # noqa: B009
     assert len({id(robot.values["sensors"]) for robot in robots.values()}) == 1
+    data = plain_shared(expanded)
+    assert len({id(robot["sensors"]) for robot in data["robots"].values()}) == 1
+    assert data == plain(expanded)
 
 
 def test_templates_are_limited_in_number() -> None:
@@ -145,4 +148,6 @@ def test_the_problems_of_an_expansion_are_bounded() -> None:
     robots = "".join(f"  r{number}: {{like: no}}\n" for number in range(2_000))
     found = problems_of(hall(f"robots:\n{robots}"))
     assert len(found) == PROBLEMS_MAX + 1
+    tree, _ = read_tree(hall(f"robots:\n{robots}"), locate_in("f"))
+    assert tree is not None and len(expand(tree).problems) == PROBLEMS_MAX + 1
     assert found[0] == "2:14: robots.r0.like: unknown template, 'no'"

@@ -18,7 +18,8 @@ TEXT = hall(
     + "  heavy: {like: rover, charge: 50 %}\n"
     + "robots:\n  r: {like: rover, count: 9, x: -9 m, y: 2 m, spacing: {x: 2 m}}\n"
     + "  red.one: {like: heavy, x: 0 m, y: 4 m}\n"
-    + "players: {p$1: {like: pilot, each: r-*}}\nclients: {c$1: {each: r-*, on: $robot}}\n"
+    + "players: {p$1: {like: pilot, each: r-*}, q-$1: {like: pilot, each: red.*}}\n"
+    + "clients: {c$1: {each: r-*, on: $robot}}\n"
 )
 
 
@@ -58,6 +59,7 @@ def changed(*sets: str) -> dict[str, Any]:
         ("players.p3.rate=50 Hz", {"/players/p3/rate": "50 Hz"}),
         ("players.p3.parameters={speed: 2}", {"/players/p3/parameters/speed": 2}),
         ("players.p3.robots.r-3[0]=battery", {"/players/p3/robots/r-3": ["battery"]}),
+        ("players.q-one.robots.red.one[0]=battery", {"/players/q-one/robots/red.one": ["battery"]}),
         ("players.p3.hears.p*[1]=beacon2", {"/players/p3/hears/p*": ["beacon", "beacon2"]}),
         ("players.p3.process=on-$node", {"/players/p3/process": "on-one"}),
         ("clients.c9.rate=5 Hz", {"/clients/c9/rate": "5 Hz"}),
@@ -77,7 +79,7 @@ def test_a_made_robot_is_written_as_an_entry_of_its_own() -> None:
     canonical = apply_sets(TEXT, "f", ["robots.r-7.x=3 m", "players.p7.rate=50 Hz"])
     assert apply_sets(canonical, "c", []) == canonical
     players = load_deployment(canonical, "c").players
-    assert [player.rate_hz for player in players.values()] == [10] * 6 + [50] + [10] * 2
+    assert [player.rate_hz for player in players.values()] == [10] * 6 + [50] + [10] * 3
 
 
 def test_a_setting_of_a_count_is_seen_by_the_next_one() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from textwrap import dedent
 from typing import Any
 
 import pytest
@@ -14,8 +15,10 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.text.expand import expand
+from foosim.deployment.text.includes import Source
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
-from tests.deployment.halls import BATTERY, PATROL, POSE, WAREHOUSE, hall, long_robot, problems_of, same
+from foosim.world.robots.rover import RoverRobot
+from tests.deployment.halls import BATTERY, HEAD, PATROL, POSE, WAREHOUSE, hall, long_robot, problems_of, same
 
 ROVER = f"""\
 templates:
@@ -245,6 +248,20 @@ def test_a_further_rover_of_the_warehouse_is_one_line() -> None:
     more = load_deployment(text.replace(line, f"{line}  rover21: {{like: rover, x: 17 m, y: -4 m}}\n"), "w")
     assert more.owners()["rover21"] == "east"
     assert (more.players["pilot21"].on, more.players["pilot21"].process) == ("rover21", "fleet-east")
+
+
+def test_the_example_of_the_reference_is_a_deployment() -> None:
+    page = (WAREHOUSE.parents[1] / "docs" / "reference" / "deployment.md").read_text()
+    example = page[page.index("    include: [parts/shelves.yaml]") : page.index("* **Templates.**")]
+    text = Source(HEAD + dedent(example), (("parts/shelves.yaml", "scenery: {}\n"),))
+    deployment = load_deployment(text, "page")
+    assert (len(deployment.robots), deployment.owners()["scout-11"]) == (22, "east")
+    assert (deployment.players["pilot-12"].on, deployment.players["pilot-12"].process) == ("scout-12", "fleet-east")
+    assert deployment.players["pilot-7"].rate_hz == 5
+    assert len(deployment.players["watch"].robots) == 20
+    scout = deployment.robots["scout-7"]
+    assert isinstance(scout, RoverRobot)
+    assert (scout.x, scout.y, scout.charge, list(scout.sensors)) == (-4.0, 6.0, 0.6, ["pose"])
 
 
 VALUES = st.recursive(
