@@ -273,8 +273,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))
 
     between = first(check_references(data), check_network(data))
-    deployment, of_schema = _validated(data)
-    within = first(check_timing(data)) + first(of_schema) + first(_unused_findings(data, expanded))
+    deployment, error = _validated(data)
+    of_schema = [] if error is None else first(schema_findings(error))
+    within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         between = first(start_findings(deployment), clearance_findings(deployment), rules, place_findings(deployment))
@@ -282,12 +283,12 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     return deployment, [*made, *map(places.problem, within)]
 
 
-def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
+def _validated(data: Any) -> tuple[Deployment | None, ValidationError | None]:
     """The deployment that plain data is, or what the schema refuses."""
     try:
-        return Deployment.model_validate(data), iter(())
+        return Deployment.model_validate(data), None
     except ValidationError as error:
-        return None, schema_findings(error)
+        return None, error
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
@@ -298,19 +299,13 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
             continue
         alone = {"tick": data.get("tick"), section: {name: plain(whole)}}
         timing = (finding for finding in check_timing(alone) if finding.location[-1] in ("rate", "offset"))
-        for finding in chain(_schema_findings_of(alone, (section, name)), timing):
+        _, error = _validated(alone)
+        details = () if error is None else error.errors(include_url=False, include_context=False)
+        is_wrong = any(each["loc"][:2] == (section, name) and each["type"] != "missing" for each in details)
+        of_schema = schema_findings(error) if error is not None and is_wrong else ()
+        for finding in chain(of_schema, timing):
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
-
-
-def _schema_findings_of(data: Any, entry: tuple[str, str]) -> Iterator[Finding]:
-    """What the schema refuses, unless all that it refuses is that something is missing from an entry."""
-    try:
-        Deployment.model_validate(data)
-    except ValidationError as error:
-        details = error.errors(include_url=False, include_context=False)
-        if any(detail["loc"][:2] == entry and detail["type"] != "missing" for detail in details):
-            yield from schema_findings(error)
 
 
 def _report(found: Sequence[Problem]) -> list[str]:
