@@ -325,17 +325,27 @@ def _show(answer: Answer, json: bool) -> None:
 
 @app.command()
 @with_options("file")
-def validate(options: RunOptions, json: Json = False) -> None:
+def validate(
+    options: RunOptions,
+    expanded: Annotated[
+        bool, typer.Option("--expanded", help="Print the deployment with its templates, counts and selectors expanded.")
+    ] = False,
+    json: Json = False,
+) -> None:
     """Check a deployment file.
 
     Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
     classes of the players on this machine are imported, in a separate process.
     """
     from foosim.common.json_text import encode_json
+    from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan
 
     plan = make_plan(options)
     check_players_here(plan)
+    if expanded:
+        print(expanded_text(plan.text, str(options.file)), end="")
+        return
     deployment = plan.deployment
     content = {
         "world": deployment.world,

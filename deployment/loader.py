@@ -274,8 +274,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))
 
     between = first(check_references(data), check_network(data))
-    deployment, of_schema = _validated(data)
-    within = first(check_timing(data)) + first(of_schema) + first(_unused_findings(data, expanded))
+    deployment, of_components, error = _validated(data)
+    of_schema = first(of_components, () if error is None else schema_findings(error))
+    within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         between = first(start_findings(deployment), clearance_findings(deployment), rules, place_findings(deployment))
@@ -283,14 +284,14 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     return deployment, [*made, *map(places.problem, within)]
 
 
-def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
-    """The deployment that plain data is, or what the schema and the components of its robots refuse."""
+def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:
+    """The deployment that plain data is, or what the components of its robots and what the schema refuse."""
     data, findings = read_components(data)
     try:
         deployment = Deployment.model_validate(data)
     except ValidationError as error:
-        return None, chain(findings, schema_findings(error))
-    return (None if findings else deployment), iter(findings)
+        return None, findings, error
+    return (None if findings else deployment), findings, None
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
@@ -301,19 +302,13 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
             continue
         alone = {**data, section: {name: plain(whole)}}
         timing = (finding for finding in check_timing(alone) if finding.location[-1] in ("rate", "offset"))
-        for finding in chain(_schema_findings_of(alone, (section, name)), timing):
+        _, of_components, error = _validated(alone)
+        details = () if error is None else error.errors(include_url=False, include_context=False)
+        is_wrong = any(each["loc"][:2] == (section, name) and each["type"] != "missing" for each in details)
+        of_schema = schema_findings(error) if error is not None and is_wrong else ()
+        for finding in chain(of_components, of_schema, timing):
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
-
-
-def _schema_findings_of(data: Any, entry: tuple[str, str]) -> Iterator[Finding]:
-    """What the schema refuses, unless all that it refuses is that something is missing from an entry."""
-    try:
-        Deployment.model_validate(data)
-    except ValidationError as error:
-        details = error.errors(include_url=False, include_context=False)
-        if any(detail["loc"][:2] == entry and detail["type"] != "missing" for detail in details):
-            yield from schema_findings(error)
 
 
 def _report(found: Sequence[Problem]) -> list[str]:

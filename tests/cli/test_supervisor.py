@@ -57,6 +57,9 @@ def test_the_version_is_that_of_the_package(command: Command) -> None:
 
 def test_a_valid_file_is_summed_up(command: Command) -> None:
     assert command("validate", TABLE).out == f"{TABLE}: valid, world table, 9 robots on 2 nodes, 2 players\n"
+    warehouse = TABLE.with_name("warehouse.yaml")
+    written_out = load_deployment(command("validate", warehouse, "--expanded").out, "expanded")
+    assert written_out == load_deployment(warehouse.read_text(), "warehouse")
     assert json.loads(command("validate", TABLE, "--json").out) == {
         "world": "table",
         "robots": 9,

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import Final
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.event_requests import BadEvent, event_text
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.presets import PRESETS
+from foosim.deployment.network.radios import lora_longest
+from foosim.deployment.network.rules import Network
+from foosim.deployment.radio_checks import rule_findings, unheeded
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from tests.links.offered import TABLE, deployment_of
 
 EVERYBODY: Final = ("network.robots={'*': [r]}", "network.places={'*': [0 m, 0 m, 1 m]}")
@@ -135,3 +143,43 @@ def test_a_partition_has_two_groups() -> None:
     made: Deployment = load_deployment(apply_sets(TABLE.read_text(), "t", []), "t")
     with pytest.raises(BadEvent, match="partition: fewer than two groups"):
         event_text(made, {"partition": [["camera"]]}, 10**9)
+
+
+ENDS = ["a1", "a2", "b1", "b2", "c1"]
+SIDES = st.lists(st.sampled_from(["a*", "b*", "*1", "c1", "*"]), min_size=1, max_size=2)
+RULES = st.lists(
+    st.tuples(SIDES, SIDES, st.sampled_from(["mtu: 200 B", "rate: 1 Mbit/s", "overhead: 1 B", ""])), max_size=3
+)
+CARRIED = st.dictionaries(
+    st.sampled_from(["a*", "b1", "*2", "*"]), st.lists(st.sampled_from(["w", "l", "x"]), max_size=2)
+)
+
+
+@given(RULES, CARRIED, st.dictionaries(st.sampled_from(ENDS), st.sampled_from(["a1", "b2", "r"])), st.booleans())
+def test_one_pair_of_each_kind_says_what_all_pairs_say(
+    rules: list[tuple[list[str], list[str], str]], carried: dict[str, list[str]], on: dict[str, str], is_radio: bool
+) -> None:
+    links = [f"{{id: l{n}, from: {source}, to: {target}, {keys}}}" for n, (source, target, keys) in enumerate(rules)]
+    radios = "w: {preset: wifi_5_indoor}, l: {preset: lora_eu868, spreading_factor: 9}, x: {preset: wired_1g}"
+    defaults = "{preset: zigbee}" if is_radio else "{}"
+    text = f"network: {{defaults: {defaults}, radios: {{{radios}}}, robots: {carried}, links: [{', '.join(links)}]}}"
+    tree, problems = read_tree(text, locate_in("t"))
+    assert tree is not None and not problems
+    network = Network.model_validate(plain(tree)["network"])
+    profiles = Profiles(network, on)
+    on_air = any(profiles.base(way).is_on_air for way in ("", *network.radios))
+    refused: dict[tuple[int | str, int | str], set[str]] = {}
+    for number, rule in enumerate(network.links):
+        for source, target in permutations(ENDS, 2) if on_air else ():
+            way = profiles.way(rule, source, target) if rule in profiles.rules_for(source, target) else None
+            radio = None if way is None else profiles.base(way)
+            for key in ("rate", "mtu", "overhead") if radio is not None else ():
+                is_heeded = unheeded(key, radio.medium) is None  # type: ignore[union-attr]
+                if key == "mtu" and radio is not None and radio.medium == "lora":
+                    is_heeded = (rule.payload_max or 0) <= (lora_longest(radio.spreading_factor) or 0)
+                if f"{key}:" in links[number] and not is_heeded:
+                    refused.setdefault((number, key), set()).add(way or network.defaults.preset)
+    found = {(finding.location[2], finding.location[3]): finding for finding in rule_findings(network, ENDS, on)}
+    assert found.keys() == refused.keys()
+    for place, finding in found.items():
+        assert finding.what.partition(",")[0].removeprefix("via ") in refused[place]
