@@ -81,7 +81,7 @@ class _Reader:
     def _read_component(
         self, form: str, base: type[ComponentSettings], model: Any, location: Location, settings: Any
     ) -> Any:
-        """Return the settings of one component; what cannot be read is left as it is, for a finding tells."""
+        """Return the settings of one component; in place of what is refused, settings that say its kind alone."""
         kind = settings.get("kind") if isinstance(settings, dict) else None
         if not isinstance(kind, str):
             return settings
@@ -102,7 +102,7 @@ class _Reader:
             self.findings.append(Finding((*location, "kind"), error.what, kind))
         except ValidationError as error:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
-        return base.model_construct(**settings)
+        return base.model_construct(kind=kind)
 
     def _misfits(self, component: Component, model: Any, location: Location, kind: str) -> Iterator[Finding]:
         """Yield what the world or a model does not have that a component needs."""

@@ -18,7 +18,6 @@ from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.deployment import hosts
 from foosim.deployment.checks import quoted
-from foosim.deployment.json_schema import deployment_schema
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {
@@ -58,7 +57,7 @@ def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Fi
 
 def settings_findings(error: ValidationError, settings: type[BaseModel], under: Location) -> Iterator[Finding]:
     """One finding for each of pydantic's errors about the settings of a component, which are at `under`."""
-    root = _Schema(settings.model_json_schema(by_alias=True))
+    root = _of_settings(settings)
     for detail in error.errors(include_url=False):
         if _is_cause(detail):
             finding = _finding(detail, detail["loc"], root)
@@ -191,7 +190,14 @@ class _Schema:
 
 
 @cache
+def _of_settings(settings: type[BaseModel]) -> _Schema:
+    return _Schema(settings.model_json_schema(by_alias=True))
+
+
+@cache
 def _deployment() -> _Schema:
+    from foosim.deployment.json_schema import deployment_schema  # only files with problems need it
+
     return _Schema(deployment_schema())
 
 

@@ -111,16 +111,12 @@ class Stepper:
         for entity, one in self._waiting:
             if entity.index in solved and numbers[entity.offsets["down"]] == 0.0:
                 one.take_due(view)
-        counts: Counter[tuple[str, str]] = Counter()
         for packet in packets:
             if packet.destination not in self.layout:
                 continue
             entity = self.layout[packet.destination]
             if entity.index not in solved or not entity.is_robot:
                 continue
-            way = packet.destination, packet.channel
-            view.count = counts[way]
-            counts[way] += 1
             if not self._take(packet, entity, view, outboxes):
                 numbers[entity.offsets["refused"]] += 1.0
         return {index: _outbox_encoder.encode(waiting) for index, waiting in sorted(outboxes.items())}

@@ -57,6 +57,7 @@ def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool =
         check_whole(read_about(Path(path)))
     capture = open_capture(path)
     about = capture.about
+    capture.first_frame()  # numbers in another layout are not compared, since they mean something else
     start = start_of(capture)
     text, name = about.deployment_text, about.deployment_name
     found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)

@@ -17,7 +17,7 @@ from foosim.common.errors import Malformed
 from foosim.world.forms import registry
 from foosim.world.forms.models import MODELS
 from foosim.world.forms.per_field import Numbers, numbers_of
-from foosim.world.forms.registry import Carrier, Component
+from foosim.world.forms.registry import SAMPLES, Carrier, Component
 from foosim.world.forms.settings import ComponentSettings, ModifierSettings
 from foosim.world.spec import Robot, WorldSpec
 
@@ -26,8 +26,6 @@ WORLD: Final = "world"
 
 ADDABLE: Final = tuple(name for name, model in MODELS.items() if model.is_addable)
 """Models of which a running world can have more."""
-SAMPLES: Final = "samples"
-"""The slot of each sensor that counts what it has sampled."""
 BALL: Final = "ball"
 """Name of the ball that every table has, and no hall; further ones have other names and can be removed again."""
 

@@ -30,7 +30,8 @@ from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import FOLDERS, FORMS, find, names
+from foosim.world.forms.registry import FOLDERS, FORMS, find, names, sensor
+from foosim.world.forms.settings import SensorSettings
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -379,6 +380,23 @@ print(json.dumps([told, names("sensor")]))
     assert unknown.startswith("UnknownName: unknown sensor") and unknown.endswith("'encodr', nearest is 'encoder'")
     assert all(word in unknown for word in ("own_thief of thief 1.2", "foosim.world.sensors.encoder"))
     assert set(there) >= {"encoder", "pose"}
+
+
+@pytest.mark.parametrize("name", ["", "Gauge", "two words", "a.b", "x" * 33])
+def test_a_name_that_no_deployment_can_write_is_refused(name: str) -> None:
+    with pytest.raises(Refused, match=r"registers a sensor as .*a name is a lower case letter"):
+        sensor(name, SensorSettings, Spoken)(type("Own", (), {}))
+
+
+def test_a_slot_that_each_sensor_has_is_not_declared_again() -> None:
+    with pytest.raises(Refused, match="sensor own_counter has a slot samples, which each sensor has already"):
+        sensor("own_counter", SensorSettings, Spoken, slots={"samples": 1})(type("Own", (), {}))
+
+
+@pytest.mark.parametrize("key", ["cls", "self", "_fields_set", "model_config"])
+def test_keys_of_any_name_beside_an_unknown_kind_are_no_more_than_that(key: str) -> None:
+    with pytest.raises(DeploymentError, match="unknown sensor"):
+        apply_sets(TEXT, TABLE.name, [f"robots.red.goal.sensors.own={{kind: nope, {key}: 1}}"])
 
 
 # --- of installed packages -------------------------------------------------------------------------------------------

@@ -22,9 +22,9 @@ from foosim.world.components.view import (
 from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
-from foosim.world.forms.registry import Component
+from foosim.world.forms.registry import SAMPLES, Component
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import SAMPLES, Entity, Layout, modifier_labels
+from foosim.world.layout import Entity, Layout, modifier_labels
 from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
@@ -99,6 +99,7 @@ class FittedActuator:
             return False
         if not self.modifiers:
             return self._take(command, view)
+        view.count_command(f"{self.robot} {self.channel}")
         return self._go_on(0, self.codec.numbers(command), view)
 
     def take_due(self, view: WritableView) -> None:

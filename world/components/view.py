@@ -51,7 +51,7 @@ class View:
         self.tick = tick
         self.numbers = numbers
         self.count = 0
-        """Of the commands that an actuator gets in one tick, which this is."""
+        """How many commands an actuator has had in the tick before this one; 0 for readings."""
         self._values = values
 
     @property
@@ -68,14 +68,34 @@ class View:
         return self.numbers[slot.at : slot.at + slot.size]
 
 
+class SlotReadings:
+    """The readings of several sensors that are the numbers of one slot each, of one length: read as one array."""
+
+    def __init__(self, slots: Sequence[Slot]) -> None:
+        import numpy as np
+
+        self._places = np.array([range(slot.at, slot.at + slot.size) for slot in slots])
+
+    def sample(self, view: View) -> NDArray[np.float64]:
+        """Return the numbers, of shape (sensors, numbers)."""
+        numbers: NDArray[np.float64] = view.values[self._places]
+        return numbers
+
+
 class WritableView(View):
     """A view in the part of a tick in which components write to their slots."""
 
-    __slots__ = ("_written",)
+    __slots__ = ("_commands", "_written")
 
     def __init__(self, tick: int, numbers: list[float]) -> None:
         super().__init__(tick, numbers)
         self._written = numbers
+        self._commands: dict[str, int] = {}
+
+    def count_command(self, actuator: str) -> None:
+        """Say in `count` how many commands of the tick an actuator has had before this one."""
+        self.count = self._commands.get(actuator, 0)
+        self._commands[actuator] = self.count + 1
 
     def write(self, slot: Slot, *values: float) -> None:
         """Write all numbers of a slot, which the component must have declared."""

@@ -19,7 +19,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 from foosim.common.errors import Refused, UnknownName
-from foosim.common.names import CLASS_PATTERN
+from foosim.common.names import CLASS_PATTERN, NAME_RULE, is_name
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -37,6 +37,8 @@ FOLDERS: Final[Mapping[str, str]] = {
 """Where foosim's own are, by form."""
 FORMS: Final = tuple(FOLDERS)
 
+SAMPLES: Final = "samples"
+"""The slot of each sensor that counts what it has sampled; no component declares one of this name."""
 NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
 NO_SETTINGS: Final[Mapping[str, float | None]] = MappingProxyType({})
 
@@ -64,10 +66,10 @@ class Component:
 
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have, `kit` the section that a deployment must have; empty where any will do.
-    `moves` says of an actuator that it commands the motors of its robot, of which one can.
-    `several` is the setting that says how many numbers the last field of a reading has, if it has several. `per_field`
-    are the settings that have a number for each field (`per_field`), with the least that is valid, if there is one.
+    that the model of its robot must have, `kit` is the section that a deployment must have; empty where any will do.
+    `several` is the setting that says how many numbers the last field of a reading has, if it has several. `moves` says
+    that an actuator commands the motors of its robot: one of a robot may. `per_field` are the settings with a number
+    for each field (`forms.per_field`), and the least that is valid of each; None without a least one.
     """
 
     form: str
@@ -112,7 +114,7 @@ def sensor(
     kit: str = "",
     several: str = "",
 ) -> Callable[[Made], Made]:
-    """Register a sensor: a class with the methods of `component.Sensor`."""
+    """Register a sensor: a class with the methods of `components.view.Sensor`."""
     return _registering(lambda made: Component("sensor", name, made, settings, reading, slots, needs, kit, several))
 
 
@@ -126,7 +128,7 @@ def actuator(
     kit: str = "",
     moves: bool = True,
 ) -> Callable[[Made], Made]:
-    """Register an actuator: a class with the methods of `component.Actuator`."""
+    """Register an actuator: a class with the methods of `components.view.Actuator`."""
     return _registering(
         lambda made: Component("actuator", name, made, settings, command, slots, needs, kit, moves=moves)
     )
@@ -139,7 +141,7 @@ def modifier(
     slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
     per_field: Mapping[str, float | None] = NO_SETTINGS,
 ) -> Callable[[Made], Made]:
-    """Register a modifier: a class with the methods of `component.Modifier`."""
+    """Register a modifier: a class with the methods of `components.view.Modifier`."""
     return _registering(lambda made: Component("modifier", name, made, settings, slots=slots, per_field=per_field))
 
 
@@ -147,6 +149,10 @@ def _registering(describe: Callable[[Callable[..., Any]], Component]) -> Callabl
     def register(made: Made) -> Made:
         component = describe(made)
         key = component.form, component.name
+        if not is_name(component.name):
+            raise Refused(f"{component.module} registers a {component.form} as {component.name!r}: {NAME_RULE}")
+        if not callable(component.slots) and SAMPLES in component.slots:
+            raise Refused(f"{component.form} {component.name} has a slot {SAMPLES}, which each sensor has already")
         own = f"{FOLDERS[component.form]}.{component.name}"
         if component.module != own and _is_there(*key):
             raise Refused(f"{component.form} {component.name} is registered by {component.module}, and is in {own}")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from msgspec import Struct
 
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -26,7 +28,12 @@ class Encoder:
     """Slide and spin of a rod."""
 
     def __init__(self, settings: EncoderSettings, at: Mounting) -> None:
-        self._joints = at.slot("joint_positions")
+        self.joints = at.slot("joint_positions")
 
     def sample(self, view: View) -> RodPosition:
-        return RodPosition(*view.read(self._joints))
+        return RodPosition(*view.read(self.joints))
+
+    @staticmethod
+    def together(sensors: Sequence[Encoder]) -> SlotReadings:
+        """Return these as one."""
+        return SlotReadings([one.joints for one in sensors])

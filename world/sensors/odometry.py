@@ -5,9 +5,11 @@ What the wheels slip is in it, and what they turned while the rover was blocked:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from msgspec import Struct
 
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -29,7 +31,12 @@ class Odometry:
     """Travel of the left and the right wheel's rim since the start."""
 
     def __init__(self, settings: OdometrySettings, at: Mounting) -> None:
-        self._travel = at.slot("wheel_travel")
+        self.travel = at.slot("wheel_travel")
 
     def sample(self, view: View) -> WheelTravel:
-        return WheelTravel(*view.read(self._travel))
+        return WheelTravel(*view.read(self.travel))
+
+    @staticmethod
+    def together(sensors: Sequence[Odometry]) -> SlotReadings:
+        """Return these as one."""
+        return SlotReadings([one.travel for one in sensors])
