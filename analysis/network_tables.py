@@ -72,7 +72,7 @@ def link_line(link: dict[str, Any]) -> str:
 
 
 def age_text(age: dict[str, Any]) -> str:
-    """Return how old a channel is when its receiver acts: `ball 6 ms, p99 8 ms`."""
+    """Return how old a channel is when its receiver acts: `encoder 6 ms, p99 8 ms`."""
     return f"{age['channel']} {time_text(age['p50_ns'])}, p99 {time_text(age['p99_ns'])}"
 
 

@@ -12,8 +12,8 @@ from statistics import median
 from typing import Final
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.engines.bullet import BulletEngine
-from foosim.world.initial_state import initial_frame
+from foosim.node.physics.bullet_engine import BulletEngine
+from foosim.world.assembly.initial_state import initial_frame
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 BLOCKS: Final = 20
@@ -25,7 +25,7 @@ def bare_tick_us() -> float:
     deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["tick=2 ms", "substeps=4"]), TABLE.name)
     frame = initial_frame(deployment)
     engine = BulletEngine(deployment, frame.layout)
-    entities = [*frame.layout.balls, *frame.layout.rods]
+    entities = [*frame.layout.of("ball"), *frame.layout.of("rod")]
     numbers = frame.values.tolist()
     blocks = []
     try:

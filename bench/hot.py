@@ -10,7 +10,6 @@ the share of all that it leaves to the interpreter.
 from __future__ import annotations
 
 import argparse
-import ast
 import cProfile
 import json
 import sys
@@ -146,13 +145,8 @@ def shares_of(name: str) -> dict[str, float]:
 
 
 def compiled() -> set[str]:
-    """Return what setup.py compiles: it cannot be imported, since it builds."""
-    (value,) = (
-        node.value
-        for node in ast.parse((ROOT / "setup.py").read_text()).body
-        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "COMPILED" and node.value is not None
-    )
-    return set(ast.literal_eval(value))
+    """Return what setup.py compiles."""
+    return set(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["foosim"]["compiled"])
 
 
 def lines(shares: dict[str, dict[str, float]], least: float, listed: set[str]) -> list[str]:

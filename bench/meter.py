@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Final, ParamSpec, TypeVar
 
 from foosim.deployment.schema import Deployment
-from foosim.node.engines import ENGINES
-from foosim.node.engines.interface import Engine
+from foosim.node.physics.interface import Engine
+from foosim.node.physics.making import kind_of
 from foosim.world.layout import Entity, Layout
 
 ENGINE_PARTS: Final = ("load", "command", "step", "read")
@@ -107,6 +107,6 @@ def metered_engine(meter: Meter) -> Callable[[Deployment, Layout], Engine]:
     """Return a factory of the deployment's engine, metered."""
 
     def make(deployment: Deployment, layout: Layout) -> Engine:
-        return MeteredEngine(ENGINES[deployment.engine](deployment, layout), meter)
+        return MeteredEngine(kind_of(deployment).make(deployment, layout), meter)
 
     return make

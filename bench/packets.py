@@ -43,8 +43,8 @@ from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.vhub.state.records import Closing
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
 
@@ -147,7 +147,7 @@ class Talk:
         self.count = Count()
         self._layout = build_layout(self.deployment)
         self._robots = [entity.name for entity in self._layout.robots]
-        rods = [entity.name for entity in self._layout.rods]
+        rods = [entity.name for entity in self._layout.of("rod")]
         self._clients = {name: Client(name, rods) for name in CLIENTS}
         self._sensed = [
             (robot, index, sensor)

@@ -14,7 +14,7 @@ from math import cos, sin, tau
 from typing import Final
 
 from foosim.vhub.line_of_sight.occlusion import Geometry, Sight
-from foosim.world.layout import Layout
+from foosim.world.layout import Declared, Layout
 from foosim.world.scene import Body, Box, Cylinder, Link, Scene, Shape, Vector, turn
 
 SHELVES: Final = 50
@@ -52,7 +52,7 @@ def hall() -> tuple[Scene, Layout]:
     names = [f"rover{n:02}" for n in range(VEHICLES)]
     links = {name: (Link(name, "free", (chassis,), 1.0, (1.0, 1.0, 1.0)),) for name in names}
     bodies = {name: Body(name, "ball", (0.0, 0.0, 0.0), links[name]) for name in names}
-    return Scene(bodies, tuple(shelves)), Layout(dict.fromkeys(names, "ball"), {})
+    return Scene(bodies, tuple(shelves)), Layout(dict.fromkeys(names, "ball"), Declared())
 
 
 def numbers_at(layout: Layout, tick: int) -> list[float]:

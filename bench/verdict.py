@@ -29,8 +29,8 @@ from foosim.runtime.roles.loop import GC_THRESHOLDS
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 
 WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
@@ -126,7 +126,7 @@ def circling(deployment: Deployment) -> Frames:
     """Return frames in which each rover drives on a circle."""
     layout = build_layout(deployment)
     numbers = np.array(initial_numbers(deployment, layout))
-    places = [entity.offsets["position"] for entity in layout.rovers]
+    places = [entity.offsets["position"] for entity in layout.of("rover")]
 
     def frame(tick: int) -> Frame:
         moved = numbers.copy()

@@ -32,13 +32,13 @@ from foxglove.messages import (
 )
 
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
 from foosim.world.mesh import Mesh
 from foosim.world.scene import Box, Scene, Shape, Sphere, Vector
 from foosim.world.scene import Quaternion as Turn
-from foosim.world.scenes.build import build_scene
 
 WORLD_FRAME: Final = "world"
 SCENERY: Final = "scenery"

@@ -68,13 +68,13 @@ from foosim.common.names import nearest_name
 from foosim.common.struct_types import Counter
 from foosim.deployment.loader import load_deployment, load_earlier
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.initial_state import first_chain
+from foosim.world.assembly.world import build_scene
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
-from foosim.world.initial_state import first_chain
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered
 from foosim.world.scene import Body
-from foosim.world.scenes.build import build_scene
 from foosim.world.start import Origin
 
 DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
@@ -305,7 +305,7 @@ class CaptureData:
             yield captured_tick(row)
 
     def poses(self, name: str) -> Poses:
-        """Return the poses of a link (`red.goal/slide`), or of an entity's last link (`ball`, `red.goal`)."""
+        """Return the poses of a link (`red.attack/slide`), or of an entity's last link (`red.attack`)."""
         found: list[tuple[Frames, Body]] = []
         link = ""
         names: set[str] = set()

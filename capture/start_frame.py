@@ -18,8 +18,8 @@ from foosim.common.errors import BadValue, Malformed, Refused
 from foosim.common.new_run import new_run_text
 from foosim.common.units import format_ns, parse_ns
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.initial_state import start_with
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import start_with
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Outbox
 from foosim.world.start import AddedEntity, Start

@@ -1,4 +1,4 @@
-"""What `foosim-supervisor components` shows: the components that a deployment can name here."""
+"""What `foosim-supervisor components` shows: the forms that a deployment can name here."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.world.forms import registry
+from foosim.world.forms.forms import Component, Form
 from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.registry import FORMS, Component
+from foosim.world.forms.registry import FORMS
 
 CARRIES: Final = {"sensor": "reading", "actuator": "command"}
 """What the values of a form are called."""
 
 
-def chosen(form: str | None, name: str | None) -> list[Component]:
-    """Return all components of the forms, or those that were asked for. Raises UnknownName."""
+def chosen(form: str | None, name: str | None) -> list[Form]:
+    """Return all of the forms, or those that were asked for. Raises UnknownName."""
     if form is not None and form not in FORMS:
         raise UnknownName("unknown form", form, FORMS)
     forms = FORMS if form is None else (form,)
@@ -29,19 +30,21 @@ def chosen(form: str | None, name: str | None) -> list[Component]:
         raise BadValue(error.what, name) from None
 
 
-def as_json(component: Component) -> dict[str, Any]:
-    """Return all that there is to know of a component."""
+def as_json(component: Form) -> dict[str, Any]:
+    """Return all that there is to know of one."""
+    slots = getattr(component, "slots", {})
     about: dict[str, Any] = {
         "form": component.form,
         "name": component.name,
         "summary": component.summary,
         "class": f"{component.module}:{component.made.__qualname__}",
         "settings": [{"key": key, "value": value, "default": default} for key, value, default in _settings(component)],
-        "slots": None if callable(component.slots) else dict(component.slots),
-        "needs": list(component.needs),
+        "slots": None if callable(slots) else dict(slots),
+        "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
+        "meshes": getattr(component, "meshes", False),
     }
-    if component.value is not None:
+    if isinstance(component, Component) and component.value is not None:
         fields = PayloadCodec(component.value, component.name).fields
         about[CARRIES[component.form]] = [
             {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
@@ -49,17 +52,18 @@ def as_json(component: Component) -> dict[str, Any]:
     return about
 
 
-def line(component: Component) -> str:
-    """Return a component in one line."""
-    return f"{component.form:9} {component.name:16} {component.summary}"
+def line(component: Form) -> str:
+    """Return one in one line."""
+    return f"{component.form:11} {component.name:16} {component.summary}"
 
 
-def lines(component: Component) -> Iterator[str]:
-    """Yield a component in full."""
+def lines(component: Form) -> Iterator[str]:
+    """Yield one in full."""
     about = as_json(component)
     yield f"{component.form} {component.name}, of {about['class']}"
     yield f"  {component.summary}"
-    yield "  settings"
+    if about["settings"]:
+        yield "  settings"
     for setting in about["settings"]:
         default = "required" if setting["default"] is None else f"default {setting['default']}"
         yield f"    {setting['key']}: {setting['value']} ({default})"
@@ -72,13 +76,15 @@ def lines(component: Component) -> Iterator[str]:
         yield f"  slots: {', '.join(counted)}"
     elif about["slots"] is None:
         yield "  slots: by its settings"
-    if component.needs:
-        yield f"  needs a model with: {', '.join(component.needs)}"
+    if about["needs"]:
+        yield f"  needs a model with: {', '.join(about['needs'])}"
+    if about["meshes"]:
+        yield "  has scenery of triangles (shape: mesh)"
     if component.kit:
         yield f"  needs a deployment with: {component.kit}"
 
 
-def _settings(component: Component) -> Iterator[tuple[str, str, str | None]]:
+def _settings(component: Form) -> Iterator[tuple[str, str, str | None]]:
     """Yield key, what is valid, and the default of each setting; None where it is required."""
     schema = component.settings.model_json_schema(by_alias=True)
     required = schema.get("required", ())

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import closing, redirect_stdout
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -16,13 +19,12 @@ from foosim.cli.run_command import with_options
 from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
-from foosim.common.json_text import encode_json
+from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
-from foosim.protocol.run_status import score_text
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
@@ -63,7 +65,7 @@ def foosim_rehearse(
     With --swarm the seed draws 3 to 5 nodes, their clocks, delay, loss and duplication of messages, and 8 to 20 faults
     of at least three kinds in 208 ticks on the pure engine; --for simulates longer, with more faults. Faults are:
     killed, interrupted, paused, slow and stopped processes; partitions in one or both directions and clogs; jumps of
-    memory and clocks; old messages; lost players (every eighth seed); moved robots; added, removed and pushed balls;
+    memory and clocks; old messages; lost players (every eighth seed); moved robots; added, removed and pushed bodies;
     pauses of the run. Every record, message and committed tick is checked against the laws. At the end all faults
     heal, and every process has to take part again.
 
@@ -134,11 +136,11 @@ def _show(process: str, level: str, text: str) -> None:
 def _told(result: dict[str, Any]) -> str:
     """Return a result for people."""
     seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
-    score = f", {score_text(result)}" if result["score"] else ""
+    summary = "".join(f", {text}" for text in result["summary"])
     packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
-    handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
+    handovers = f"{result['handovers']} hand-overs, " if result["solvers"] else ""
     return (
-        f"{seconds:.2f} s simulated at {result['rtf']}x{score}\n"
+        f"{seconds:.2f} s simulated at {result['rtf']}x{summary}\n"
         f"{handovers}packets {packets}\n"
         f"digest of all ticks {result['digest']['chain']}"
         + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
@@ -188,3 +190,29 @@ def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
 def main() -> None:
     """The entry point of `foosim-rehearse`."""
     run_app(app, "foosim-rehearse")
+
+
+# --- for check-component ---------------------------------------------------------------------------------------------
+
+REHEARSE: Final = "from foosim.cli.rehearse import main; main()"
+HASH_SEED: Final = "4711"
+"""Of the other process: sets of texts have another order there."""
+
+
+def elsewhere(text: str, name: str, ticks: int) -> Iterator[str]:
+    """Yield that a process with another seed of Python's hashes computes another world than this one."""
+    here: dict[str, Any] = rehearse(text, name, ticks, 1).json
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / Path(name).name
+        file.write_text(text)
+        span = f"{ticks * here['tick_ns']}ns"
+        command = [sys.executable, "-c", REHEARSE, str(file), "--for", span, "--nodes", "1", "--json"]
+        environment = {**os.environ, "PYTHONHASHSEED": HASH_SEED}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        yield f"in another process it fails: {done.stderr.strip()[-400:]}"
+        return
+    there = decode_json(done.stdout.encode())
+    assert isinstance(there, dict), there
+    if there["digest"] != here["digest"]:
+        yield "another process computes another world"

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 from foosim.client.loading import ClassPathError, load_player
 from foosim.common.finding import Finding
-from foosim.deployment.checks import quoted
+from foosim.common.plain_data import quoted
 from foosim.deployment.schema import Deployment
 from foosim.runtime.process import STACK_SIGNAL, end_with, end_with_stack
 

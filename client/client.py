@@ -1,16 +1,16 @@
 """The library for programs and people: connect to a run, read its robots, command them, send and receive packets.
 
     with connect("tcp/127.0.0.1:7450", "hand") as client:
-        client.subscribe("red.goal", "encoder")
-        goal = client.robots["red.goal"]
+        client.subscribe("red.attack", "encoder")
+        robot = client.robots["red.attack"]
         for tick in client.lockstep(100):
-            sample = goal.sensors["encoder"]
-            goal.actuators["position"].set(slide=0.05, spin=0.0)
+            sample = robot.sensors["encoder"]
+            robot.actuators["position"].set(slide=0.05, spin=0.0)
 
 The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
 until the loop's body is done; after `listen` it goes on by itself. Everything travels as packets through the emulated
 network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
-frame (origin on the floor in the middle of the table, x towards blue's goal, z up). A client belongs to one thread.
+frame (origin on the floor in the middle, z up). A client belongs to one thread.
 """
 
 from __future__ import annotations
@@ -109,11 +109,10 @@ class Actuator:
     def set(self, *numbers: float, **named: float) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
 
-        A rod's `position` takes `slide` in m along world +y from its middle and `spin` in rad about +y, 0 feet down; a
-        rover's `drive` the speeds of the rims of its `left` and `right` wheel in m/s. In lockstep a command is sent at
-        the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps its last
-        command. Raises BadValue for numbers that are out of bounds, not finite, or not those of a command; NotJoined,
-        RunEnded.
+        What the numbers of its kind mean `foosim-supervisor components actuator KIND` says. In lockstep a command is
+        sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
+        its last command. Raises BadValue for numbers that are out of bounds, not finite, or not those of a command;
+        NotJoined, RunEnded.
         """
         payload = self._client._encoder.encode_numbers(self._robot, self._channel, numbers, named)
         self._client._command(self._robot, self._channel, payload)

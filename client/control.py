@@ -205,12 +205,19 @@ def rate(pace: str, run: str | None = None) -> Answer:
 
 
 def add(
-    name: str | None = None, position: Vector | None = None, velocity: Vector | None = None, run: str | None = None
+    name: str | None = None,
+    position: Vector | None = None,
+    velocity: Vector | None = None,
+    run: str | None = None,
+    model: str | None = None,
 ) -> Answer:
-    """Add a ball at `position` (m, world frame) with `velocity` (m/s); by default at the kick-off spot, at rest."""
+    """Add an entity of a model at `position` (m, world frame) with `velocity` (m/s).
+
+    By default it is of the first model of which the world can have more, where the first one of it starts, at rest.
+    """
     for key, vector in (("position", position), ("velocity", velocity)):
         _check_finite(key, vector or ())
-    given = {"name": name, "position": position, "velocity": velocity}
+    given = {"name": name, "position": position, "velocity": velocity, "model": model}
     return _ask(run, "add", **{key: value for key, value in given.items() if value is not None})
 
 
@@ -239,10 +246,10 @@ def start(node: str, run: str | None = None) -> Answer:
     return _ask(run, "start", node=node)
 
 
-def push(impulse: Vector, name: str = "ball", run: str | None = None) -> Answer:
-    """Give a ball an impulse (N s, world frame)."""
+def push(impulse: Vector, name: str | None = None, run: str | None = None) -> Answer:
+    """Give a free body an impulse (N s, world frame); by default the first one by name."""
     _check_finite("impulse", impulse)
-    return _ask(run, "push", impulse=impulse, name=name)
+    return _ask(run, "push", impulse=impulse, **({} if name is None else {"name": name}))
 
 
 def network(event: dict[str, Any], run: str | None = None) -> Answer:

@@ -3,7 +3,7 @@
     with hear_replay("tcp/127.0.0.1:7470") as replay:
         replay.resume()
         for item in replay:
-            if isinstance(item, PlayedPacket) and item.channel == "ball":
+            if isinstance(item, PlayedPacket) and item.channel == "pose":
                 print(item.time_ns, replay.value(item))
 
 Messages (`foosim.protocol.replay_messages`) arrive in the order in which they were published. Times are the capture's

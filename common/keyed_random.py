@@ -37,7 +37,7 @@ class Slot(IntEnum):
 
 
 def draw_key(seed: int, *purpose: str) -> bytes:
-    """Return the 32-byte key of one purpose, e.g. `draw_key(1, "noise", "red.goal", "encoder")`."""
+    """Return the 32-byte key of one purpose, e.g. `draw_key(1, "noise", "red.attack", "encoder")`."""
     hasher = blake2b(struct.pack("<Q", seed), digest_size=32, person=b"foosim draw")
     for part in purpose:
         raw = part.encode()

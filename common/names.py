@@ -7,7 +7,7 @@ import difflib
 import re
 from collections.abc import Iterable
 from itertools import takewhile
-from typing import Final, Literal
+from typing import Final
 
 from foosim.common.limits import NAME_LENGTH_MAX
 
@@ -22,14 +22,7 @@ ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
 SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
 CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
 
-LineName = Literal["goal", "defence", "midfield", "attack"]
-LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attack")
-Team = Literal["red", "blue"]
-TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
-
-# Reserved names: entities that are not robots, for robots; processes other than nodes and players, for nodes, players
-# and clients.
-ENTITY_NAMES_RESERVED: Final = ("ball", "world")
+# Reserved names: of processes other than nodes and players, for nodes, players and clients.
 PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
 CHANNEL_ECHO: Final = "echo"
 """The channel that every robot has; no component may have this name."""
@@ -48,7 +41,7 @@ def is_name(text: str) -> bool:
 
 
 def is_robot_name(text: str) -> bool:
-    """True for the name of a robot: names joined by dots, as in `red.goal`."""
+    """True for the name of a robot: names joined by dots, as in `red.attack`."""
     return len(text) <= NAME_LENGTH_MAX and _ROBOT_NAME.fullmatch(text) is not None
 
 

@@ -7,46 +7,40 @@ network_references.py, rates and offsets are in timing_references.py.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import translate
-from fractions import Fraction
 from typing import Any, Final
 
 from foosim.common import limits, names, units
-from foosim.common.errors import BadValue
-from foosim.common.finding import Finding, Location, path_text
-from foosim.common.names import LINE_NAMES, nearest_name
+from foosim.common.errors import BadValue, Refused
+from foosim.common.finding import Finding, Location
+from foosim.common.plain_data import PlainData
+from foosim.deployment.schema import Deployment
 from foosim.deployment.text.selection import TooManyComparisons
-from foosim.world.forms.models import MODELS
+from foosim.world.forms import registry
+from foosim.world.forms.forms import Engine, Kit
+from foosim.world.layout import WORLD
+from foosim.world.spec import KITS
 
-# Bounds of the checks; the schema refuses larger values.
-TEXTS_MAX: Final = 4096
-NEAREST_MAX: Final = 128
-"""How often a nearest name is looked for: among thousands of names that takes 20 ms, and not all problems are shown."""
-
-WORLD_OF_MODEL: Final[Mapping[str, str]] = {"rod": "table", "camera": "table", "rover": "hall", "station": "hall"}
-"""The kind of world that a model of robot is for."""
-BODILESS: Final = "camera"
-"""The model of robots that have no body."""
+DEPLOYMENT_KEYS: Final = frozenset(
+    field.alias or name for name, field in Deployment.model_fields.items() if name != KITS
+)
+"""The keys of a deployment that are no kit's."""
 
 
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found lazily."""
     view = View(data)
     between = (_names, _people, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
-    for check in (_world, *between, _lines, _shapes, _hall, _scenery):
+    for check in (_kits, *between, _scenery):
         yield from check(view)
 
 
-def quoted(nearest: str | None) -> str | None:
-    return None if nearest is None else repr(nearest)
-
-
-class View:
-    """Tolerant access to plain data: a value of an unexpected kind reads as empty."""
+class View(PlainData):
+    """The plain data of a deployment, with its endpoints."""
 
     def __init__(self, data: object, endpoints: Sequence[str] | None = None) -> None:
-        self.data = data
+        super().__init__(data)
         self.robots = self.mapping("robots")
         self.hosts = self.mapping("hosts")
         self.nodes = self.mapping("nodes")
@@ -55,35 +49,6 @@ class View:
         self.endpoints = [*self.robots, *self.players, *self.clients] if endpoints is None else endpoints
         self._matched: dict[str, list[str]] = {}
         self._compared = 0
-        self._nearest = 0
-
-    def get(self, *path: str | int) -> Any:
-        value = self.data
-        for step in path:
-            if isinstance(value, dict) and isinstance(step, str):
-                value = value.get(step)
-            elif isinstance(value, list) and isinstance(step, int) and step < len(value):
-                value = value[step]
-            else:
-                return None
-        return value
-
-    def mapping(self, *path: str | int) -> Mapping[str, Any]:
-        value = self.get(*path)
-        return value if isinstance(value, dict) else {}
-
-    def texts(self, *path: str | int) -> list[tuple[int, str]]:
-        """The texts of a list, or the single text in place of it, with their indices."""
-        value = self.get(*path)
-        items = value if isinstance(value, list) else [value]
-        return [(index, item) for index, item in enumerate(items[:TEXTS_MAX]) if isinstance(item, str)]
-
-    def length(self, *path: str, world: str = "table") -> Fraction | None:
-        """A length of the table (or hall) in metres, exact; None if it is not one."""
-        try:
-            return units.parse(self.get(world, *path), units.LENGTH)
-        except BadValue:
-            return None
 
     def matched(self, glob: str) -> Sequence[str]:
         """The endpoints that a selector matches, with which it is compared once. Raises TooManyComparisons."""
@@ -96,11 +61,6 @@ class View:
             found = self._matched[glob] = [name for name in self.endpoints if match(name)]
         return found
 
-    def nearest(self, value: str, choices: Iterable[str]) -> str | None:
-        """The valid name most similar to a wrong one, in quotes; it is looked for so many times."""
-        self._nearest += 1
-        return quoted(nearest_name(value, choices)) if self._nearest <= NEAREST_MAX else None
-
     def tick_ns(self) -> int | None:
         try:
             return units.parse_ns(self.get("tick")) or None
@@ -108,21 +68,24 @@ class View:
             return None
 
 
-def _world(view: View) -> Iterator[Finding]:
-    """There is one world, a table or a hall, and robots are in the kind of world that they are for."""
-    given = [kind for kind in WORLD_OF_MODEL.values() if view.get(kind) is not None]
-    if len({*given}) > 1:
-        yield Finding(("hall",), "a hall beside a table: a world is one of them", "hall", at="key")
-    if not given:
-        if not isinstance(view.data, dict):
-            return
-        yield Finding(("table",), "missing key of a world, which is a table or a hall", "table", at="missing")
-        return
-    for name in view.robots:
-        model = view.get("robots", name, "model")
-        needed = WORLD_OF_MODEL.get(model) if isinstance(model, str) else None
-        if needed is not None and needed not in given:
-            yield Finding(("robots", name, "model"), f"a robot of a {needed} in a world without one", model)
+def kits_of(view: PlainData) -> Iterator[tuple[str, Kit]]:
+    """Yield the kits whose sections a deployment has."""
+    for key in view.mapping():
+        if view.get(key) is not None and key not in DEPLOYMENT_KEYS:
+            try:
+                kit = registry.find("kit", key)
+            except Refused:
+                continue
+            assert isinstance(kit, Kit), kit
+            yield key, kit
+
+
+def _kits(view: View) -> Iterator[Finding]:
+    """Settings of a kit fit each other; one kit says what rigid bodies feel."""
+    for _, kit in kits_of(view):
+        check = getattr(kit.made, "check", None)
+        if check is not None:
+            yield from check(view)
 
 
 def _names(view: View) -> Iterator[Finding]:
@@ -130,7 +93,7 @@ def _names(view: View) -> Iterator[Finding]:
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
     for section, scopes, reserved in (
-        ("robots", (endpoints,), names.ENTITY_NAMES_RESERVED),
+        ("robots", (endpoints,), reserved_entities(view)),
         ("nodes", (processes,), names.PROCESS_NAMES_RESERVED),
         ("players", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
         ("clients", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
@@ -144,6 +107,11 @@ def _names(view: View) -> Iterator[Finding]:
             for scope in scopes:
                 scope.setdefault(name, section)
     yield from _processes(view, processes)
+
+
+def reserved_entities(view: PlainData) -> tuple[str, ...]:
+    """Return names that no robot can have: the world itself, and what its kits put into it."""
+    return (WORLD, *(name for _, kit in kits_of(view) for name in kit.entities))
 
 
 def _people(view: View) -> Iterator[Finding]:
@@ -198,27 +166,17 @@ def _hosts(view: View) -> Iterator[Finding]:
 
 
 def _robots(view: View) -> Iterator[Finding]:
-    """Lines exist and have one rod a team; channels have names of their own."""
-    rods: dict[tuple[str, str], str] = {}
-    lines = view.get("table", "lines")
+    """Channels have names of their own."""
     for name in view.robots:
         yield from _channels(view, name)
-        team, line = view.get("robots", name, "team"), view.get("robots", name, "line")
-        if not (isinstance(team, str) and isinstance(line, str)):
-            continue
-        if line in LINE_NAMES and isinstance(lines, dict) and line not in lines:
-            yield Finding(("robots", name, "line"), "not in table.lines", line, view.nearest(line, lines))
-        first = rods.setdefault((team, line), name)
-        if first != name:
-            yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
 
 
 def _channels(view: View, robot: str) -> Iterator[Finding]:
     """The components of a robot have names of their own, and none is called like the channel that every robot has."""
     model = view.get("robots", robot, "model")
     actuators = view.mapping("robots", robot, "actuators")
-    if view.get("robots", robot, "actuators") is None and isinstance(model, str) and model in MODELS:
-        actuators = MODELS[model].actuators
+    if view.get("robots", robot, "actuators") is None and isinstance(model, str):
+        actuators = _usual_actuators(model)
     for section, others in (("sensors", actuators), ("actuators", {})):
         for channel in view.mapping("robots", robot, section):
             location = ("robots", robot, section, channel)
@@ -226,6 +184,23 @@ def _channels(view: View, robot: str) -> Iterator[Finding]:
                 yield Finding(location, "a reserved name", channel, at="key")
             elif channel in others:
                 yield Finding(location, f"a name that is also one of {robot}'s actuators", channel, at="key")
+
+
+def has_body(view: PlainData, model: object) -> bool:
+    """Whether robots of a model are somewhere; of one that is not known, or not for this world, it is taken so."""
+    try:
+        found = registry.find_model(model) if isinstance(model, str) else None
+    except Refused:
+        return True
+    return found is None or found.has_body or bool(found.kit and view.get(found.kit) is None)
+
+
+def _usual_actuators(model: str) -> Mapping[str, Any]:
+    """Return the actuators of robots of a model that say nothing of theirs."""
+    try:
+        return registry.find_model(model).actuators
+    except Refused:
+        return {}
 
 
 def _nodes(view: View) -> Iterator[Finding]:
@@ -323,82 +298,33 @@ def _deadlines(view: View) -> Iterator[Finding]:
         yield Finding(("deadlines", "tick_named"), "longer than tick_lost", view.get("deadlines", "tick_named"))
 
 
-def _lines(view: View) -> Iterator[Finding]:
-    """Figures stay off the side walls, rods span the field, at either end of the stroke."""
-    width, foot, rod = view.length("field", "width"), view.length("rod", "foot", "width"), view.length("rod", "length")
-    for line in view.mapping("table", "lines"):
-        figures = view.get("table", "lines", line, "figures")
-        pitch, stroke = view.length("lines", line, "pitch"), view.length("lines", line, "half_stroke")
-        if width is None or stroke is None:
-            continue
-        location = ("table", "lines", line, "half_stroke")
-        value = view.get(*location)
-        if foot is not None and pitch is not None and isinstance(figures, int) and 1 <= figures <= 11:
-            free = (width - pitch * (figures - 1) - foot) / 2
-            if stroke > free:
-                yield Finding(location, "figures would reach the side wall", value, _millimetres(free))
-        if rod is not None and rod / 2 - stroke < width / 2:
-            yield Finding(location, "the rod would leave the field uncovered", value, _millimetres((rod - width) / 2))
-
-
-def _shapes(view: View) -> Iterator[Finding]:
-    """The table's lengths describe a table that can be built."""
-    for small, big, why in (
-        (("rod", "inner_radius"), ("rod", "radius"), ""),
-        (("rod", "foot_radius"), ("rod", "axis_height"), "the feet would reach the floor: "),
-        (("rod", "figure_com_below_axis"), ("rod", "foot_radius"), ""),
-        (("goal", "width"), ("field", "width"), ""),
-        (("goal", "height"), ("walls", "height"), ""),
-    ):
-        yield from _too_big(view, small, big, why)
-    for side in ("depth", "width", "height"):
-        yield from _too_big(view, ("ball", "radius"), ("goal", side), "the ball would not fit: ", 2)
-
-
-def _too_big(view: View, small: Location, big: Location, why: str, times: int = 1) -> Iterator[Finding]:
-    """A length of the table of which `times` as much is not below another one; `why` that is wrong."""
-    least, most = (view.length(*map(str, where)) for where in (small, big))
-    if least is None or most is None or times * least < most:
-        return
-    small, big = ("table", *small), ("table", *big)
-    twice, half = ("twice that is ", "twice ") if times > 1 else ("", "")
-    below = f"{why}{twice}not below {path_text(big)} ({_mm(most)}), valid is below {_mm(most / times)}"
-    above = f"{why}not above {half}{path_text(small)} ({_mm(least)}), valid is above {_mm(least * times)}"
-    yield Finding(small, below, view.get(*small), other=Finding(big, above, view.get(*big)))
-
-
-def _hall(view: View) -> Iterator[Finding]:
-    """A rover's parts fit each other, and it fits into the hall."""
-    rover: Location = ("hall", "rover")
-    radius, track = view.length("rover", "radius", world="hall"), view.length("rover", "drive", "track", world="hall")
-    sides = [side for name in ("length", "width") if (side := view.length(name, world="hall")) is not None]
-    if radius is not None and sides and 2 * radius > min(sides):
-        yield Finding((*rover, "radius"), "more than half of the hall's least side", view.get(*rover, "radius"))
-    if radius is not None and track is not None and track > 2 * radius:
-        what = "the wheels would be outside of the rover: more than twice its radius"
-        yield Finding((*rover, "drive", "track"), what, view.get(*rover, "drive", "track"))
-    empty = view.get(*rover, "battery", "empty")
-    try:
-        below = units.parse(empty, units.VOLTAGE) < units.parse(view.get(*rover, "battery", "full"), units.VOLTAGE)
-    except BadValue:
-        return
-    if not below:
-        yield Finding((*rover, "battery", "empty"), "not below the full battery's voltage", empty)
-
-
 def _scenery(view: View) -> Iterator[Finding]:
-    """The pure engine has no meshes, a hall no ball that feels surfaces; waves cross a material, or have a loss."""
+    """Some engines have no meshes, only free bodies feel surfaces; waves cross a material, or have a loss."""
+    engine = view.get("engine")
+    no_meshes = isinstance(engine, str) and _is_without_meshes(engine)
+    has_rigid = any(registry.find_model(model).is_free for _, kit in kits_of(view) for model in kit.entities.values())
     for name in view.mapping("scenery"):
         if name in view.robots:
             yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")
-        if view.get("table") is None:
+        if not has_rigid:
             surface = view.get("scenery", name, "surface")
             if surface is not None:
-                yield Finding(("scenery", name, "surface"), "a surface for a ball, in a world without one", surface)
-        elif view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":
-            what = "the engine pure has no meshes (boxes and cylinders it has, and the engine bullet has all)"
+                what = "a surface for free bodies, in a world without any"
+                yield Finding(("scenery", name, "surface"), what, surface)
+        elif no_meshes and view.get("scenery", name, "shape") == "mesh":
+            what = f"the engine {engine} has no meshes (boxes and cylinders it has, and the engine bullet has all)"
             yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
         yield from _radio(view, ("scenery", name, "radio"))
+
+
+def _is_without_meshes(engine: str) -> bool:
+    """Whether an engine is known to have no meshes; what is wrong with its name is found elsewhere."""
+    try:
+        found = registry.find("engine", engine)
+    except Refused:
+        return False
+    assert isinstance(found, Engine), found
+    return not found.meshes
 
 
 def _radio(view: View, radio: Location) -> Iterator[Finding]:
@@ -409,11 +335,3 @@ def _radio(view: View, radio: Location) -> Iterator[Finding]:
     for key in ("is", "thickness"):
         if key in given and "loss" in given:
             yield Finding((*radio, key), "a loss holds whatever it is made of: not beside one", key, at="key")
-
-
-def _millimetres(length: Fraction) -> str | None:
-    return None if length <= 0 else f"'{_mm(length)}'"
-
-
-def _mm(length: Fraction) -> str:
-    return f"{float(length * 1000):g} mm"

@@ -1,75 +1,178 @@
-"""Reads the settings of the components of robots: those of a kind are checked by the class that registered it.
+"""Reads the settings of all forms of a deployment: those of a kind are checked by the class that registered it.
 
 Kinds are open, so their settings are read before the schema of the deployment is applied, which takes what was read as
-it is.
+it is: of kits, rules of the world, the scene, robots and their components.
 """
 
-from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.common.finding import Finding, Location
+from foosim.common.spec_base import SpecBase
 from foosim.common.units import parse_ns, period_ticks
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.models import MODELS
+from foosim.world.forms.forms import Carrier, Component, Form, Model
 from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
-from foosim.world.forms.registry import Carrier, Component
-from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, ModifierSettings, SensorSettings
+from foosim.world.forms.settings import (
+    ActuatorSettings,
+    ComponentSettings,
+    EntityRuleSettings,
+    ModifierSettings,
+    RobotSettings,
+    RuleSettings,
+    SceneSettings,
+    SensorSettings,
+)
+from foosim.world.spec import KITS
 
 SECTIONS: Final[Mapping[str, tuple[str, type[ComponentSettings]]]] = {
     "sensors": ("sensor", SensorSettings),
     "actuators": ("actuator", ActuatorSettings),
+    "rules": ("entity_rule", EntityRuleSettings),
 }
 """The sections of a robot that have components: their form, and what all settings have."""
+OF_MODEL: Final = ("actuators", "rules")
+"""The sections of which a robot that says nothing has those of its model."""
+WORDS: Final = {"entity_rule": "rule of entities", "rule": "rule of worlds"}
+"""What forms are called, where that is not their name."""
 
 
-def read_components(data: Any) -> tuple[Any, list[Finding]]:
-    """Return a deployment's plain data with the settings of all components read, and what is wrong with them.
+def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Finding]]:
+    """Return a deployment's plain data with the settings of all forms read, and what is wrong with them.
 
-    A robot that says nothing of its actuators has those of its model.
+    `known` are the keys of a deployment; any other that is the name of a kit is that kit's section.
     """
-    robots = data.get("robots") if isinstance(data, dict) else None
-    if not isinstance(robots, dict):
+    if not isinstance(data, dict):
         return data, []
     reader = _Reader(data)
-    read = {name: reader.robot(("robots", name), robot) for name, robot in robots.items()}
-    return {**data, "robots": read}, reader.findings
+    reader.findings += _unknown_engine(data.get("engine"))
+    read = {key: value for key, value in data.items() if key != KITS}
+    kits = {key: read.pop(key) for key in data if key not in known and reader.is_kit(key)}
+    if KITS in data:
+        reader.findings.append(Finding((KITS,), "unknown key", KITS, at="key"))
+    read[KITS] = {key: reader.kit(key, section) for key, section in kits.items() if section is not None}
+    reader.kits = {*read[KITS]}
+    robots = data.get("robots")
+    if isinstance(robots, dict):
+        read["robots"] = {name: reader.robot(("robots", name), robot) for name, robot in robots.items()}
+    rules = data.get("rules")
+    if isinstance(rules, dict):
+        read["rules"] = {
+            name: reader.component("rule", RuleSettings, None, ("rules", name), settings)
+            for name, settings in rules.items()
+        }
+    if isinstance(data.get("scene"), dict):
+        read["scene"] = reader.component("scene", SceneSettings, None, ("scene",), data["scene"])
+    return read, reader.findings
+
+
+def _unknown_engine(kind: Any) -> Iterator[Finding]:
+    """Yield what is wrong with the name of an engine; whether it is a text is the schema's to say."""
+    if not isinstance(kind, str):
+        return
+    try:
+        registry.find("engine", kind)
+    except UnknownName as error:
+        yield Finding(("engine",), error.problem, kind, error.nearest)
+    except Refused as error:
+        yield Finding(("engine",), error.what, kind)
 
 
 class _Reader:
-    """Reads the robots of one deployment, and gathers what is wrong."""
+    """Reads the forms of one deployment, and gathers what is wrong."""
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self._data = data
+        self.kits: set[str] = set()
         self.findings: list[Finding] = []
         self._read: dict[tuple[str, Any, int], Any] = {}
         """What was read without findings: by form, model and the identity of the plain data, which lives as long."""
 
+    def is_kit(self, key: Any) -> bool:
+        """Whether a kit has this name; one that cannot be imported is reported."""
+        if not isinstance(key, str):
+            return False
+        try:
+            registry.find("kit", key)
+        except UnknownName:
+            return False
+        except Refused as error:
+            if ":" in key:
+                self.findings.append(Finding((key,), error.what, key, at="key"))
+            return False
+        return True
+
+    def kit(self, name: str, section: Any) -> Any:
+        """Return the settings of a kit; in place of what is refused, settings without any."""
+        settings = registry.find("kit", name).settings
+        try:
+            return settings.model_validate(section)
+        except ValidationError as error:
+            self.findings += settings_findings(error, settings, (name,))
+            return SpecBase.model_construct()
+
     def robot(self, location: Location, robot: Any) -> Any:
-        """Return the data of a robot with the settings of its components read."""
+        """Return the settings of a robot; in place of what is refused, settings that say its model alone."""
         if not isinstance(robot, dict):
             return robot
-        model = robot.get("model")
-        if isinstance(model, str) and model in MODELS and robot.get("actuators") is None:
-            robot = {**robot, "actuators": dict(MODELS[model].actuators)}
+        name = robot.get("model")
+        if not isinstance(name, str):
+            what = "missing key" if name is None else "not a text"
+            at: Literal["missing", "value"] = "missing" if name is None else "value"
+            self.findings.append(Finding((*location, "model"), what, name or "model", at=at))
+            return RobotSettings.model_construct(model="")
+        try:
+            model = registry.find_model(name)
+        except UnknownName as error:
+            choices = [other.name for other in _models_of_robots()]
+            refused = error if ":" in name else UnknownName("unknown model", name, choices)
+            self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
+        except Refused as error:
+            self.findings.append(Finding((*location, "model"), error.what, name))
+        else:
+            return self._robot_of(model, location, robot)
+        self._components_of(None, location, robot)
+        return RobotSettings.model_construct(model=name)
+
+    def _robot_of(self, model: Model, location: Location, robot: Mapping[str, Any]) -> Any:
+        if not model.is_robot:
+            what = f"no model of robots: {model.name} is there without an owner"
+            self.findings.append(Finding((*location, "model"), what, robot["model"]))
+            return RobotSettings.model_construct(model=model.name)
+        if model.kit and model.kit not in self.kits:
+            what = f"a robot of a {model.kit} in a world without one"
+            self.findings.append(Finding((*location, "model"), what, robot["model"]))
+        for section in OF_MODEL:
+            if robot.get(section) is None:
+                robot = {**robot, section: dict(getattr(model, section))}
+        found = self._components_of(model, location, robot)
+        try:
+            return model.settings.model_validate(found)
+        except ValidationError as error:
+            self.findings += settings_findings(error, model.settings, location)
+            return RobotSettings.model_construct(model=model.name)
+
+    def _components_of(self, model: Model | None, location: Location, robot: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the data of a robot with the settings of its components read."""
         found = dict(robot)
         for section, (form, base) in SECTIONS.items():
             if isinstance(robot.get(section), dict):
                 found[section] = {
-                    name: self._component(form, base, model, (*location, section, name), settings)
+                    name: self.component(form, base, model, (*location, section, name), settings)
                     for name, settings in robot[section].items()
                 }
         self.findings += _competing(found.get("actuators"), (*location, "actuators"))
         return found
 
-    def _component(
-        self, form: str, base: type[ComponentSettings], model: Any, location: Location, settings: Any
+    def component(
+        self, form: str, base: type[ComponentSettings], model: Model | None, location: Location, settings: Any
     ) -> Any:
         """Return the settings of one component. What many robots share, by a template, is read once."""
-        key = form, model, id(settings)
+        key = form, None if model is None else model.name, id(settings)
         if key not in self._read:
             count = len(self.findings)
             read = self._read_component(form, base, model, location, settings)
@@ -79,7 +182,7 @@ class _Reader:
         return self._read[key]
 
     def _read_component(
-        self, form: str, base: type[ComponentSettings], model: Any, location: Location, settings: Any
+        self, form: str, base: type[ComponentSettings], model: Model | None, location: Location, settings: Any
     ) -> Any:
         """Return the settings of one component; in place of what is refused, settings that say its kind alone."""
         kind = settings.get("kind") if isinstance(settings, dict) else None
@@ -94,6 +197,7 @@ class _Reader:
                 settings = {**settings, "modifiers": [*self._modifiers((*location, "modifiers"), modifiers)]}
             found = component.settings.model_validate(settings)
             if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
+                assert isinstance(component, Component), component
                 self.findings += self._unfit_modifiers(component, found, location)
             return found
         except UnknownName as error:
@@ -104,21 +208,23 @@ class _Reader:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
         return base.model_construct(kind=kind)
 
-    def _misfits(self, component: Component, model: Any, location: Location, kind: str) -> Iterator[Finding]:
+    def _misfits(self, component: Form, model: Model | None, location: Location, kind: str) -> Iterator[Finding]:
         """Yield what the world or a model does not have that a component needs."""
-        if component.kit and self._data.get(component.kit) is None:
-            yield Finding(location, f"{component.form} of a {component.kit} in a world without one", kind)
+        word = WORDS.get(component.form, component.form)
+        if component.kit and component.kit not in self.kits:
+            yield Finding(location, f"{word} of a {component.kit} in a world without one", kind)
             return
-        known = MODELS.get(model) if isinstance(model, str) else None
-        missing = [] if known is None else [field for field in component.needs if field not in known.slots]
-        if missing:
-            fitting = ", ".join(name for name, other in MODELS.items() if {*component.needs} <= {*other.slots})
-            lacking = f"a {model} cannot carry, which has no {', '.join(missing)}"
-            yield Finding(location, f"{component.form} that {lacking} (valid on: {fitting})", kind)
+        needs: tuple[str, ...] = getattr(component, "needs", ())
+        needs += tuple(field for field in (getattr(component, "speaks", ""),) if field and field not in needs)
+        missing = [] if model is None else [field for field in needs if field not in model.slots]
+        if missing and model is not None:
+            fitting = ", ".join(other.name for other in _models_of_robots() if {*needs} <= {*other.slots})
+            lacking = f"a {model.name} cannot carry, which has no {', '.join(missing)}"
+            yield Finding(location, f"{word} that {lacking} (valid on: {fitting or 'none'})", kind)
 
     def _modifiers(self, location: Location, modifiers: list[Any]) -> Iterator[Any]:
         for number, settings in enumerate(modifiers):
-            yield self._component("modifier", ModifierSettings, None, (*location, number), settings)
+            yield self.component("modifier", ModifierSettings, None, (*location, number), settings)
 
     def _unfit_modifiers(
         self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
@@ -134,7 +240,11 @@ class _Reader:
             period_ns = self._period_ns(settings)
             if type(modifier) is not ModifierSettings and period_ns is not None:
                 yield from _unfit(
-                    registry.find("modifier", modifier.kind), modifier, Carrier(numbers.size, period_ns), numbers, place
+                    registry.find_component("modifier", modifier.kind),
+                    modifier,
+                    Carrier(numbers.size, period_ns),
+                    numbers,
+                    place,
                 )
 
     def _period_ns(self, settings: SensorSettings | ActuatorSettings) -> int | None:
@@ -147,6 +257,11 @@ class _Reader:
             return None
 
 
+def _models_of_robots() -> list[Model]:
+    found = map(registry.find_model, registry.names("model"))
+    return [model for model in found if model.is_robot]
+
+
 def _competing(actuators: Any, location: Location) -> Iterator[Finding]:
     """Yield the actuators that command motors which another one commands already."""
     moving = [
@@ -154,7 +269,7 @@ def _competing(actuators: Any, location: Location) -> Iterator[Finding]:
         for name, settings in (actuators.items() if isinstance(actuators, dict) else ())
         if type(settings) is not ActuatorSettings
         and isinstance(settings, ActuatorSettings)
-        and registry.find("actuator", settings.kind).moves
+        and registry.find_component("actuator", settings.kind).moves
     ]
     for name, kind in moving[1:]:
         yield Finding((*location, name, "kind"), f"commands the motors that {moving[0][0]} commands already", kind)

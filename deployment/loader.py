@@ -4,7 +4,7 @@ The text is scanned before anything is built (text/yaml.py), with what it includ
 (text/expand.py), then checked against the schema (schema.py, schema_errors.py) and for what lies between its parts
 (checks.py and its neighbours). Every problem becomes one line,
 
-    deploy/table.yaml:7:11: nodes.red.robots[1]: unknown robot, 'red.gaol', nearest is 'red.goal'
+    deploy/table.yaml:7:11: nodes.red.robots[1]: unknown robot, 'red.atack', nearest is 'red.attack'
 
 that is `file:line:column: what, value, nearest valid name`, in the order of the files. Settings given on a command
 line are placed in the same tree first: overrides.py.
@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
-from foosim.deployment.checks import check_references
+from foosim.deployment.checks import DEPLOYMENT_KEYS, check_references
 from foosim.deployment.components import read_components
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network_checks import check_network, check_network_alone
@@ -29,7 +29,6 @@ from foosim.deployment.overrides import place_sets
 from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
-from foosim.deployment.table_clearance import clearance_findings
 from foosim.deployment.text.each import without_places_by_node
 from foosim.deployment.text.expand import Expanded, expand
 from foosim.deployment.text.includes import Source, read_source
@@ -52,7 +51,7 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
-from foosim.world.scenes.hall_start import start_findings
+from foosim.world.assembly.sections import findings_of
 
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
@@ -279,14 +278,14 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-        between = first(start_findings(deployment), clearance_findings(deployment), rules, place_findings(deployment))
+        between = first(findings_of(deployment), rules, place_findings(deployment))
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
 
 
 def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:
     """The deployment that plain data is, or what the components of its robots and what the schema refuse."""
-    data, findings = read_components(data)
+    data, findings = read_components(data, DEPLOYMENT_KEYS)
     try:
         deployment = Deployment.model_validate(data)
     except ValidationError as error:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from foosim.common import names, units
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.deployment.checks import BODILESS, View
+from foosim.deployment.checks import View, has_body
 from foosim.deployment.network.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.deployment.network.rules import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
 from foosim.deployment.radio_checks import is_on_air, radio_findings
@@ -108,7 +108,7 @@ def _placeless(view: View) -> Iterator[Finding]:
             continue
         section = next(one for one in ("players", "clients", "robots") if endpoint in view.mapping(one))
         robot = endpoint if section == "robots" else view.get(section, endpoint, "on")
-        if isinstance(robot, str) and (view.get("robots", robot, "model") != BODILESS or view.get("table") is None):
+        if isinstance(robot, str) and has_body(view, view.get("robots", robot, "model")):
             continue
         what = f"carries the radio {on_air[0]}, but is nowhere: write network.places.{endpoint}"
         yield Finding(

@@ -1,6 +1,6 @@
 """Settings of a command line, `--set a.b=VALUE`, placed in the tree of a deployment file.
 
-The path is made of keys joined by dots, as messages print it: `robots.red.goal.sensors.encoder.rate`. Where names hold
+The path is made of keys joined by dots, as messages print it: `robots.arm.sensors.encoder.rate`. Where names hold
 dots themselves, the longest key that fits is meant; a new one is written in double quotes. An entry of a list is named
 by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply in order; what they hold is placed at
 `--set:N:COLUMN`, N counting settings from 1.

@@ -14,13 +14,14 @@ from typing import Any, Final
 from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.deployment.checks import BODILESS, View
+from foosim.deployment.checks import View
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.presets import PRESETS, preset_settings
 from foosim.deployment.network.radios import lora_longest
 from foosim.deployment.network.rules import Event, LinkRule, Network
 from foosim.deployment.schema import Deployment
+from foosim.world.forms import registry
 
 BANDWIDTHS: Final = {"802.11a/g": ("20 MHz", "10 MHz"), "802.11n": ("20 MHz",)}
 """Of Wi-Fi: those whose rates are known here; 10 MHz is 802.11p."""
@@ -257,7 +258,7 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
     others: list[str] = []
     for end in ends if on_air else ():
         robot = deployment.robots.get(profiles.body(end))
-        has_body = robot is not None and (deployment.is_hall or robot.model != BODILESS)
+        has_body = robot is not None and registry.find_model(robot.model).has_body
         if has_body or network.place_of(end) is not None:
             continue
         others = others or _representatives(profiles, _kinds(profiles, ends))

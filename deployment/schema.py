@@ -3,7 +3,7 @@
 This is the schema. Text becomes a `Deployment` in deployment_file.py only, because what one field cannot know (every
 robot has one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too,
 by references.py. Quantities are strings with units in the file and SI numbers here; times are integer nanoseconds
-whose names end in `_ns` (see units.py). The table's parameters are in table.py, a hall's in hall.py.
+whose names end in `_ns` (see units.py). The settings of robots, components and kits are in their forms (world/).
 """
 
 from collections.abc import Mapping
@@ -152,7 +152,7 @@ def _int_only(value: object) -> object:
 class Deployment(WorldSpec):
     """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded.
 
-    The world is a football table or a hall with mobile robots: one of `table` and `hall` is given.
+    Sections of kits, which make a world from few numbers, stand beside these keys: `table` and `hall` are such.
     """
 
     format: Annotated[Literal[2], BeforeValidator(_int_only, json_schema_input_type=Literal[2])]

@@ -16,8 +16,8 @@ from pydantic_core import ErrorDetails
 from foosim.common import names
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
+from foosim.common.plain_data import quoted
 from foosim.deployment import hosts
-from foosim.deployment.checks import quoted
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {

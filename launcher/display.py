@@ -14,11 +14,12 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from foosim.protocol.run_status import CLOSING, score_text
+from foosim.protocol.run_status import CLOSING
 from foosim.runtime.disk import megabytes
 
 LINKS_SHOWN_MAX: Final = 20
 ENTITIES_SHOWN_MAX: Final = 6
+SOLVERS_SHOWN_MAX: Final = 3
 AWAY: Final = "(before the vHub was lost)"
 
 
@@ -49,24 +50,9 @@ def pace_text(status: dict[str, Any]) -> str:
 
 
 def world_texts(status: dict[str, Any]) -> list[str]:
-    """Return a summary of the world: score and ball of a table, the rovers of a hall."""
-    of_table = [score_text(status), ball_text(status)] if status["score"] else []
-    return of_table + ([rovers_text(status)] if status["rovers"] else [])
-
-
-def rovers_text(status: dict[str, Any]) -> str:
-    """`20 rovers, 18 drive, rover07 has 34 % of its charge`."""
-    rovers = status["rovers"]
-    count, drive, least, charge = (rovers[key] for key in ("count", "drive", "least", "charge"))
-    return f"{count} rovers, {drive} drive, {least} has {charge:.0%} of its charge"
-
-
-def ball_text(status: dict[str, Any]) -> str:
-    """`ball at 0.123 -0.045 0.018 m, solved by red`."""
-    ball = status["ball"]
-    x, y, z = ball["position"]
-    text = f"ball at {x:+.3f} {y:+.3f} {z:+.3f} m"
-    return f"{text}, solved by {ball['solver']}" if ball["solver"] else text
+    """Return a summary of the world: what its rules and kits say, and who solves its free bodies."""
+    solvers = [f"{name} solved by {node}" for name, node in status["solvers"].items()]
+    return [*status["summary"], *solvers[:SOLVERS_SHOWN_MAX]]
 
 
 def recovery_text(entry: dict[str, Any]) -> str:
@@ -162,7 +148,7 @@ def _head(status: dict[str, Any]) -> Text:
 def _processes(status: dict[str, Any]) -> Table:
     """Nodes with their hosts and shared processes, if any, their entities and their load; then the other roles.
 
-    The load is a table's share of the ball's ticks, or a hall's ticks in which the node solved a rover.
+    Beside them is each node's share of the ticks of free bodies, or without any the ticks in which it solved a body.
     """
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
     processes = status["processes"]
@@ -170,8 +156,8 @@ def _processes(status: dict[str, Any]) -> Table:
     hosts, shared = any(process["host"] for process in processes.values()), status["shared"]
     columns = [("name", "left"), *([("process", "left")] if shared else []), *([("host", "left")] if hosts else [])]
     columns.append(("owns", "left"))
-    balls = sum(node["ball_ticks"] for node in nodes.values())
-    solved = "ball ticks" if balls else "solved ticks"
+    free = sum(node["free_ticks"] for node in nodes.values())
+    solved = "free bodies" if free else "solved ticks"
     for column, justify in (*columns, (solved, "right"), ("load", "right")):
         table.add_column(column, justify=justify)  # type: ignore[arg-type]
     table.add_column("waits for", no_wrap=True)
@@ -182,7 +168,7 @@ def _processes(status: dict[str, Any]) -> Table:
             *([shared.get(name, name)] if shared else []),
             *([process["host"] if process else ""] if hosts else []),
             "" if node is None else _listed(node["owned"]),
-            "" if node is None else f"{node['ball_ticks'] / balls:.0%}" if balls else str(node["solved_ticks"]),
+            "" if node is None else f"{node['free_ticks'] / free:.0%}" if free else str(node["solved_ticks"]),
             "-" if process is None else f"{process['busy']:.0%}",
             _doing(process),
         )

@@ -18,14 +18,13 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, refuse_findings
 from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import VHUB, Deployment, places
-from foosim.deployment.table_clearance import clearance_findings
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.protocol import identity
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
+from foosim.world.assembly.sections import findings_of
 from foosim.world.scenery import SceneryMesh
-from foosim.world.scenes.hall_start import start_findings
 
 if TYPE_CHECKING:
     from foosim.capture.start_frame import Branch
@@ -107,7 +106,7 @@ def check_players_here(plan: Plan) -> None:
 
 def check_meshes(deployment: Deployment, options: RunOptions) -> None:
     """Raise DeploymentError for meshes that bodies start in or pass through. Their files must have been read."""
-    findings = [*start_findings(deployment), *clearance_findings(deployment)]
+    findings = list(findings_of(deployment))
     if findings:
         refuse_findings(read_source_file(options.file), str(options.file), findings, options.all_sets)
 
@@ -119,7 +118,7 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     if any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values()):
-        from foosim.node.engines.mesh_trial import check_models
+        from foosim.node.physics.mesh_trial import check_models
 
         check_models(deployment, name, text)
         check_meshes(deployment, options)

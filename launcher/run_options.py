@@ -28,9 +28,11 @@ class RunOptions:
     ] = None
     sets: Annotated[
         tuple[str, ...],
-        typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
+        typer.Option("--set", help="Change the deployment, e.g. --set table.gravity='9.83 m/s2'; may be repeated."),
     ] = ()
-    engine: Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")] = None
+    engine: Annotated[
+        str | None, typer.Option("--engine", help="bullet, pure or another; short for --set engine=NAME.")
+    ] = None
     listen: Annotated[
         str | None,
         typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),

@@ -45,10 +45,10 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.initial_state import initial_frame
-from foosim.world.islands import Assignment, Share, reach_of
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.robot_packets import Outbox
 from foosim.world.start import AddedEntity
@@ -228,6 +228,12 @@ class NodeCore:
         if stepper is None:
             stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout)
         return stepper
+
+    def make_anew(self) -> None:
+        """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
+        self._steppers.clear()
+        if self._term is not None:
+            self._term = self._make_term(self._term.assignment.layout)
 
     def statistics(self) -> NodeStatistics:
         tick = self.frame.tick if self.frame is not None else 0

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from foosim.world.assembly.world import body_of, model_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView
 from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after
+from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.initial_state import place_ball
 from foosim.world.layout import Layout
 from foosim.world.spec import WorldSpec
 
@@ -17,29 +18,48 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, 
     """Return layout and numbers of the edited frame; the order's edits apply in their order."""
     layout = layout_after(frame.layout, edits)
     numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
+    view = WritableView(frame.tick, numbers)
     for change in fitting_edits(frame.layout, edits) if edits else ():
         if isinstance(change, Add) and change.name in layout:
-            place_ball(numbers, layout[change.name], change.position, change.velocity)
+            model_of(spec, layout, layout[change.name]).place_at(view, change.position, change.velocity)  # type: ignore[attr-defined]
         elif isinstance(change, Push) and change.name in layout:
-            _push(numbers, layout, change, spec.table.ball.mass)
+            _push(numbers, layout, change, spec)
         elif isinstance(change, Freeze | Thaw):
-            _take_out(WritableView(frame.tick, numbers), numbers, spec, layout, change)
+            _take_out(view, numbers, spec, layout, change)
     return layout, numbers
 
 
 def _moved(frame: Frame, layout: Layout) -> list[float]:
-    """Return a frame's numbers in another layout; entities that are new there are zero."""
+    """Return a frame's numbers in another layout; entities that are new there are zero.
+
+    References follow their entities; those to entities that are gone become -1.
+    """
     numbers = [0.0] * layout.size
     for entity in layout.entities:
         if entity.name in frame.layout:
             old = frame.layout[entity.name]
             numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
+        else:
+            for place in layout.references:
+                if entity.start <= place < entity.stop:
+                    numbers[place] = NO_ENTITY
+    for place in layout.references:
+        numbers[place] = moved_reference(numbers[place], frame.layout, layout)
     return numbers
 
 
-def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None:
-    """Change the velocity by impulse / mass."""
-    start = layout[push.name].offsets["linear_velocity"]
+def moved_reference(reference: float, old: Layout, new: Layout) -> float:
+    """Return a reference to an entity in another layout, -1 where the entity is gone."""
+    if not 0.0 <= reference < len(old.entities):
+        return NO_ENTITY
+    name = old.entities[int(reference)].name
+    return float(new[name].index) if name in new else NO_ENTITY
+
+
+def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> None:
+    """Change the velocity of a free body by impulse / mass."""
+    entity = layout[push.name]
+    start, mass = entity.offsets["linear_velocity"], body_of(spec, layout, entity).links[0].mass
     for axis, impulse in enumerate(push.impulse):
         numbers[start + axis] += impulse / mass
 

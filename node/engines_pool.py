@@ -13,11 +13,11 @@ import numpy as np
 
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
-from foosim.node.engines import build_in_steps, make_engine, prepare_spares
-from foosim.node.engines.interface import Engine, EngineFactory
+from foosim.node.physics.interface import Engine, EngineFactory
+from foosim.node.physics.making import build_in_steps, make_engine, prepare_spares
 from foosim.node.tick import Stepper, Work
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.view import ComponentError
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Layout, build_layout
 from foosim.world.mesh import Mesh
 
@@ -76,7 +76,7 @@ class Solver:
             yield
             return self._factory(deployment, layout)
         if not self.fingerprint:
-            prepare_spares(deployment)
+            prepare_spares(deployment, layout)
         return (yield from build_in_steps(deployment, layout))
 
     def _take(self, layout: Layout, engine: Engine) -> None:
@@ -93,7 +93,8 @@ class Solver:
         self._core.engine_ready(layout, self.fingerprint)
 
     def rebuild(self) -> None:
-        """Replace every engine by a new one: nothing that matters is lost."""
+        """Replace every engine, and all that computes beside it, by new ones: nothing that matters is lost."""
+        self._core.make_anew()
         for layout in self._core.layouts_wanted:
             old = self._engines.pop(layout.digest, None)
             if old is not None:
@@ -130,7 +131,7 @@ class Solver:
 
 
 def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
-    """Return the digest of a fixed small run: a kicked ball among turning rods, or rovers in curves, 32 ticks.
+    """Return the digest of a fixed small run: the stirred world, 32 ticks.
 
     It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
     as they were read here, are part of it.
@@ -141,7 +142,7 @@ def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
     stepper.world.stir(numbers)
     base = build_layout(deployment)
     declared = [entity for entity in layout.entities if entity.name in base]
-    bodies = tuple(entity for entity in declared if entity.has_body)
+    bodies = tuple(entity for entity in declared if entity.is_solved)
     for tick in range(FINGERPRINT_TICKS):
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)

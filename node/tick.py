@@ -14,9 +14,10 @@ import msgspec
 
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
-from foosim.node.edited_frame import edit
-from foosim.node.engines.interface import Engine
-from foosim.world.components.fitted import FittedActuator, sensors_of
+from foosim.node.edited_frame import edit, moved_reference
+from foosim.node.physics.interface import Engine
+from foosim.world.assembly.world import World
+from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.edits import Edit
@@ -24,7 +25,6 @@ from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
-from foosim.world.scenes.worlds import world_of
 
 ECHO = "echo"
 
@@ -50,7 +50,7 @@ class Stepper:
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self.deployment = deployment
         self.layout = layout
-        self.world = world_of(deployment, layout)
+        self.world = World(deployment, layout)
         self.substeps = deployment.substeps
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
@@ -73,7 +73,7 @@ class Stepper:
         packets: list[RobotPacket] = []
         tick, outboxes, numbers = frame.tick, frame.outboxes, frame.numbers
         awake = [robot for robot in robots if numbers[robot.offsets["down"]] == 0.0]
-        due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick)] for robot in awake}
+        due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick, numbers)] for robot in awake}
         view = SensingView(tick, numbers, frame.values)
         payloads = iter(self._sensing.sample([one for sensors in due.values() for one in sensors], view))
         for robot in awake:
@@ -99,7 +99,8 @@ class Stepper:
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
-        self.world.apply_rules(numbers, layout)
+        world = self.world if layout is self.layout else World(self.deployment, layout)
+        world.apply_rules(numbers, frame.tick)
         return layout, numbers
 
     def deliver(
@@ -147,17 +148,22 @@ class Stepper:
         if any(numbers[entity.offsets["quarantined"]] != 0.0 for entity in bodies):
             for entity in bodies:
                 if numbers[entity.offsets["quarantined"]] != 0.0:
-                    _clear_log(entity, numbers)
+                    _clear_results(entity, numbers)
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
         if not bodies:
             return
-        actuators, view = self.world.actuators, View(work.tick, numbers)
-        driven = [entity for entity in bodies if entity.index in actuators]
-        engine.load(bodies, numbers)
-        engine.command(driven, [_motors(actuators[entity.index], view) for entity in driven])
-        engine.step(self.substeps)
-        before = numbers.copy()
-        engine.read(bodies, numbers)
+        world, before = self.world, numbers.copy()
+        rigid = [entity for entity in bodies if entity.is_rigid]
+        if rigid:
+            view = View(work.tick, numbers)
+            driven = [entity for entity in rigid if entity.index in world.actuators]
+            engine.load(rigid, numbers)
+            engine.command(driven, [world.motors(entity, view) for entity in driven])
+            engine.step(self.substeps)
+            engine.read(rigid, numbers)
+        if len(rigid) < len(bodies):
+            world.move(bodies, before, numbers, work.tick)
+        world.apply_entity_rules(bodies, numbers, work.tick)
         if not (isfinite(sum(numbers)) and all(self.world.plausible(entity, numbers, before) for entity in bodies)):
             self._quarantine(work, before)
 
@@ -181,30 +187,30 @@ class Stepper:
                 continue
             for entity in island:
                 numbers[entity.start : entity.split] = before[entity.start : entity.split]
-                _clear_log(entity, numbers)
+                _clear_results(entity, numbers)
             for entity in bad:
                 numbers[entity.offsets["quarantined"]] = 1.0
 
 
-def _motors(fitted: Sequence[FittedActuator], view: View) -> tuple[tuple[float, float], ...]:
-    """Return what the actuators of a robot ask of its motors, in the order of their channels."""
-    if len(fitted) == 1:
-        return fitted[0].command(view)
-    return tuple([motor for one in fitted for motor in one.command(view)])
-
-
-def _clear_log(entity: Entity, numbers: list[float]) -> None:
-    """Empty the contact log of a body that was not solved: a contact happens once."""
+def _clear_results(entity: Entity, numbers: list[float]) -> None:
+    """Empty the contact log and the efforts of a body that was not solved: they are those of one tick."""
     start = entity.offsets.get("contacts")
     if start is not None:
         numbers[start : start + 3] = (0.0, 0.0, -1.0)
+    start = entity.offsets.get("joint_efforts")
+    if start is not None:
+        count = entity.counts["joint_efforts"]
+        numbers[start : start + count] = [0.0] * count
 
 
 def moved_slots(written: dict[int, float], old: Layout, new: Layout) -> dict[int, float]:
     """Return numbers of owners' slots, by place, at their places in another layout."""
     moved: dict[int, float] = {}
+    references = frozenset(old.references)
     for entity in old.robots:
         if entity.name in new:
             shift = new[entity.name].split - entity.split
-            moved |= {at + shift: number for at, number in written.items() if entity.split <= at < entity.stop}
+            for at, number in written.items():
+                if entity.split <= at < entity.stop:
+                    moved[at + shift] = moved_reference(number, old, new) if at in references else number
     return moved

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from foosim.deployment.schema import Deployment
+from foosim.world.parameters.table import table_of
 from foosim.world.sensors.ball import BallPosition
 
 ALPHA: Final = 0.6
@@ -35,7 +36,7 @@ class BallTrack:
     """The estimate after the newest sample."""
 
     def __init__(self, deployment: Deployment) -> None:
-        table = deployment.table
+        table = table_of(deployment)
         self._y_max = table.field.width / 2 - table.ball.radius
         self._sent_ns = -1
         self._measured = (0.0, 0.0)

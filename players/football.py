@@ -14,11 +14,11 @@ from mypy_extensions import mypyc_attr
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
-from foosim.common.names import TEAMS
 from foosim.deployment.schema import Deployment
 from foosim.players.ball_filter import Ball, BallTrack, moved
 from foosim.world.actuators.joint_position import Command
-from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.models.rod import RodRobot
+from foosim.world.parameters.table import TEAMS, table_of
 from foosim.world.sensors.ball import BallPosition, BallSettings
 from foosim.world.sensors.encoder import EncoderSettings, RodPosition
 
@@ -83,7 +83,7 @@ class Rod:
     """One rod of a player: its state, and its possible movements."""
 
     def __init__(self, deployment: Deployment, name: str, robot: RodRobot, side: float) -> None:
-        table = deployment.table
+        table = table_of(deployment)
         line = table.lines[robot.line]
         self.name = name
         self.u = line.x
@@ -206,7 +206,7 @@ class Team:
         team = parameters.get("team")
         if team not in TEAMS:
             raise BadValue(f"parameter team is not one of {', '.join(TEAMS)}", team)
-        table = deployment.table
+        table = table_of(deployment)
         side = 1.0 if team == "red" else -1.0
         self._side = side
         self._tick_ns = deployment.tick_ns

@@ -9,7 +9,8 @@ from math import ceil, hypot
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.world.scenes.obstacles import Obstacle, obstacles_of
+from foosim.world.clearance.hall_obstacles import Obstacle, obstacles_of
+from foosim.world.parameters.hall import hall_of
 
 MARGIN_M: Final = 0.2
 """What stays free between a rover and everything along its way."""
@@ -54,7 +55,7 @@ class Roadmap:
 
 def roadmap_of(deployment: Deployment, cell_m: float) -> Roadmap:
     """Return the roadmap of a deployment's hall with spots `cell_m` apart."""
-    hall = deployment.hall
+    hall = hall_of(deployment)
     return _roadmap(obstacles_of(deployment), hall.length, hall.width, hall.rover.radius + MARGIN_M, cell_m)
 
 

@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Final
 
 from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.kits.hall import Rover
+from foosim.world.parameters.hall import Rover
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
 

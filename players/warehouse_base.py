@@ -16,7 +16,7 @@ from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
 from foosim.players.beacons import FLEET, TELEMETRY, Entry, Telemetry, decode_telemetry, encode_fleet
 from foosim.players.roadmap import roadmap_of
-from foosim.world.robots.rover import RoverRobot
+from foosim.world.models.rover import RoverRobot
 
 FLEET_S: Final = 1.0
 FORGOTTEN_S: Final = 60.0

@@ -35,8 +35,10 @@ from foosim.players.beacons import (
 from foosim.players.roadmap import roadmap_of
 from foosim.players.steering import Estimate, Steering, wrapped
 from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.robots.rover import RoverRobot, StationRobot
-from foosim.world.scenes.obstacles import obstacles_of
+from foosim.world.clearance.hall_obstacles import obstacles_of
+from foosim.world.models.rover import RoverRobot
+from foosim.world.models.station import StationRobot
+from foosim.world.parameters.hall import hall_of
 from foosim.world.sensors.battery import Battery
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
@@ -132,12 +134,12 @@ class Patrol:
         self._tick_s = deployment.tick_ns / 1e9
         self._map = roadmap_of(deployment, settings.cell_m)
         stations = [robot for _, robot in sorted(deployment.robots.items()) if isinstance(robot, StationRobot)]
-        reach = deployment.hall.station.charge_radius - ARRIVED_M
+        reach = hall_of(deployment).station.charge_radius - ARRIVED_M
         self._chargers = frozenset(spot for robot in stations for spot in self._map.around(robot.x, robot.y, reach))
         self._obstacles = obstacles_of(deployment)
-        self._steering = Steering(deployment.hall.rover)
-        self._estimate = Estimate(deployment.hall.rover.drive.track)
-        self._rays_from = deployment.hall.rover.radius
+        self._steering = Steering(hall_of(deployment).rover)
+        self._estimate = Estimate(hall_of(deployment).rover.drive.track)
+        self._rays_from = hall_of(deployment).rover.radius
         key = draw_key(deployment.seed, "patrol", settings.rover)
         spots = range(len(self._map.spots))
         self._visited_s = [-100.0 * unit_interval(draw_words(key, spot)[0]) for spot in spots]

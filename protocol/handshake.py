@@ -18,7 +18,8 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Build, Epoch, Fetch, Heartbeat, Hello, Piece, Ready, Recall, Refusal
+from foosim.protocol.messages import Build, Epoch, Fetch, FormVersion, Heartbeat, Hello, Piece, Ready, Recall, Refusal
+from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.layout import Layout, build_layout
 from foosim.world.mesh import AssetError
 
@@ -182,7 +183,9 @@ class Member:
         self._built.add(layout.digest)
         if self.standing is not None:
             self._actions.append(self.standing())
-        ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint)
+        versions = foreign_versions(self.deployment) if self.role == "node" and self.deployment is not None else {}
+        forms = [FormVersion(name, version) for name, version in versions.items()]
+        ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint, forms)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:

@@ -21,6 +21,13 @@ from foosim.world.start import Added, Origin
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 
 
+class FormVersion(Item, frozen=True):
+    """The version of a form that is not foosim's own: `name` is its form, module and class."""
+
+    name: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
+    version: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
+
+
 class Order(Message, frozen=True):
     """Permission to compute `tick`, with its edits, and the `following` ticks, without edits."""
 
@@ -183,12 +190,14 @@ class Ready(Message, frozen=True):
     """The process has built the layout with this digest; of the vHub, all declared lockstep clients have joined too.
 
     A node's `fingerprint` is the digest of a fixed short run of its engine: equal fingerprints compute equal worlds.
+    Its `forms` are the versions of the forms of the world that are not foosim's own.
     """
 
     name: Name
     boot: Name
     layout: Digest
     fingerprint: Digest
+    forms: Annotated[list[FormVersion], Meta(max_length=limits.FORMS_MAX)] = field(default_factory=list)
 
 
 class Prepare(Message, frozen=True):

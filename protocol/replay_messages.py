@@ -17,7 +17,7 @@ PACKETS, POSES, SCENE, LOG, ROWS, CLOCK = "packets", "poses", "scene", "log", "r
 STREAMS: Final = (PACKETS, POSES, SCENE, LOG, ROWS, CLOCK)
 """The streams: the last part of a message's key."""
 LinkName = Annotated[str, Meta(min_length=1, max_length=2 * limits.NAME_LENGTH_MAX + 1)]
-"""A body and its link, as `red.goal/slide`."""
+"""A body and its link, as `red.attack/slide`."""
 
 
 class PlayedPacket(Message, frozen=True):

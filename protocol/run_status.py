@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 CLOSING: Final = "closing"
 """State of a recording whose run has ended, and which is still written."""
@@ -10,8 +10,3 @@ UNFINISHED: Final = "unfinished"
 """State of a recording that no vHub has reported as closed: its file has no end, or was closed later."""
 NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
 NO_PACKETS: Final = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
-
-
-def score_text(status: dict[str, Any]) -> str:
-    """`red 2 : 1 blue`."""
-    return f"red {status['score']['red']} : {status['score']['blue']} blue"

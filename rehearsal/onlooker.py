@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from foosim.common.names import TEAMS
-from foosim.protocol.run_status import score_text
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.state import RunState
+from foosim.world.assembly.world import world_status, world_texts
 from foosim.world.frame import Frame
 
 LINE_S: Final = 1.0
@@ -77,8 +76,8 @@ class Onlooker:
     def _line(self, elapsed_s: float, frame: Frame) -> str:
         speed = (frame.tick - self._line_tick) * self._state.deployment.tick_ns / 1e9 / elapsed_s
         parts = [f"{reached(self._state)} simulated, {speed:.2f}x"]
-        if frame.score is not None:
-            parts.append(score_text({"score": dict(zip(TEAMS, frame.score, strict=True))}))
+        deployment = self._state.deployment
+        parts += world_texts(deployment, world_status(deployment, frame))
         name, count = max(sorted(self._turns.items()), key=lambda item: item[1])
         parts.append(f"waits for {name or 'start'} ({100 * count / self._turns.total():.0f} %)")
         return ", ".join(parts)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
-from foosim.node.engines.interface import EngineFactory
 from foosim.node.engines_pool import Solver
+from foosim.node.physics.interface import EngineFactory
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.asset_transfer import piece_of
@@ -18,9 +18,9 @@ from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Prepare
 from foosim.runtime.roles.bus import Bus
+from foosim.world.assembly.initial_state import first_frame
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame
-from foosim.world.initial_state import first_frame
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered, RobotPacket
 from foosim.world.start import AddedEntity, Start

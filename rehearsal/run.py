@@ -18,7 +18,7 @@ from foosim.common.units import Pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, with_owners
 from foosim.deployment.schema import Deployment
-from foosim.node.engines.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_models
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Answer, Epoch
 from foosim.rehearsal.attendant import Attendant
@@ -27,6 +27,7 @@ from foosim.runtime.disk import Level
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.records import Closing
+from foosim.world.forms.registry import find_model
 from foosim.world.frame import Frame
 from foosim.world.start import Start
 
@@ -41,11 +42,11 @@ class Rehearsed:
 
 
 def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
-    """Return the robots of n1 to nN, dealt in turn: first those with bodies, then those without, each in name order."""
-    bodies = sorted(name for name, robot in deployment.robots.items() if robot.model == "rod")
-    others = sorted(set(deployment.robots) - set(bodies))
+    """Return the robots of n1 to nN, dealt in turn: first those that engines solve, then others, each in name order."""
+    rigid = sorted(name for name, robot in deployment.robots.items() if find_model(robot.model).is_rigid)
+    others = sorted(set(deployment.robots) - set(rigid))
     dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
-    for place, name in enumerate([*bodies, *others]):
+    for place, name in enumerate([*rigid, *others]):
         dealt[f"n{place % nodes + 1}"].append(name)
     return dealt
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
-from foosim.node.engines.interface import EngineFactory
+from foosim.node.physics.interface import EngineFactory
 from foosim.protocol.messages import Epoch
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.trace import Observer

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 
 from foosim.capture.reader import About, CapturedTick
 from foosim.deployment.loader import load_deployment
-from foosim.node.engines.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
+from foosim.world.assembly.initial_state import added_to, start_with
 from foosim.world.frame import CHAIN_START, Frame
-from foosim.world.initial_state import added_to, start_with
 from foosim.world.start import Start
 
 
@@ -48,7 +48,7 @@ class Between:
         text = with_nodes(about.deployment_text, about.deployment_name, 1)
         deployment = load_deployment(text, about.deployment_name).with_assets(about.files)
         check_models(deployment, about.deployment_name, text)
-        start: Start = start_with(frame, about.path.name, CHAIN_START, added_to(deployment, frame.layout))
+        start: Start = start_with(frame, about.path.name, CHAIN_START, added_to(frame.layout))
         self._replica = Replica(text, about.deployment_name, deployment, start=start)
         return self._replica
 

@@ -143,7 +143,7 @@ class Playback:
         passed_ns = self._passed_ns(now_ns)
         return passed_ns if self._next is None else min(passed_ns, max(self._time_ns, self._next.time_ns))
 
-    def goal_ns(self, now_ns: int) -> int:
+    def heading_ns(self, now_ns: int) -> int:
         """Return the captured time at a wall time, or at the end of the step in progress."""
         return self.time_ns(now_ns) if self._step_to_ns is None else self._step_to_ns
 
@@ -181,7 +181,7 @@ class Playback:
         """Publish the entries of so many ticks from here at once, and pause after them. Raises BadValue."""
         if not 1 <= ticks <= STEPS_MAX:
             raise BadValue(f"not a number of ticks, 1 to {STEPS_MAX}", ticks)
-        at_ns = self.goal_ns(now_ns)
+        at_ns = self.heading_ns(now_ns)
         self.pause(now_ns)
         self._step_to_ns = min((at_ns // self._tick_ns + ticks) * self._tick_ns, self.span.last_ns)
 

@@ -49,7 +49,7 @@ class Requests:
             result = encode_json(self.perform(request.verb, decode_json(request.arguments), now_ns))
         except (Refused, Malformed) as error:
             accepted, text = False, str(error)
-        tick = self._playback.goal_ns(now_ns) // self._tick_ns
+        tick = self._playback.heading_ns(now_ns) // self._tick_ns
         return self._answers.keep(Answer(request.sender, request.id, accepted, tick, text, result))
 
     def perform(self, verb: str, arguments: Any, now_ns: int) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class Requests:
         elif verb == STOP:
             self.stopped = True
         clock = playback.clock(now_ns)
-        at = {"time_ns": playback.goal_ns(now_ns), "rate": clock.rate, "state": clock.state, "jumps": clock.jumps}
+        at = {"time_ns": playback.heading_ns(now_ns), "rate": clock.rate, "state": clock.state, "jumps": clock.jumps}
         return {**at, "published": playback.published, **self._description}
 
     def key(self, key: str, now_ns: int) -> None:

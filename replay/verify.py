@@ -14,11 +14,11 @@ from pathlib import Path
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
 from foosim.deployment.loader import load_deployment
-from foosim.node.engines.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
+from foosim.world.assembly.initial_state import added_to, first_chain, start_with
 from foosim.world.frame import Frame, chain_next
-from foosim.world.initial_state import added_to, first_chain, start_with
 from foosim.world.start import Start
 
 
@@ -73,7 +73,7 @@ def start_of(capture: CaptureData) -> Start | None:
     first = capture.first_frame()
     if first is None or first.digest != origin.digest:
         raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which it begins")
-    return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
+    return start_with(first, origin.source, origin.chain, added_to(first.layout))
 
 
 def verify(

@@ -368,7 +368,7 @@ class SupervisorCore:
         """Publish the last commit again: a supervisor that ended may have written and not published it."""
         payload = self.state.commits.get(self.state.frame.tick)
         if payload is None:
-            self._publish_commit([], ([], ""), now_ns)
+            self._publish_commit([], ([], {}), now_ns)
         else:
             self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
 
@@ -408,7 +408,7 @@ class SupervisorCore:
         state.publish_tempo()
         self.open_epoch(state.owners, now_ns, state.deployment.nodes)
         state.committed_ns = now_ns
-        self._publish_commit([], ([], ""), now_ns)
+        self._publish_commit([], ([], {}), now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
         """Continue without lost nodes, wait for a lost vHub; the loss of another process ends the run."""

@@ -22,10 +22,10 @@ from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.kept_answers import KeptAnswers
 from foosim.protocol.messages import Answer, Commit, End, Epoch
+from foosim.world.assembly.initial_state import first_chain, first_frame
 from foosim.world.edits import Disrupt, Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import first_chain, first_frame
-from foosim.world.layout import BALL, Layout, build_layout
+from foosim.world.layout import Layout, build_layout
 from foosim.world.start import AddedEntity, Start
 
 ANSWERS_KEPT: Final = 1024
@@ -34,25 +34,25 @@ ANSWERS_KEPT: Final = 1024
 
 @dataclass(slots=True)
 class Account:
-    """Counts of a run. A hand-over is a change of the ball's solver, a move one of a robot's owner."""
+    """Counts of a run. A hand-over is a change of a free body's solver, a move one of a robot's owner."""
 
     solved_ticks: dict[str, int] = field(default_factory=dict)
     """By node: the ticks in which it solved a body."""
-    ball_ticks: dict[str, int] = field(default_factory=dict)
-    """By node: the ticks in which it solved the ball."""
+    free_ticks: dict[str, int] = field(default_factory=dict)
+    """By node: how often it solved a free body."""
     handovers: int = 0
     moves: int = 0
-    ball_solver: str = ""
+    solvers: dict[str, str] = field(default_factory=dict)
+    """Who solved each free body on the way to the last frame, by the body's name."""
 
-    def count(self, solved: Iterable[str], ball_solver: str) -> None:
-        """Count a committed frame: the nodes that solved a body for it, and who solved the ball."""
+    def count(self, solved: Iterable[str], solvers: dict[str, str]) -> None:
+        """Count a committed frame: the nodes that solved a body for it, and who solved each free body."""
         for name in solved:
             self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
-        if self.ball_solver and ball_solver != self.ball_solver:
-            self.handovers += 1
-        self.ball_solver = ball_solver
-        if ball_solver:
-            self.ball_ticks[ball_solver] = self.ball_ticks.get(ball_solver, 0) + 1
+        for name, solver in solvers.items():
+            self.handovers += self.solvers.get(name, solver) != solver
+            self.free_ticks[solver] = self.free_ticks.get(solver, 0) + 1
+        self.solvers = solvers
 
 
 @dataclass(slots=True)
@@ -164,12 +164,12 @@ class OrderedRecord(msgspec.Struct, frozen=True, array_like=True, tag="ordered",
 
 
 class CommitRecord(msgspec.Struct, frozen=True, array_like=True, tag="commit", forbid_unknown_fields=True):
-    """A commit as it is published, with what the account counts: the nodes that solved a body, the ball's solver (empty
-    for frame 0), and when it was committed, how late, by the supervisor's clock."""
+    """A commit as it is published, with what the account counts: the nodes that solved a body, the solver of each free
+    body, and when it was committed, how late, by the supervisor's clock."""
 
     commit: bytes
     solved: list[str]
-    ball_solver: str
+    solvers: dict[str, str]
     now_ns: int
     lag_ns: int
 
@@ -240,16 +240,15 @@ class History:
     """The last requests that change something."""
 
 
-Solved = tuple[list[str], str]
-"""The nodes that solved a body on the way to a frame, and who solved the ball (empty for the first frame, and where
-there is none)."""
+Solved = tuple[list[str], dict[str, str]]
+"""The nodes that solved a body on the way to a frame, and who solved each free body, by its name."""
 
 
 def solved_by(barrier: Barrier, frame: Frame) -> Solved:
-    """Return the nodes that solved a body on the way to a frame, and who solved the ball."""
+    """Return the nodes that solved a body on the way to a frame, and who solved each free body."""
     entities = frame.layout.entities
-    names = [name for name, part in barrier.parts.items() if any(entities[index].has_body for index in part.solved)]
-    return sorted(names), barrier.solver_of(frame.layout[BALL].index) if BALL in frame.layout else ""
+    names = [name for name, part in barrier.parts.items() if any(entities[index].is_solved for index in part.solved)]
+    return sorted(names), {body.name: barrier.solver_of(body.index) for body in frame.layout.free}
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
@@ -348,7 +347,7 @@ def _commit(history: History, record: CommitRecord) -> None:
         history.started_ns = history.committed_ns = record.now_ns
         return
     history.chain = chain_next(history.chain, commit.digest)
-    history.account.count(record.solved, record.ball_solver)
+    history.account.count(record.solved, record.solvers)
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)
     over = close_outages(history.recovered, history.committed_ns, record.now_ns)

@@ -29,8 +29,9 @@ from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.records import RequestRecord, asked
 from foosim.supervisor.state import RunState
 from foosim.supervisor.viewing import Viewing, chosen
+from foosim.world.assembly.world import addition, body_of
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
-from foosim.world.layout import BALL, Layout
+from foosim.world.layout import Layout
 
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
@@ -210,34 +211,32 @@ class Requests:
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
-        if self._state.deployment.is_hall:
-            raise Refused("this world is a hall: balls are added to a table")
         layout = self._state.next_layout()
+        addable = layout.declared.addable
+        if not addable:
+            raise Refused("nothing can be added to this world: no kit of it says of what there can be more")
+        model = chosen("model", _name(arguments, "model", addable[0]), addable)
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
-        name = _name(arguments, "name", _free_name(taken))
+        name = _name(arguments, "name", _free_name(model, taken))
         if not is_name(name):
             raise Refused(f"{show(name)} is no name; {NAME_RULE}")
         if name in taken:
             raise Refused(f"name {show(name)} is taken; taken are {', '.join(sorted(taken))}")
         if len(taken) >= limits.ENTITIES_MAX:
             raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
-        table = self._state.deployment.table
-        position = _vector(arguments, "position", (0.0, 0.0, table.ball.radius))
+        usual, check = addition(self._state.deployment, layout, name, model)
+        position = _vector(arguments, "position", usual)
         velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
-        bounds = (table.field.length / 2, table.field.width / 2, table.walls.height)
-        if any(abs(value) > bound for value, bound in zip(position, bounds, strict=True)) or position[2] <= 0.0:
-            raise Refused(f"position {position} is outside the table: at most {bounds} m")
-        if sum(value * value for value in velocity) > table.ball.speed_limit**2:
-            raise Refused(f"velocity {velocity} is above the ball's limit of {table.ball.speed_limit} m/s")
-        self._wait_for_engines(request, Add(name, "ball", position, velocity))
+        check(position, velocity)
+        self._wait_for_engines(request, Add(name, model, position, velocity))
 
     def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
         name = _name(arguments, "name")
         going = {waiting.edit.name for waiting in self._pending}
         added = [entity.name for entity in self._state.added(self._state.next_layout()) if entity.name not in going]
         if name not in added:
-            balls = f"those are {', '.join(added)}" if added else "none was"
-            raise Refused(f"{show(name)} cannot be removed: only a ball that was added can, and {balls}")
+            which = f"those are {', '.join(added)}" if added else "nothing was"
+            raise Refused(f"{show(name)} cannot be removed: only what was added can, and {which}")
         self._wait_for_engines(request, Remove(name))
 
     def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
@@ -270,13 +269,17 @@ class Requests:
                 self.prepare()
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        balls = [ball.name for ball in self._state.next_layout().balls]
-        name = chosen("free body", _name(arguments, "name", BALL), balls)
+        layout = self._state.next_layout()
+        free = [body.name for body in layout.free]
+        if not free:
+            raise Refused("nothing can be pushed: this world has no free bodies")
+        name = chosen("free body", _name(arguments, "name", free[0]), free)
         impulse = _vector(arguments, "impulse", None)
-        ball = self._state.deployment.table.ball
-        size, most = hypot(*impulse), ball.mass * ball.speed_limit
+        body = body_of(self._state.deployment, layout, layout[name])
+        mass, fastest = body.links[0].mass, body.speed_limit
+        size, most = hypot(*impulse), mass * fastest
         if size > most:
-            limit = f"at most {most:g} N s, which are the ball's limit of {ball.speed_limit:g} m/s at {ball.mass:g} kg"
+            limit = f"at most {most:g} N s, which are the limit of {name}, {fastest:g} m/s, at {mass:g} kg"
             raise Refused(f"impulse: {size:g} N s in all are too much, valid are {limit}")
         tick = self._tick_for_edit()
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
@@ -417,8 +420,8 @@ def _show_list(value: object) -> str:
     return f"[{', '.join(show(item) for item in value[:4])}]" if isinstance(value, list) else show(value)
 
 
-def _free_name(taken: Collection[str]) -> str:
+def _free_name(model: str, taken: Collection[str]) -> str:
     number = 2
-    while f"{BALL}{number}" in taken:
+    while f"{model}{number}" in taken:
         number += 1
-    return f"{BALL}{number}"
+    return f"{model}{number}"

@@ -6,6 +6,7 @@ layout that a node has built is checked for the digest of a small run of its eng
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Heartbeat, Hello, Ready, Refusal
+from foosim.world.assembly.used_forms import foreign_versions
 
 SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
 """A process that lives is not silent for so long, unless its machine or its loop is suspended."""
@@ -136,6 +138,11 @@ class Roster:
     def note_ready(self, process: Process, ready: Ready) -> str:
         """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
         if process.role == "node":
+            there = {form.name: form.version for form in ready.forms}
+            differing = _differing(there, foreign_versions(self.deployment))
+            if differing:
+                self.by_name.pop(process.name)
+                return differing
             if not self._simulation:
                 self._simulation = ready.fingerprint
             if ready.fingerprint != self._simulation and not self.deployment.mixed_cpu:
@@ -160,6 +167,15 @@ class Roster:
             for name, process in sorted(self.by_name.items())
             if now_ns - process.heard_ns > deadline_ns and not process.farewell and not process.lost
         ]
+
+
+def _differing(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+    """Return which form has another version in a node than in the supervisor, empty if none has."""
+    for name in sorted({*there, *here}):
+        if there.get(name) != here.get(name):
+            versions = there.get(name, "missing"), here.get(name, "missing")
+            return f"{name} has version {versions[0]} there and {versions[1]} here: install the same on all machines"
+    return ""
 
 
 def refuse(role: str, name: str, boot: str, reason: str) -> list[Action]:

@@ -40,9 +40,9 @@ from foosim.supervisor.records import (
 )
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
+from foosim.world.assembly.initial_state import added_to, first_chain, first_frame
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.initial_state import added_to, first_chain, first_frame
 from foosim.world.layout import Layout, build_layout
 from foosim.world.start import AddedEntity
 
@@ -290,7 +290,7 @@ class RunState:
 
     def added(self, layout: Layout) -> list[AddedEntity]:
         """Return the entities of a layout beside the deployment's."""
-        return added_to(self.deployment, layout)
+        return added_to(layout)
 
     def next_layout(self) -> Layout:
         """Return the layout after all edits that are ordered, released or not."""

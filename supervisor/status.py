@@ -9,14 +9,12 @@ from typing import Any, Final
 from msgspec.structs import asdict
 
 from foosim.common.json_text import decode_json
-from foosim.common.names import TEAMS
 from foosim.deployment.schema import places
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
-from foosim.world.frame import Frame
-from foosim.world.layout import BALL
+from foosim.world.assembly.world import world_status, world_texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +41,11 @@ def result(state: RunState) -> dict[str, Any]:
     cut_off = state.cut_off
     wall_ns = state.committed_ns - state.started_ns
     origin = state.settings.origin
+    shown = world_status(state.deployment, frame)
     return {
+        **shown,
+        "summary": world_texts(state.deployment, shown),
+        "solvers": state.account.solvers,
         "run": state.settings.run,
         "world": state.deployment.world,
         "seed": state.deployment.seed,
@@ -61,14 +63,13 @@ def result(state: RunState) -> dict[str, Any]:
             name: {
                 "owned": sorted(robot for robot, owner in state.owners.items() if owner == name),
                 "solved_ticks": state.account.solved_ticks.get(name, 0),
-                "ball_ticks": state.account.ball_ticks.get(name, 0),
+                "free_ticks": state.account.free_ticks.get(name, 0),
             }
             for name in sorted(state.deployment.nodes)
         },
         "recoveries": _recoveries(state),
         "moves": state.account.moves,
         "handovers": state.account.handovers,
-        "score": _score(frame),
         "capture": report.get("capture") or None,
         "reason": "; ".join(part for part in (state.end.reason, cut_off) if part) if state.end is not None else None,
         "failed": state.end is not None and (state.end.failed or bool(cut_off)),
@@ -94,8 +95,6 @@ def status(
         "released": state.released,
         "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": progress.late, "tick": progress.late_tick},
         "waiting_for": waiting_for,
-        "ball": _ball(state),
-        "rovers": _rovers(state),
         "processes": _processes(state, waiting_for, refused),
         "shared": dict(sorted(state.settings.processes.items())),
         "starts": dict(state.roster.starts),
@@ -135,30 +134,6 @@ def _recording(state: RunState) -> dict[str, Any]:
     recording = state.roster.hub_account.get("recording") or NOT_RECORDED
     is_open = state.finished and hub is not None and not hub.farewell and recording["state"] in ("on", "low", "closing")
     return {**recording, "state": UNFINISHED} if is_open else recording
-
-
-def _score(frame: Frame) -> dict[str, int] | None:
-    """Return the goals of both teams; None without a table."""
-    return None if frame.score is None else dict(zip(TEAMS, frame.score, strict=True))
-
-
-def _ball(state: RunState) -> dict[str, Any] | None:
-    """Return where the ball is, and who solves it; None without a table."""
-    if BALL not in state.frame.layout:
-        return None
-    position = state.frame.vector(BALL, "position", 3)
-    return {"position": [round(value, 4) for value in position], "solver": state.account.ball_solver}
-
-
-def _rovers(state: RunState) -> dict[str, Any] | None:
-    """Return how many rovers there are and drive, and which has the least charge (a share); None without a hall."""
-    frame, rovers = state.frame, state.frame.layout.rovers
-    if not rovers:
-        return None
-    capacity = state.deployment.hall.rover.battery.capacity
-    least, name = min((frame.at(rover.name, "charge"), rover.name) for rover in rovers)
-    drive = sum(any(frame.vector(rover.name, "wheel_speeds", 2)) for rover in rovers)
-    return {"count": len(rovers), "drive": drive, "least": name, "charge": round(least / capacity, 4)}
 
 
 def _processes(state: RunState, waiting_for: str, refused: Mapping[str, Any]) -> dict[str, Any]:

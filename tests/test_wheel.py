@@ -138,11 +138,10 @@ def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> N
     """Half of the compiled modules would not import. Few are tried here, so that mypyc is done soon."""
     source = tmp_path / "source"
     copy_source(source)
-    setup = source / "setup.py"
-    few = 'COMPILED = {"common/keyed_random": ""}\n'
-    text, count = re.subn(r"(?s)COMPILED: Final = \{.*?\n\}\n", few, setup.read_text())
-    assert count == 1
-    setup.write_text(text)
+    project = source / "pyproject.toml"
+    before, table, _ = project.read_text().partition("[tool.foosim.compiled]\n")
+    assert table
+    project.write_text(f'{before}{table}"common/keyed_random" = ""\n')
     build = sys.executable, "-m", "build", "--no-isolation", "--wheel", "--outdir", tmp_path
     assert "foosim gets no compiled modules" in run(*build, cwd=source, CC="/nowhere/cc", FOOSIM_COMPILE="auto")
     (wheel,) = tmp_path.glob("*.whl")

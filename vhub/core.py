@@ -68,8 +68,8 @@ from foosim.vhub.state.resume import Past
 from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, report_before, statistics
 from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import Watching
+from foosim.world.assembly.initial_state import added_to, first_chain
 from foosim.world.frame import Frame
-from foosim.world.initial_state import added_to, first_chain
 
 HubAction = Action | RecordClosing | RecordEpoch
 
@@ -413,7 +413,7 @@ class HubCore:
         commit, _, frame = self.commits.get(closed) or (b"", None, None)
         layout = self.commits.layout if frame is None else frame.layout
         assert layout is not None
-        added = [(entity.name, entity.model) for entity in added_to(self.state.deployment, layout)]
+        added = [(entity.name, entity.model) for entity in added_to(layout)]
         return encode(
             HeadRecord(
                 self.member.build.run,

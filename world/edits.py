@@ -11,8 +11,7 @@ from msgspec import Meta
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
-from foosim.world.forms.models import MODELS
-from foosim.world.layout import ADDABLE, BALL, WORLD, Layout
+from foosim.world.layout import Layout
 
 
 class Add(Message, frozen=True):
@@ -62,12 +61,12 @@ Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
     """Return the edits that do something to a world with this layout, in their order.
 
-    An addition of a name that is taken or to a world without a table, the removal of what was not added, a push of what
-    is no free body and a freeze of what is no robot change nothing, and what happens to the network is the vHub's: a
-    function of the order alone, the same for all who read it.
+    An addition of a name that is taken, or of a model of which the world cannot have more, the removal of what was not
+    added, a push of what is no free body and a freeze of what is no robot change nothing, and what happens to the
+    network is the vHub's: a function of the order alone, the same for all who read it.
     """
     models = dict(layout.models)
-    addable = ADDABLE if WORLD in layout else ()
+    addable, declared = layout.declared.addable, layout.declared.names
     fitting: list[Edit] = []
     for edit in edits:
         if isinstance(edit, Disrupt):
@@ -77,13 +76,15 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
                 continue
             models[edit.name] = edit.model
         elif isinstance(edit, Remove):
-            if edit.name == BALL or models.get(edit.name) not in ADDABLE:
+            if edit.name in declared or edit.name not in models:
                 continue
             del models[edit.name]
+        elif edit.name not in models:
+            continue
         elif isinstance(edit, Freeze | Thaw):
-            if edit.name not in models or not MODELS[models[edit.name]].is_robot:
+            if not layout.kind_of(models[edit.name]).is_robot:
                 continue
-        elif models.get(edit.name) not in ADDABLE:
+        elif not layout.kind_of(models[edit.name]).is_free:
             continue
         fitting.append(edit)
     return fitting
@@ -99,7 +100,7 @@ def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
             models[edit.name] = edit.model
         elif isinstance(edit, Remove):
             del models[edit.name]
-    return layout if models == layout.models else Layout(models, layout.carried)
+    return layout if models == layout.models else Layout(models, layout.declared)
 
 
 def check_edits(edits: Sequence[Edit]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
-from foosim.world.layout import WORLD, Entity, Layout
+from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Outbox
 
 assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
@@ -76,14 +76,6 @@ class Frame:
     @property
     def outbox_items(self) -> list[Outbox]:
         return [Outbox(index, packets) for index, packets in self.outboxes.items()]
-
-    @property
-    def score(self) -> tuple[int, int] | None:
-        """Goals of red and of blue; None in a world without a table."""
-        if WORLD not in self.layout:
-            return None
-        red, blue = self.vector(WORLD, "score", 2)
-        return int(red), int(blue)
 
 
 def frame_from_bytes(tick: int, layout: Layout, values: bytes, outboxes: Sequence[Outbox]) -> Frame:

@@ -1,42 +1,52 @@
 """The canonical layout of a frame: which entity, in name order, keeps which numbers where.
 
-An entity's slots stand in one run of float64 numbers: first what its solver writes (body, flags, contact log, rules'
-and actuators' memory), then what its owner writes (the memory of its sensors). A layout is a pure function of the
-deployment and of what was added since, so every process builds the same one and its digest names it.
+An entity's slots stand in one run of float64 numbers: first what its solver writes (the fields of its model, the memory
+of rules, motion and actuators), then what its owner writes (the memory of its sensors). A layout is a pure function of
+the deployment and of what was added since, so every process builds the same one and its digest names it.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Final
 
 from foosim.common.errors import Malformed
 from foosim.world.forms import registry
-from foosim.world.forms.models import MODELS
+from foosim.world.forms.forms import (
+    ROBOTS,
+    SAMPLES,
+    Carrier,
+    Component,
+    EntityRule,
+    Kit,
+    Model,
+    Motion,
+    References,
+    WorldRule,
+)
 from foosim.world.forms.per_field import Numbers, numbers_of
-from foosim.world.forms.registry import SAMPLES, Carrier, Component
-from foosim.world.forms.settings import ComponentSettings, ModifierSettings
-from foosim.world.spec import Robot, WorldSpec
+from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings
+from foosim.world.spec import WorldSpec
 
 WORLD: Final = "world"
-"""Name of a table's entity that has no body: score and the rules' memory."""
+"""Name and model of the entity without a body that has what the rules of the world remember; in a world whose rules
+remember nothing it is not there."""
+MOTION: Final = "motion"
+"""Component name of the slots in which a motion remembers."""
 
-ADDABLE: Final = tuple(name for name, model in MODELS.items() if model.is_addable)
-"""Models of which a running world can have more."""
-BALL: Final = "ball"
-"""Name of the ball that every table has, and no hall; further ones have other names and can be removed again."""
+WORLD_MODEL: Final = Model(form="model", name=WORLD, made=object, settings=RobotSettings, slots={}, is_robot=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entity:
     """One entry of a layout. `start` to `split` are the solver's slots, `split` to `stop` the owner's."""
 
     index: int
     name: str
-    model: str
+    kind: Model
     start: int
     split: int
     stop: int
@@ -45,17 +55,35 @@ class Entity:
     """The place of the first number of each field, and how many it has."""
 
     @property
-    def has_body(self) -> bool:
-        return MODELS[self.model].has_body
+    def model(self) -> str:
+        """The name of its model."""
+        return self.kind.name
 
     @property
     def is_robot(self) -> bool:
-        return MODELS[self.model].is_robot
+        """Whether it has an owner, sends and receives."""
+        return self.kind.is_robot
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether a node computes its next state."""
+        return self.kind.is_solved
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether an engine solves it."""
+        return self.kind.is_rigid
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it is a rigid body that nothing holds: it can be pushed."""
+        return self.kind.is_free
 
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """The slots of the components of a robot, by `NAME.FIELD`: those that the solver writes, and the owner's."""
+    """The slots that are not of an entity's model, by name, with the count of their numbers: the solver's and the
+    owner's."""
 
     solver: Mapping[str, int]
     owner: Mapping[str, int]
@@ -64,39 +92,79 @@ class Carried:
 NOTHING: Final = Carried({}, {})
 
 
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What a layout has of the deployment, whatever is added to the world.
+
+    `names` are the entities that are always there; `carried` what entities carry, by name; `memory` what the rules of
+    the world remember of each entity of a model; `addable` the models of which a running world can have more.
+    """
+
+    names: frozenset[str] = frozenset()
+    carried: Mapping[str, Carried] = field(default_factory=dict)
+    memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    addable: tuple[str, ...] = ()
+
+    def remembered(self, kind: Model) -> dict[str, int]:
+        """Return the slots in which the rules of the world remember what they know of each entity of a model."""
+        of_robots = self.memory.get(ROBOTS, {}) if kind.is_robot else {}
+        return {**self.memory.get(kind.name, {}), **of_robots}
+
+
 class Layout:
     """Entities in name order and where their slots are. Two layouts are equal when their digests are."""
 
-    def __init__(self, models: Mapping[str, str], carried: Mapping[str, Carried]) -> None:
-        """Build from the model of every entity and what each robot carries."""
+    def __init__(self, models: Mapping[str, str], declared: Declared) -> None:
+        """Build from the model of every entity, by name, and what the deployment says."""
         entities = []
         position = 0
         for index, name in enumerate(sorted(models)):
-            model = models[name]
-            its = carried.get(name, NOTHING)
+            kind = _model(models[name])
+            its = declared.carried.get(name, NOTHING)
             start = position
             offsets: dict[str, int] = {}
-            counts = {**MODELS[model].slots, **its.solver}
-            for field, count in counts.items():
-                offsets[field] = position
+            counts = {**kind.slots, **declared.remembered(kind), **its.solver}
+            for slot, count in counts.items():
+                offsets[slot] = position
                 position += count
             split = position
-            for field, count in its.owner.items():
-                offsets[field], counts[field] = position, count
+            for slot, count in its.owner.items():
+                offsets[slot], counts[slot] = position, count
                 position += count
-            entities.append(Entity(index, name, model, start, split, position, offsets, counts))
+            entities.append(Entity(index, name, kind, start, split, position, offsets, counts))
         self.entities: tuple[Entity, ...] = tuple(entities)
         self.size = position
         self.models = dict(models)
-        self.carried = dict(carried)
+        self.declared = declared
         self._index = {entity.name: entity for entity in entities}
         self.robots = tuple([entity for entity in entities if entity.is_robot])
         """Entities that have an owner, in name order."""
-        self.balls, self.rods, self.rovers = self._of("ball"), self._of("rod"), self._of("rover")
+        self.references = tuple(
+            [
+                entity.offsets[slot] + place
+                for entity in entities
+                for slot, count in entity.counts.items()
+                if isinstance(count, References)
+                for place in range(count)
+            ]
+        )
+        """The numbers that refer to entities."""
+        self.free = tuple([entity for entity in entities if entity.is_free])
+        """Free rigid bodies, in name order."""
         self._digest = b""
 
-    def _of(self, model: str) -> tuple[Entity, ...]:
+    def of(self, model: str) -> tuple[Entity, ...]:
+        """Return the entities of a model, in name order."""
         return tuple([entity for entity in self.entities if entity.model == model])
+
+    @staticmethod
+    def kind_of(model: str) -> Model:
+        """Return what there is to know of a model."""
+        return _model(model)
+
+    def is_added(self, name: str) -> bool:
+        """Whether an entity is there beside those of the deployment."""
+        return name in self._index and name not in self.declared.names
 
     def __getitem__(self, name: str) -> Entity:
         return self._index[name]
@@ -110,7 +178,7 @@ class Layout:
 
     def components(self, robot: str) -> list[str]:
         """Return the components of a robot that have slots, in name order."""
-        its = self.carried.get(robot, NOTHING)
+        its = self.declared.carried.get(robot, NOTHING)
         return sorted({slot.partition(".")[0] for slot in (*its.solver, *its.owner)})
 
     @property
@@ -124,34 +192,108 @@ class Layout:
                     hasher.update(struct.pack("<I", len(raw)) + raw)
                 hasher.update(struct.pack(f"<{len(entity.counts)}Q", *entity.counts.values()))
                 hasher.update(struct.pack("<3Q", entity.start, entity.split, entity.stop))
+            if self.references:
+                hasher.update(struct.pack(f"<{len(self.references)}Q", *self.references))
             self._digest = hasher.digest()
         return self._digest
 
 
 def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layout:
     """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
-    models = {} if spec.is_hall else {BALL: "ball", WORLD: "world"}
+    models: dict[str, str] = {}
+    addable: list[str] = []
+    for kit in kits_named(spec):
+        models |= kit.entities
+        addable += kit.addable
+    memory, of_world = _memory(spec)
+    if of_world:
+        models[WORLD] = WORLD
     models |= {name: robot.model for name, robot in spec.robots.items()}
     carried = {name: _carried(spec, robot) for name, robot in spec.robots.items()}
+    carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
+    carried[WORLD] = Carried(of_world, {})
+    declared = Declared(frozenset(models), carried, memory, tuple(addable))
     for name, model in added:
-        if spec.is_hall:
-            raise Malformed(f"{model} {name} cannot be added: nothing can be to a hall")
-        if model not in ADDABLE or name in models:
-            raise Malformed(f"{model} {name} cannot be added: {' or '.join(ADDABLE)} with a free name can be")
+        if not addable:
+            raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")
+        if model not in addable or name in models:
+            raise Malformed(f"{model} {name} cannot be added: {' or '.join(addable)} with a free name can be")
         models[name] = model
-    return Layout(models, carried)
+    return Layout(models, declared)
 
 
-def _carried(spec: WorldSpec, robot: Robot) -> Carried:
-    """Return the slots of a robot's components and of their modifiers, in name order."""
-    solver: dict[str, int] = {}
+def kits_named(spec: WorldSpec) -> list[Kit]:
+    """Return what is registered of the kits of a world, in name order."""
+    found = [registry.find("kit", name) for name in sorted(spec.kits)]
+    assert all(isinstance(kit, Kit) for kit in found), found
+    return [kit for kit in found if isinstance(kit, Kit)]
+
+
+def _model(kind: str) -> Model:
+    return WORLD_MODEL if kind == WORLD else registry.find_model(kind)
+
+
+def world_rules(spec: WorldSpec) -> dict[str, ComponentSettings]:
+    """Return the rules of a world, by name, in name order: those of its kits, and those of the deployment."""
+    found: dict[str, ComponentSettings] = dict(spec.rules)
+    for kit in kits_named(spec):
+        for label, settings in kit.rules.items():
+            found[label] = registry.find("rule", settings["kind"]).settings.model_validate(dict(settings))  # type: ignore[assignment]
+    return dict(sorted(found.items()))
+
+
+def find_rule(settings: ComponentSettings) -> WorldRule:
+    """Return the registered rule of a world that settings are of."""
+    found = registry.find("rule", settings.kind)
+    assert isinstance(found, WorldRule), found
+    return found
+
+
+def find_entity_rule(settings: ComponentSettings) -> EntityRule:
+    """Return the registered rule of entities that settings are of."""
+    found = registry.find("entity_rule", settings.kind)
+    assert isinstance(found, EntityRule), found
+    return found
+
+
+def find_motion(model: Model) -> Motion:
+    """Return the registered motion of a model that has one."""
+    found = registry.find("motion", model.motion)
+    assert isinstance(found, Motion), found
+    return found
+
+
+def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
+    """Return what the rules of a world remember: of each entity, by its model; and of the world."""
+    each: dict[str, dict[str, int]] = {}
+    of_world: dict[str, int] = {}
+    for label, settings in world_rules(spec).items():
+        rule = find_rule(settings)
+        of_world |= {f"{label}.{slot}": count for slot, count in rule.slots.items()}
+        for model, slots in rule.each.items():
+            each.setdefault(model, {}).update({f"{label}.{slot}": count for slot, count in slots.items()})
+    return each, of_world
+
+
+def of_motion(model: Model) -> dict[str, int]:
+    """Return the slots in which the motion of a model remembers."""
+    if not model.motion:
+        return {}
+    return {f"{MOTION}.{slot}": count for slot, count in find_motion(model).slots.items()}
+
+
+def _carried(spec: WorldSpec, robot: RobotSettings) -> Carried:
+    """Return the slots of a robot's motion, of its components and of their modifiers, in name order."""
+    solver = of_motion(_model(robot.model))
     for name, actuator in sorted(robot.actuators.items()):
-        component = registry.find("actuator", actuator.kind)
+        component = registry.find_component("actuator", actuator.kind)
         solver |= _slots(name, component, actuator, Carrier(0, spec.tick_ns))
         solver |= _slots_of_modifiers(name, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
+    for name, rule in sorted(robot.rules.items()):
+        solver |= {f"{name}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
     owner: dict[str, int] = {}
     for name, sensor in sorted(robot.sensors.items()):
-        component = registry.find("sensor", sensor.kind)
+        component = registry.find_component("sensor", sensor.kind)
         period_ns = spec.turns(sensor)[0] * spec.tick_ns
         owner |= _slots(name, component, sensor, Carrier(0, period_ns))
         owner |= _slots_of_modifiers(name, sensor.modifiers, numbers_of(component, sensor), period_ns)
@@ -165,7 +307,7 @@ def _slots_of_modifiers(
     found: dict[str, int] = {}
     for label, settings in zip(modifier_labels(modifiers), modifiers, strict=True):
         assert numbers is not None, "checked with the deployment"
-        component = registry.find("modifier", settings.kind)
+        component = registry.find_component("modifier", settings.kind)
         found |= _slots(f"{name}.{label}", component, settings, Carrier(numbers.size, period_ns))
     return found
 
@@ -176,7 +318,7 @@ def _slots(name: str, component: Component, settings: ComponentSettings, carrier
 
 def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:
     """Return the names of the modifiers of a component: their kinds, numbered where there are several of one."""
-    kinds = [registry.find("modifier", settings.kind).name for settings in modifiers]
+    kinds = [registry.find_component("modifier", settings.kind).name for settings in modifiers]
     return [
         kind if kinds.index(kind) == place else f"{kind}{kinds[:place].count(kind) + 1}"
         for place, kind in enumerate(kinds)

@@ -10,26 +10,51 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from foosim.common.names import CHANNEL_ECHO
+from foosim.world.forms import registry
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered
 from foosim.world.spec import WorldSpec
 
 
 class Sampling:
-    """The ticks of all sensors of a deployment."""
+    """The ticks of all sensors of a deployment, and the numbers of frames that make some measure besides."""
 
     def __init__(self, spec: WorldSpec) -> None:
         sensors = [sensor for robot in spec.robots.values() for sensor in robot.sensors.values()]
         self._turns = tuple(sorted({spec.turns(sensor) for sensor in sensors}))
         """Period and offset, in ticks."""
+        self._speaking = sorted(
+            {
+                (name, speaks)
+                for name, robot in spec.robots.items()
+                for sensor in robot.sensors.values()
+                if (speaks := registry.find_component("sensor", sensor.kind).speaks)
+            }
+        )
+        """Robots, and the field of each that makes a sensor of it measure."""
+        self._layout = b""
+        self._places: list[int] = []
 
     def is_due(self, tick: int) -> bool:
-        """Whether some sensor samples at a tick."""
+        """Whether some sensor samples at a tick by its rate."""
         return any(tick % period == offset for period, offset in self._turns)
+
+    def may_be_due(self, tick: int) -> bool:
+        """Whether some sensor may sample at a tick whose frame is not known."""
+        return bool(self._speaking) or self.is_due(tick)
 
     def is_silent(self, frame: Frame) -> bool:
         """Whether no robot sends anything at the frame's tick."""
-        return not frame.outboxes and not self.is_due(frame.tick)
+        return not frame.outboxes and not self.is_due(frame.tick) and not self._has_spoken(frame)
+
+    def _has_spoken(self, frame: Frame) -> bool:
+        if not self._speaking:
+            return False
+        layout = frame.layout
+        if layout.digest != self._layout:
+            self._layout = layout.digest
+            self._places = [layout[name].offsets[field] for name, field in self._speaking if name in layout]
+        return any(frame.numbers[place] != 0.0 for place in self._places)
 
 
 def are_answered(packets: Iterable[Delivered]) -> bool:

@@ -51,7 +51,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A geometry at a pose in its link (in the world for scenery), its surface (a key of the table's) and colour.
+    """A geometry at a pose in its link (in the world for scenery), its surface (a key of the physics') and colour.
 
     `radio` is what waves lose in it; `name` is that of the scenery it belongs to, empty in a body, which has its own.
     """
@@ -88,7 +88,8 @@ class Link:
 class Body:
     """A chain of links on a base that stands at `position`, upright. A free body's position comes from its slots.
 
-    Radio waves leave from `antenna`, a place in its last link.
+    Radio waves leave from `antenna`, a place in its last link. `speed_limit` (m/s) is how fast a free body can be, a
+    promise of its model.
     """
 
     name: str
@@ -96,6 +97,12 @@ class Body:
     position: Vector
     links: tuple[Link, ...]
     antenna: Vector = ORIGIN
+    speed_limit: float = 0.0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether its base moves; the base of any other is fixed."""
+        return self.links[0].joint == "free"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +111,13 @@ class Scene:
 
     bodies: Mapping[str, Body]
     scenery: tuple[Shape, ...]
+
+
+def inertia_about_axis(link: Link) -> float:
+    """Return the moment of inertia of a turning link about its joint's axis, a coordinate axis (kg m2)."""
+    (axis,) = [number for number in range(3) if link.axis[number] != 0.0]
+    along = [link.centre_of_mass[number] for number in range(3) if number != axis]
+    return link.inertia[axis] + link.mass * (along[0] * along[0] + along[1] * along[1])
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:

@@ -1,27 +1,25 @@
-"""The world part of a deployment: what is computed, and nothing of where it is computed or what lies between.
-
-It holds a football table or a hall with mobile robots, the robots, and the scenery.
-"""
+"""The world part of a deployment: what is computed, and nothing of where it is computed or what lies between."""
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Annotated, Literal, Protocol, Self
+from typing import Annotated, Final, Protocol, Self, TypeVar
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, SerializeAsAny
 
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
-from foosim.world.kits.hall import Hall
-from foosim.world.kits.table import Table
+from foosim.world.forms.settings import RobotSettings, RuleSettings, SceneSettings
 from foosim.world.mesh import Mesh
-from foosim.world.robots.foosball_rod import RodRobot
-from foosim.world.robots.overhead_camera import CameraRobot
-from foosim.world.robots.rover import RoverRobot, StationRobot
 from foosim.world.scene import Shape
 from foosim.world.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, open_meshes, scenery_shape
 
-Robot = Annotated[RodRobot | CameraRobot | RoverRobot | StationRobot, Field(discriminator="model")]
+KITS: Final = "kits"
+"""The field of kits' sections, which in a file stand each under the name of its kit."""
+KITS_MAX: Final = 16
+RULES_MAX: Final = 64
+
+Section = TypeVar("Section", bound=SpecBase)
 
 
 class Timed(Protocol):
@@ -37,36 +35,26 @@ class Timed(Protocol):
 
 
 class WorldSpec(SpecBase):
-    """The world: one of `table` and `hall` is given."""
+    """The world: its robots, the sections of kits, rules, a scene, and fixed things."""
 
     world: Name
     seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
     tick_ns: Annotated[int, Quantity(units.TIME, "0.1 ms", "100 ms")] = Field(alias="tick")
     substeps: Annotated[int, Field(ge=1, le=64)]
-    engine: Literal["bullet", "pure"]
-    table_: Table | None = Field(default=None, alias="table")
-    hall_: Hall | None = Field(default=None, alias="hall")
+    engine: str
+    kits: dict[str, SerializeAsAny[SpecBase]] = Field(default={}, max_length=KITS_MAX)
+    rules: dict[Name, SerializeAsAny[RuleSettings]] = Field(default={}, max_length=RULES_MAX)
+    scene: SerializeAsAny[SceneSettings] | None = None
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
-    robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
+    robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     _contents: Contents = PrivateAttr(default_factory=Contents)
 
-    @property
-    def is_hall(self) -> bool:
-        """Whether the world is a hall with mobile robots; else it is a football table."""
-        return self.hall_ is not None
-
-    @property
-    def table(self) -> Table:
-        """The football table of a world that is one."""
-        assert self.table_ is not None, "this world has no table"
-        return self.table_
-
-    @property
-    def hall(self) -> Hall:
-        """The hall of a world that is one."""
-        assert self.hall_ is not None, "this world is no hall"
-        return self.hall_
+    def section(self, kit: str, kind: type[Section]) -> Section:
+        """Return the section of a kit that this world has."""
+        found = self.kits[kit]
+        assert isinstance(found, kind), found
+        return found
 
     def with_contents(self, contents: Contents) -> Self:
         """The same with what is in the files that it names."""
@@ -88,7 +76,7 @@ class WorldSpec(SpecBase):
         return self._contents.meshes.get(thing)
 
     def scenery_shapes(self) -> list[Shape]:
-        """The scenery beside table or hall, in name order; files that its meshes are in were given."""
+        """The scenery beside kits and scene, in name order; files that its meshes are in were given."""
         meshes = self._contents.meshes
         return [scenery_shape(name, thing, meshes.get(name)) for name, thing in sorted(self.scenery.items())]
 

@@ -15,7 +15,7 @@ place has the first, an odd place the second. Captures and digests depend on thi
     keys = NoiseKeys([draw_key(seed, "noise", name, "imu") for name in robots])
     turned = rates + 0.01 * keys.normal(tick, width=3, slot=0)           # (robots, 3)
     is_lost = keys.uniform(tick, width=1, slot=1)[:, 0] < probability
-    alone = NoiseKey(draw_key(seed, "noise", "rover-7", "imu")).normal(tick, width=3, slot=0)    # its row, in a list
+    alone = NoiseKey(draw_key(seed, "noise", "robot-7", "imu")).normal(tick, width=3, slot=0)    # its row, in a list
 
 Neighbours: `foosim.common.keyed_random` has draws of eight words for one packet or event, from BLAKE2b.
 """

@@ -25,8 +25,8 @@ from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.initial_state import initial_frame
 from foosim.world.layout import build_layout
 
 ASKERS_KEPT: Final = 256

@@ -6,7 +6,7 @@ with `#` are passed by. What `foosim-replay export CAPTURE --what poses` writes 
 | column | what | unit |
 |---|---|---|
 | `time_s` (or `time`), `time_ms`, `time_us`, `time_ns` | when; one of them | as its name says |
-| `entity`, `link`, `name` or `body` | an entity (`ball`, `rover1`) or one of its links (`red.goal/slide`) | |
+| `entity`, `link`, `name` or `body` | an entity (`arm`) or one of its links (`arm/slide`) | |
 | `x`, `y`, perhaps `z` | where, in the world frame; no `z` is 0; `x_mm`, `x_cm` ... in these units | m |
 | `qx`, `qy`, `qz`, `qw` | orientation; all four, of length 1 | |
 | `yaw` or `yaw_deg`, in their place | turn about the vertical axis, counter-clockwise from x | rad, or degrees |

@@ -1,6 +1,6 @@
 """Recorded poses as a source of the page: a recorded reality, beside or as a ghost in what a capture has.
 
-What has the name of a link or an entity of the other source is drawn as that; all else is a small ball.
+What has the name of a link or an entity of the other source is drawn as that; all else is a small sphere.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
 from foosim.console.shown.tracks import Pose, Track
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.layout import build_layout
-from foosim.world.scenes.build import build_scene
 
 TICK_NS: Final = 1_000_000
 """Of a table that is looked at by itself."""
@@ -157,7 +157,7 @@ def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[s
         {"name": name, "model": models.get(name, ""), "links": [place], "removable": False, "pushable": False}
         for place, name in enumerate(tracks)
     ]
-    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "meshes": {}, "addable": []}
+    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "addable": [], "marks": {}}
     return {**empty, "meshes": content.get("meshes", {}), "links": links, "bodies": bodies, "bounds": _bounds(tracks)}
 
 

@@ -24,7 +24,7 @@ from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.deployment.schema import Deployment
 from foosim.protocol.replay_messages import PlayedLine, PlayedPoses, PlayedRow, ReplayClock
-from foosim.world.layout import ADDABLE, build_layout
+from foosim.world.layout import build_layout
 
 ARGUMENTS: Final[Known] = {
     "play": {},
@@ -154,10 +154,10 @@ class PlayedSource:
         deployment = self._replay.deployment
         base = build_layout(deployment)
         added = sorted({link.partition("/")[0] for link in links} - {*base.names})
-        (model,) = ADDABLE
+        addable = base.declared.addable
         try:
-            layout = build_layout(deployment, [(name, model) for name in added])
-        except Malformed:  # a hall, to which nothing can be added: a name that is nobody's
+            layout = build_layout(deployment, [(name, addable[0]) for name in added]) if addable else base
+        except Malformed:  # a name that is nobody's
             layout = base
         self._drawing = Drawing(deployment, layout)
         names = [link.name for body in self._drawing.scene.bodies.values() for link in body.links]

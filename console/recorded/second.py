@@ -14,8 +14,8 @@ from foosim.console.clock.leading import Leader
 from foosim.console.recorded.capture_source import FileSource, Recompute
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.layout import build_layout
-from foosim.world.scenes.build import build_scene
 
 SecondOption = Annotated[
     Path | None,

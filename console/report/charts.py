@@ -82,7 +82,7 @@ def _events(found: Report) -> Drawing:
     for name, mark, moments in named:
         if moments:
             entries = [{"from": at_ns / 1e9, "text": f"{at_ns / 1e9:.9g} s: {text}"} for at_ns, text in moments]
-            lanes.append({"name": name, "mark": mark, "entries": entries})
+            lanes.append({"name": name, "mark": mark, "look": found.looks.get(mark), "entries": entries})
     return {"kind": "lanes", "range": _range(found), "lanes": lanes}
 
 

@@ -28,6 +28,7 @@ from foosim.deployment.network.rules import event_of
 from foosim.deployment.network.settings_text import event_words, impairments_text, radio_text, rule_ends, sends_once
 from foosim.vhub.links.summary import delay_of, residual_of
 from foosim.vhub.network.timeline import Timeline
+from foosim.world.assembly.world import mark_kinds
 from foosim.world.frame import Frame, chain_next
 
 BINS: Final = 60
@@ -205,6 +206,8 @@ class Report:
     senders: tuple[SenderReport, ...]
     measured: tuple[RuleReport, ...]
     happenings: tuple[Happening, ...]
+    looks: dict[str, str]
+    """How marks of the kinds that the world's rules bring look, by kind."""
     bands: tuple[Band, ...]
     bands_left: int
     marks: tuple[Mark, ...]
@@ -357,6 +360,7 @@ class _Gathered:
             tuple(self._sender(*key) for key in sorted(self._senders)),
             tuple(self._rule(*key) for key in sorted(self._rules)),
             tuple(sorted([*self._happenings, *moved], key=lambda happening: happening.at_ns)),
+            {name: kind.look for name, kind in mark_kinds(self._deployment).items()},
             tuple(bands[:BANDS_MAX]),
             max(0, len(bands) - BANDS_MAX),
             tuple(self._marks()),

@@ -20,6 +20,7 @@ from foosim.console.shown.scene_json import standing_bounds
 from foosim.deployment.network.rules import selects
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
+from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
@@ -36,7 +37,6 @@ from foosim.world.scene import (
     multiply,
     rotate,
 )
-from foosim.world.scenes.build import build_scene
 
 FRAMES_KEPT: Final = 256
 """Captured frames whose places are remembered, for packets that are lost late."""

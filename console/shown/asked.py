@@ -1,4 +1,4 @@
-"""Descriptions of edits of a run's world: balls and robots that were added, removed, pushed, moved."""
+"""Descriptions of edits of a run's world: entities that were added, removed, pushed, robots that were moved."""
 
 from __future__ import annotations
 

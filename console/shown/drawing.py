@@ -13,9 +13,9 @@ from foosim.console.shown.poses import Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import Moment
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
-from foosim.world.scenes.build import build_scene
 
 
 class Drawing:

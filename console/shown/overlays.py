@@ -1,4 +1,4 @@
-"""Overlays of a world on request: contacts, and the rays of proximity sensors."""
+"""Overlays of a world on request: contacts, and the rays of sensors that send some."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
-from foosim.world.components.view import Mounting
+from foosim.world.components.fitted import sensors_of
+from foosim.world.forms import registry
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
-from foosim.world.sensors.proximity import Proximity, ProximitySettings, ways_of
 
 
 class Overlays:
@@ -19,23 +19,14 @@ class Overlays:
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._layout = layout
-        self._groups: dict[int, list[Proximity]] = {}
-        """Sensors by their number of rays."""
-        self._ranges: dict[int, list[tuple[int, float, int]]] = {}
-        """Of each of them: the slot of the rover's position, the range, the slot of the heading."""
-        for name, robot in deployment.robots.items():
-            for channel, settings in robot.sensors.items():
-                if isinstance(settings, ProximitySettings):
-                    self._add(deployment, name, channel, settings)
-
-    def _add(self, deployment: Deployment, name: str, channel: str, settings: ProximitySettings) -> None:
-        entity = self._layout[name]
-        rover = deployment.hall.rover
-        self._radius_m, self._height_m = rover.radius, rover.height
-        sensor = Proximity(settings, Mounting(deployment, self._layout, entity, channel, b""))
-        self._groups.setdefault(settings.rays, []).append(sensor)
-        place = entity.offsets["position"], settings.range, entity.offsets["heading"]
-        self._ranges.setdefault(settings.rays, []).append(place)
+        self._groups: dict[tuple[Any, int], list[Any]] = {}
+        """Sensors that send rays, by their class and the length of their readings."""
+        for robot in layout.robots:
+            kinds = {sensor.kind for sensor in deployment.robots[robot.name].sensors.values()}
+            if any(hasattr(registry.find_component("sensor", kind).made, "rays") for kind in kinds):
+                for fitted in sensors_of(deployment, layout, robot):
+                    if hasattr(fitted.sensor, "rays"):
+                        self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted.sensor)
 
     def content(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
         """Return the content of the message `overlay` but for its source and generation."""
@@ -47,26 +38,17 @@ class Overlays:
         }
 
     def _contacts(self, frame: Frame) -> list[tuple[float, ...]]:
-        """Return where free bodies touched something in the tick, and the impulse (N s); a rod's are its ball's."""
+        """Return where free bodies touched something in the tick, and the impulse (N s): what is rigid meets those."""
         found = []
-        for ball in self._layout.balls:
-            count, impulse = frame.vector(ball.name, "contacts", 2)
+        for body in self._layout.free:
+            count, impulse = frame.vector(body.name, "contacts", 2)
             if count > 0.0:
-                found.append((*frame.vector(ball.name, "position", 3), impulse))
+                found.append((*frame.vector(body.name, "position", 3), impulse))
         return found
 
     def _rays(self, frame: Frame) -> list[list[float]]:
-        """Return both ends of each ray: from a rover's hull to what it meets, or as far as the sensor reaches."""
+        """Return both ends of each ray (m)."""
         found: list[list[float]] = []
-        for rays, sensors in self._groups.items():
-            ways = ways_of(sensors, frame.numbers)
-            turns = 2.0 * np.pi * np.arange(rays) / rays
-            for row, (place, range_m, heading) in enumerate(self._ranges[rays]):
-                x, y, z = frame.numbers[place : place + 3]
-                angles = frame.numbers[heading] + turns
-                ends = np.clip(ways[row], self._radius_m, self._radius_m + range_m)
-                east, north, height = np.cos(angles), np.sin(angles), np.full(rays, z + self._height_m / 2)
-                radius = self._radius_m
-                lines = [x + radius * east, y + radius * north, height, x + ends * east, y + ends * north, height]
-                found += np.round(np.stack(lines, axis=1), 4).tolist()
+        for (kind, _), sensors in self._groups.items():
+            found += np.round(kind.rays(sensors, frame.numbers), 4).tolist()
         return found

@@ -11,10 +11,10 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import addition, mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.initial_state import kickoff_spot
-from foosim.world.layout import ADDABLE, BALL, Layout
+from foosim.world.layout import Entity, Layout
 from foosim.world.mesh import Mesh
 from foosim.world.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
 
@@ -25,16 +25,13 @@ UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "angular_velocity": ("rad/s",),
     "joint_positions": ("m", "rad"),
     "joint_velocities": ("m/s", "rad/s"),
+    "joint_efforts": ("N", "N m"),
     "contacts": ("", "N s", ""),
-    "heading": ("rad",),
-    "wheel_speeds": ("m/s",),
-    "wheel_travel": ("m",),
-    "charge": ("J",),
-    "still_ticks": ("ticks",),
-    "out_ticks": ("ticks",),
-    "wait_ticks": ("ticks",),
 }
-"""Of a field's numbers; the last one stands for all behind it. What is not here has no unit."""
+"""Of the numbers of fields that every model calls the same; the last one stands for all behind it."""
+NO_UNIT: Final = ("",)
+TICKS: Final = ("_ticks", ("ticks",))
+"""How a field of a rule's memory is called that counts ticks, and its unit."""
 
 
 def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[str, Any]:
@@ -42,18 +39,16 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
     meshes: dict[str, Mesh] = {}
     links: list[dict[str, Any]] = []
     bodies: list[dict[str, Any]] = []
-    added = set(layout.names) - {*deployment.robots, BALL}
     for name, body in scene.bodies.items():
         first = len(links)
         links += [{"name": link.name, "body": name, "shapes": _shapes(link.shapes, meshes)} for link in body.links]
-        is_free = body.model in ADDABLE
         bodies.append(
             {
                 "name": name,
                 "model": body.model,
                 "links": list(range(first, len(links))),
-                "removable": is_free and name in added,
-                "pushable": is_free,
+                "removable": layout.is_added(name),
+                "pushable": layout[name].is_free,
             }
         )
     scenery = _shapes(scene.scenery, meshes)
@@ -67,7 +62,11 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
-        "addable": _addable(deployment),
+        "addable": _addable(deployment, layout),
+        "marks": {
+            name: {"look": kind.look, "text": kind.text, "cut": kind.is_cut}
+            for name, kind in sorted(mark_kinds(deployment).items())
+        },
         "network": {
             "rules": [rule.id for rule in deployment.network.links],
             "endpoints": sorted(deployment.endpoints()),
@@ -117,7 +116,7 @@ def _fields(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
         commanded = {f"{channel}.set_point": codec for channel, codec in _actuators(deployment, entity.name)}
         for name, start in entity.offsets.items():
             codec = commanded.get(name)
-            units = UNITS.get(name, ("",)) if codec is None else tuple(field.unit for field in codec.fields)
+            units = _units(entity, name) if codec is None else tuple(field.unit for field in codec.fields)
             for place, count in _runs(entity.counts[name], len(units)):
                 fields.append(
                     {
@@ -129,6 +128,12 @@ def _fields(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
                     }
                 )
     return fields
+
+
+def _units(entity: Entity, field: str) -> tuple[str, ...]:
+    """Return the units of a field's numbers, the last one standing for all behind it; a field may have none."""
+    ending, ticks = TICKS
+    return entity.kind.units.get(field) or UNITS.get(field) or (ticks if field.endswith(ending) else NO_UNIT)
 
 
 def _actuators(deployment: Deployment, robot: str) -> list[tuple[str, PayloadCodec]]:
@@ -177,8 +182,12 @@ def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:
     return enclosing(boxes) if boxes else ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
 
 
-def _addable(deployment: Deployment) -> list[dict[str, Any]]:
+def _addable(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
     """Return what can be added, and where and how fast it is where nothing else is said."""
-    if deployment.is_hall:
-        return []
-    return [{"model": model, "position": kickoff_spot(deployment), "velocity": (0.0, 0.0, 0.0)} for model in ADDABLE]
+    name = "new"
+    while name in layout:
+        name += "_"
+    return [
+        {"model": model, "position": addition(deployment, layout, name, model)[0], "velocity": (0.0, 0.0, 0.0)}
+        for model in layout.declared.addable
+    ]

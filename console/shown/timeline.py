@@ -1,13 +1,13 @@
 """Events of a run as marks on its time line: effects of the world's rules, requests, losses.
 
-The rules leave their memory in frames, so their events are read from these, to the tick, also where only every tenth
+The rules leave their memory in frames, so they tell from these what they did, to the tick, also where only every tenth
 frame is there. Pure, and bounded whatever the length of the run.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,14 +15,12 @@ from pydantic import ValidationError
 
 from foosim.capture.rows import EditRow, EpochRow, RecoveryRow
 from foosim.common.errors import Refused
-from foosim.common.names import TEAMS
 from foosim.console.shown.asked import edit_text, moves
 from foosim.deployment.network.rules import event_of
 from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import WorldMarks
 from foosim.world.frame import Frame
-from foosim.world.initial_state import kickoff_ticks
-from foosim.world.layout import WORLD, Entity
 
 MARKS_MAX: Final = 400
 """Marks of one kind; those that come later are counted."""
@@ -32,7 +30,7 @@ FINE_BINS: Final = 8192
 """Spans in which drops are counted; where they are not enough, they get twice as long."""
 FINE_NS: Final = 50_000_000
 CAUSES_SHOWN: Final = 3
-GOAL, KICKOFF, OUT, DEAD, QUARANTINE, DOWN, EMPTY = "goal", "kickoff", "out", "dead", "quarantine", "down", "empty"
+QUARANTINE, DOWN = "quarantine", "down"
 EPOCH, RECOVERY, MOVE, NETWORK, DROPS = "epoch", "recovery", "move", "network", "drops"
 
 FLAGS: Final = {"quarantined": (QUARANTINE, "is in quarantine"), "down": (DOWN, "is out of service")}
@@ -52,7 +50,8 @@ class WorldEvents:
     """Finds what the rules did between frames, taken in order. The first frame is what later ones are compared with."""
 
     def __init__(self, deployment: Deployment) -> None:
-        self._wait_ticks = 0 if deployment.is_hall else kickoff_ticks(deployment)
+        self._deployment = deployment
+        self._rules: WorldMarks | None = None
         self._before: Frame | None = None
 
     def take(self, frame: Frame) -> list[Mark]:
@@ -61,52 +60,10 @@ class WorldEvents:
         if before is None or frame.tick <= before.tick:
             return []
         marks = self._of_flags(before, frame)
-        if WORLD in frame.layout and WORLD in before.layout:
-            marks += self._of_table(before, frame)
+        if self._rules is None or self._rules.layout is not frame.layout:
+            self._rules = WorldMarks(self._deployment, frame.layout)
+        marks += [Mark(*mark) for mark in self._rules.between(before, frame)]
         return sorted(marks, key=lambda mark: mark.tick)
-
-    def _of_table(self, before: Frame, frame: Frame) -> list[Mark]:
-        marks: list[Mark] = []
-        returned: list[tuple[int, Entity]] = []
-        for ball in frame.layout.balls:
-            if ball.name not in before.layout:
-                continue
-            wait = int(frame.at(ball.name, "wait_ticks"))
-            waited = int(before.at(ball.name, "wait_ticks"))
-            if wait > waited or (wait and not waited):
-                returned.append((frame.tick - (self._wait_ticks - wait), ball))
-            if waited and before.tick + waited <= frame.tick:
-                marks.append(Mark(before.tick + waited, KICKOFF, f"kick-off of {ball.name}"))
-        goals = self._goals(before, frame, [tick for tick, _ in returned])
-        scored = {mark.tick for mark in goals}
-        marks += goals
-        for tick, ball in returned:
-            if tick not in scored:
-                marks.append(self._back(before, tick, ball))
-        unseen = int(frame.at(WORLD, "kickoffs") - before.at(WORLD, "kickoffs"))
-        unseen -= sum(mark.kind == KICKOFF for mark in marks)
-        marks += [Mark(frame.tick, KICKOFF, "kick-off")] * max(0, unseen)
-        return marks
-
-    @staticmethod
-    def _goals(before: Frame, frame: Frame, returned: Sequence[int]) -> list[Mark]:
-        """Return the goals between two frames, each at the tick at which a ball came back, where that is known."""
-        assert frame.score is not None and before.score is not None
-        ticks = sorted(returned)
-        score, marks = list(before.score), []
-        for team, name in enumerate(TEAMS):
-            while score[team] < frame.score[team]:
-                score[team] += 1
-                tick = ticks.pop(0) if ticks else frame.tick
-                marks.append(Mark(tick, GOAL, f"goal of {name}, {score[0]} : {score[1]}"))
-        return marks
-
-    @staticmethod
-    def _back(before: Frame, tick: int, ball: Entity) -> Mark:
-        """Return why a ball came back to the spot without a goal."""
-        if before.at(ball.name, "still_ticks") > before.at(ball.name, "out_ticks"):
-            return Mark(tick, DEAD, f"{ball.name} lay still")
-        return Mark(tick, OUT, f"{ball.name} left the table")
 
     @staticmethod
     def _of_flags(before: Frame, frame: Frame) -> list[Mark]:
@@ -120,8 +77,6 @@ class WorldEvents:
                         marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
                     elif was and not holds and kind == DOWN:
                         marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
-            if "charge" in known and before.at(entity.name, "charge") > 0.0 >= frame.at(entity.name, "charge"):
-                marks.append(Mark(frame.tick, EMPTY, f"the battery of {entity.name} is empty"))
         return marks
 
 

@@ -1,4 +1,4 @@
-"""Entries with `each: SELECTOR`: one for each robot that the selector matches, such as the controller of each rover.
+"""Entries with `each: SELECTOR`: one for each robot that the selector matches, such as the controller of each scout.
 
 In the name, in texts and in keys of such an entry `$robot` stands for the robot's name, `$1`, `$2`... for what the
 wildcards of the selector match in it, and `$$` for a dollar sign. Where it runs may also follow from `$node`, the node

@@ -3,21 +3,12 @@
 The noise of a sensor was settings of its own, which are a modifier now. A file of format 1 is read as if it said so.
 """
 
-from collections.abc import Mapping
 from typing import Final
 
 from foosim.deployment.text.yaml import Fields, Items, Leaf, Tree
+from foosim.world.forms.earlier_noise import NOISE
 
 FORMAT: Final = 2
-NOISE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
-    "encoder": {"position_noise": ("slide",), "angle_noise": ("spin",)},
-    "ball": {"noise": ("x", "y")},
-    "pose": {"position_noise": ("position",), "heading_noise": ("heading",)},
-    "odometry": {"noise": ("left", "right")},
-    "proximity": {"noise": ("ways",)},
-    "battery": {"noise": ("voltage",)},
-}
-"""By kind of sensor: its settings of noise, and the fields of its readings that each was of."""
 
 
 def upgrade(tree: Tree | None) -> None:

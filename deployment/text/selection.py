@@ -1,4 +1,4 @@
-"""Selectors of names in a deployment's text: globs (`rover-*`), and ranges of numbers (`rover01..20`).
+"""Selectors of names in a deployment's text: globs (`scout-*`), and ranges of numbers (`scout01..20`).
 
 A range selects those of its names that there are; numbers are written as the first one is, with zeros before them or
 without. What the wildcards match, or the number of a range, is what `$1`, `$2`... stand for where an entry is made for

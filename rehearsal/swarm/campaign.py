@@ -7,6 +7,7 @@ processes present. A failing seed is reproduced with one command.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Final
@@ -68,8 +69,9 @@ SMALL: Final[tuple[str, ...]] = (
     f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
 )
 """Overrides that keep the computation, with fewer steps, and add echo channels."""
+TABLE: Final = "table"
 OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
-"""The ball of a table rolls from the start."""
+"""A table's game begins at once."""
 BY_PERIOD: Final[tuple[str, ...]] = ("act=period", "arrivals={}", "rate=100 Hz")
 """In the last world players act at arrival, in the others at ticks of their own: both kinds are tested."""
 PATIENT: Final[tuple[str, ...]] = (
@@ -139,10 +141,13 @@ def _later(fault: Fault, ticks: int) -> Fault:
     return replace(fault, tick=fault.tick + ticks)
 
 
+def spread(names: Sequence[str]) -> list[str]:
+    """Return the first, the middle and the last one: robots of different nodes where those deal in name order."""
+    return list(dict.fromkeys(names[place] for place in (0, len(names) // 2, -1)))
+
+
 class Prober:
     """A lockstep client that sends numbered echo requests to robots and counts the replies."""
-
-    OF_TABLE: Final[tuple[str, ...]] = ("blue.goal", "camera", "red.midfield")
 
     def __init__(self, core: ClientCore) -> None:
         self._core = core
@@ -162,7 +167,7 @@ class Prober:
             deployment = core.deployment
             spec = deployment.clients[PROBER]
             assert spec.rate_hz is not None
-            self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
+            self._robots = spread(sorted(deployment.robots))
             heard = [(robot, CHANNEL_ECHO) for robot in self._robots]
             core.join(deployment.ticks(spec.rate_hz), heard, spec.offset_ns // deployment.tick_ns)
         if core.go is not None:
@@ -217,7 +222,7 @@ class Flown:
 def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
     deployment = load_deployment(text, name)
-    of_world = [] if deployment.is_hall else list(OF_TABLE)
+    of_world = list(OF_TABLE) if TABLE in deployment.kits else []
     if seed != WORLDS - 1:
         acting = [player for player in deployment.players if deployment.arrivals_of(player)]
         of_world += [f"players.{player}.{what}" for player in acting for what in BY_PERIOD]

@@ -26,7 +26,7 @@ HOUR_NS: Final = 3_600_000 * MS
 ASK_AGAIN_NS: Final = 150 * MS
 """Period at which an unanswered request is repeated."""
 PUSH_MAX: Final = 0.8
-"""In N s: a push may give the table's ball of 21 g no more than its speed limit of 40 m/s."""
+"""In N s: a push may give a body of 21 g, the lightest of those deployed, no more than its speed limit of 40 m/s."""
 
 T = TypeVar("T")
 
@@ -224,18 +224,14 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
 # --- people ----------------------------------------------------------------------------------------------------------
 
 
-OF_TABLE: Final[tuple[str, ...]] = ("red.goal", "red.attack", "blue.defence", "camera")
-
-
 def _move(dice: Dice, names: Sequence[str]) -> Fault:
-    robot, node = dice.one_of(OF_TABLE), dice.one_of(names)
+    place, node = dice.unit(), dice.one_of(names)
 
     def do(system: System) -> None:
-        others = sorted(system.supervisor.state.owners)  # of a hall, the robots in the same places of the list
-        chosen = robot if robot in others else others[OF_TABLE.index(robot) % len(others)]
-        ask(system, "move", robot=chosen, node=node)
+        robots = sorted(system.supervisor.state.owners)
+        ask(system, "move", robot=robots[int(place * len(robots))], node=node)
 
-    return Fault(_tick(dice), "move", f"move {robot} to {node}", do)
+    return Fault(_tick(dice), "move", f"move robot {place:.2f} of all to {node}", do)
 
 
 def _add(dice: Dice, names: Sequence[str]) -> Fault:
@@ -246,7 +242,7 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
-    """Sometimes at the permitted maximum, twice in one tick: then the ball goes into quarantine."""
+    """Sometimes at the permitted maximum, twice in one tick: then the body goes into quarantine."""
     hard = dice.one_of((0.04, 0.04, 0.04, 4.0))
     impulse = [hard * (dice.unit() - 0.5) for _ in range(3)]
     size = hypot(*impulse)
@@ -258,7 +254,7 @@ def _push(dice: Dice, names: Sequence[str]) -> Fault:
         for _ in range(1 + is_too_hard):
             ask(system, "push", impulse=impulse)
 
-    return Fault(_tick(dice), "push", "push the ball", do)
+    return Fault(_tick(dice), "push", "push the first free body", do)
 
 
 def _tempo(dice: Dice, names: Sequence[str]) -> Fault:

@@ -27,9 +27,9 @@ from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.vhub.state.records import fold as fold_hub
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
-from foosim.world.initial_state import initial_frame
 
 
 class Laws:

@@ -37,8 +37,8 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.vhub.core import HubCore
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
 

@@ -20,9 +20,9 @@ from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.initial_state import initial_frame
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.assembly.world import build_scene
 from foosim.world.layout import build_layout
-from foosim.world.scenes.build import build_scene
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 TOKENS = Tokens("look", "touch")

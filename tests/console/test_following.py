@@ -14,9 +14,10 @@ from foosim.console.shown.source import About, Wanted
 from foosim.deployment.loader import load_deployment
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Commit
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame
 from foosim.world.layout import build_layout
+from foosim.world.parameters.hall import hall_of
 from foosim.world.sensors.proximity import ProximitySettings
 from tests.console.memory import TABLE, table
 
@@ -105,7 +106,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
         "requests": list(requests),
         "links": [],
         "links_in_all": 0,
-        "score": None,
+        "summary": [],
         "watched": {},
     }
 
@@ -173,7 +174,7 @@ def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None
     frame = initial_frame(deployment)
     rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
     sensor = next(s for s in deployment.robots["rover01"].sensors.values() if isinstance(s, ProximitySettings))
-    radius = deployment.hall.rover.radius
+    radius = hall_of(deployment).rover.radius
     assert rays.shape == (sensor.rays, 6)
     rays[:, (0, 3)] -= frame.at("rover01", "position")
     rays[:, (1, 4)] -= frame.at("rover01", "position", 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -21,9 +22,11 @@ from foosim.console.shown.source import Curve
 from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame, kickoff_ticks
-from foosim.world.layout import BALL, WORLD
+from foosim.world.kits.table import BALL
+from foosim.world.layout import WORLD
+from foosim.world.rules.football import kickoff_ticks
 from tests.replay.conftest import TABLE, TICK_NS, TICKS
 
 SECOND_NS = 1_000_000_000
@@ -63,10 +66,11 @@ class Played:
         values = np.array(self.frame.values)
         for name, value in slots.items():
             entity, field, offset = {
-                "score_red": (WORLD, "score", 0),
-                "score_blue": (WORLD, "score", 1),
-                "kickoffs": (WORLD, "kickoffs", 0),
-            }.get(name, (BALL, name, 0))
+                "score_red": (WORLD, "football.score", 0),
+                "score_blue": (WORLD, "football.score", 1),
+                "kickoffs": (WORLD, "football.kickoffs", 0),
+                "quarantined": (BALL, "quarantined", 0),
+            }.get(name, (BALL, f"football.{name}", 0))
             values[self.frame.layout[entity].offsets[field] + offset] = value
         self.frame = Frame(tick, self.frame.layout, values)
         return self.events.take(self.frame)
@@ -91,6 +95,20 @@ def test_what_the_rules_did_is_found_to_the_tick_between_frames(table: Deploymen
     assert [mark.text for mark in late if mark.kind == "goal"] == ["goal of red, 2 : 0", "goal of blue, 2 : 1"]
     assert [mark.kind for mark in late if mark.kind != "goal"] == ["kickoff"] * 3, "those that no frame shows, too"
     assert played.at(10, wait_ticks=wait) == [], "an earlier frame begins anew"
+
+
+def test_an_empty_battery_is_marked_once(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2), "hall")
+    frame, events = initial_frame(deployment), WorldEvents(deployment)
+    events.take(frame)
+    marks = []
+    for tick, charge in ((10, 1.0), (20, 0.0), (30, 0.0), (40, 5.0), (50, 0.0)):
+        values = np.array(frame.values)
+        values[frame.layout["rover02"].offsets["charge"]] = charge
+        frame = Frame(tick, frame.layout, values)
+        marks += events.take(frame)
+    text = "the battery of rover02 is empty"
+    assert marks == [Mark(20, "empty", text), Mark(50, "empty", text)]
 
 
 def epoch(tick: int, number: int, roster: list[str], **owners: str) -> EpochRow:
@@ -233,7 +251,7 @@ def test_curves_of_a_run_are_what_the_capture_has(history: CaptureHistory) -> No
     recording = history.recording
     frames = [*open_capture(recording.path).each_frame()]
     place = frames[0].layout[BALL].offsets["position"]
-    first = [(frame.tick, float(frame.values[place])) for frame in frames if len(frame.layout.balls) == 1]
+    first = [(frame.tick, float(frame.values[place])) for frame in frames if len(frame.layout.of("ball")) == 1]
     assert curve_points(history, Curve("a", field=place), TICKS, 0) == first
     score = curve_points(history, Curve("b", status="score.red"), TICKS, 0)
     assert len(score) > 100 and {value for _, value in score} == {0.0}

@@ -8,7 +8,7 @@ from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
 from foosim.console.shown.rule_text import RuleTexts, rule_text
 from foosim.deployment.loader import load_deployment
-from foosim.world.initial_state import initial_frame
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.layout import build_layout
 
 KEY = ("a", "b", "rule")

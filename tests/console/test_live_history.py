@@ -30,7 +30,7 @@ def test_numbers_of_frames_are_kept_some_time_apart_by_name_through_a_change_of_
     found, world = following()
     for tick in range(10, 10 + 3 * APART):
         found.show(world, frame_of(tick))
-    ball = place("world", "score", [])
+    ball = place("world", "football.score", [])
     points = found.points(Curve("z", field=ball))()
     assert points == [(tick, float(ball)) for tick in (10, 10 + APART, 10 + 2 * APART)]
     later = 20 * APART
@@ -39,7 +39,7 @@ def test_numbers_of_frames_are_kept_some_time_apart_by_name_through_a_change_of_
     read = found.read(commit(frame_of(later, BALL2[0])))
     assert read is not None
     found.show(*read)
-    moved = place("world", "score", BALL2)
+    moved = place("world", "football.score", BALL2)
     assert moved != ball
     assert found.points(Curve("z", field=moved))() == [*points, (later, float(moved))]
     assert found.points(Curve("b", field=place("ball2", "position", BALL2)))()[0][0] == later

@@ -8,9 +8,10 @@ from foosim.console.shown.poses import Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.scenes.build import build_scene
+from foosim.world.parameters.table import table_of
 from tests.console.memory import table
 
 
@@ -62,3 +63,26 @@ def test_the_commands_of_a_world_are_the_set_points_of_its_actuators(fleet_text:
         assert [(command["number"], command["unit"]) for command in mine] == told
         assert [command["index"] - robot.offsets[slot] for command in mine] == [0, 1]
         assert len(commands) == 2 * sum(slot in entity.offsets for entity in layout.robots)
+
+
+def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str]) -> None:
+    """Units of fields, what can be added where, and how marks of the rules look."""
+    football, hall = table(), load_deployment(fleet_text(2), "hall")
+    layout = build_layout(football, (("new", "ball"), ("ball2", "ball")))
+    shown = scene_content(football, layout, build_scene(football, layout))
+    units = {(run["entity"], run["field"]): run["unit"] for run in shown["fields"]}
+    assert units["ball", "football.wait_ticks"] == "ticks" and units["ball", "position"] == "m"
+    assert units["world", "football.score"] == ""
+    spot = (0.0, 0.0, table_of(football).ball.radius)
+    assert shown["addable"] == [{"model": "ball", "position": spot, "velocity": (0.0, 0.0, 0.0)}]
+    bodies = {body["name"]: (body["pushable"], body["removable"]) for body in shown["bodies"]}
+    assert (bodies["ball"], bodies["ball2"], bodies["red.goal"]) == ((True, False), (True, True), (False, False))
+    assert shown["marks"]["goal"] == {"look": "score", "text": "goals", "cut": True}
+    assert {name for name, mark in shown["marks"].items() if mark["cut"]} == {"goal", "kickoff", "out", "dead"}
+    layout = build_layout(hall)
+    shown = scene_content(hall, layout, build_scene(hall, layout))
+    units = {(run["entity"], run["field"]): run["unit"] for run in shown["fields"]}
+    rover = [units["rover01", field] for field in ("heading", "wheel_speeds", "wheel_travel", "charge")]
+    assert rover == ["rad", "m/s", "m", "J"] and shown["addable"] == []
+    assert not any(body["pushable"] or body["removable"] for body in shown["bodies"])
+    assert shown["marks"] == {"empty": {"look": "lost", "text": "empty batteries", "cut": False}}

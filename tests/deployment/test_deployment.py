@@ -11,8 +11,8 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
-from foosim.common.names import LINE_NAMES, TEAMS
 from foosim.common.units import Pace
+from foosim.deployment.checks import DEPLOYMENT_KEYS
 from foosim.deployment.components import read_components
 from foosim.deployment.json_schema import deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -21,10 +21,11 @@ from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.world.forms.per_field import numbers_of, read_per_field
-from foosim.world.forms.registry import find
+from foosim.world.forms.registry import find_component
+from foosim.world.models.camera import CameraRobot
+from foosim.world.models.rod import RodRobot
 from foosim.world.modifiers.gaussian_noise import GaussianNoiseSettings
-from foosim.world.robots.foosball_rod import RodRobot
-from foosim.world.robots.overhead_camera import CameraRobot
+from foosim.world.parameters.table import LINE_NAMES, TEAMS, table_of
 from foosim.world.sensors.ball import BallSettings
 from foosim.world.sensors.encoder import EncoderSettings
 from tests.deployment.halls import BATTERY, PATROL, POSE, hall
@@ -74,10 +75,10 @@ def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Depl
 
 def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) -> None:
     assert (table.tick_ns, table.substeps, table.pace) == (2_000_000, 4, Pace("realtime"))
-    assert (table.table.ball.radius, table.table.ball.mass, table.table.gravity) == (0.0175, 0.021, 9.81)
-    assert (table.table.lines["goal"].x, table.table.lines["midfield"].half_stroke) == (-0.522, 0.0615)
-    assert table.table.surfaces.floor.rolling_friction == 0.00015
-    assert (table.table.drive.slide.speed, table.table.drive.spin.torque) == (3.5, 2.0)
+    assert (table_of(table).ball.radius, table_of(table).ball.mass, table_of(table).gravity) == (0.0175, 0.021, 9.81)
+    assert (table_of(table).lines["goal"].x, table_of(table).lines["midfield"].half_stroke) == (-0.522, 0.0615)
+    assert table_of(table).surfaces.floor.rolling_friction == 0.00015
+    assert (table_of(table).drive.slide.speed, table_of(table).drive.spin.torque) == (3.5, 2.0)
     camera, rod = table.robots["camera"], table.robots["red.goal"]
     assert isinstance(camera, CameraRobot)
     assert isinstance(rod, RodRobot)
@@ -86,7 +87,7 @@ def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) 
     assert ball.rate_hz == Fraction(100)
     assert isinstance(encoder, EncoderSettings)
     (noise,) = encoder.modifiers
-    numbers = numbers_of(find("sensor", "encoder"), encoder)
+    numbers = numbers_of(find_component("sensor", "encoder"), encoder)
     assert isinstance(noise, GaussianNoiseSettings) and numbers is not None
     assert read_per_field(noise.std, numbers) == [0.0002, math.radians(0.5)]
     rule = links_of(table).rule_for("player-red", "red.goal")
@@ -105,7 +106,7 @@ def test_what_is_left_out_has_its_default(table: Deployment) -> None:
     data = data_of(TABLE_TEXT)
     for section in ("network", "capture", "deadlines", "players", "mixed_cpu"):
         del data[section]
-    read, findings = read_components(data)
+    read, findings = read_components(data, DEPLOYMENT_KEYS)
     bare = Deployment.model_validate(read)
     assert findings == []
     assert bare.capture == table.capture
@@ -152,7 +153,8 @@ def test_a_rule_without_effects_is_a_perfect_link() -> None:
 
 
 def test_a_deployment_written_in_si_units_is_the_same_deployment(table: Deployment) -> None:
-    data, findings = read_components(table.model_dump(mode="json", by_alias=True))
+    written = table.model_dump(mode="json", by_alias=True)
+    data, findings = read_components(written | written.pop("kits"), DEPLOYMENT_KEYS)
     assert findings == []
     assert Deployment.model_validate(data) == table
 

@@ -14,7 +14,7 @@ from foosim.common import limits, units
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.text.selection import Population, Selector, TooManyComparisons
-from foosim.world.robots.rover import RoverRobot
+from foosim.world.models.rover import RoverRobot
 from tests.deployment.halls import PATROL, hall, long_robot, problems_of, same
 from tests.deployment.test_templates import ROVER
 

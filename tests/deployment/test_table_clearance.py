@@ -8,9 +8,9 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.table_clearance import clearance_findings
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.world.clearance.table_clearance import clearance_findings
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 CUBE: Final = "shape: box, length: 10 cm, width: 10 cm, height: 10 cm"

@@ -17,7 +17,7 @@ from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.text.expand import expand
 from foosim.deployment.text.includes import Source
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
-from foosim.world.robots.rover import RoverRobot
+from foosim.world.models.rover import RoverRobot
 from tests.deployment.halls import BATTERY, HEAD, PATROL, POSE, WAREHOUSE, hall, long_robot, problems_of, same
 
 ROVER = f"""\
@@ -99,7 +99,8 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
         (("kind: pose, rate: 5 Hz, ", "kind: pose, "),
          "5:13: templates.rover.sensors.pose: missing key, 'rate'"),
         (("    model: rover", "    model: rovr"),
-         "3:12: templates.rover.model: not one of camera, rod, rover, station, 'rovr', nearest is 'rover'"),
+         "3:12: templates.rover.model: unknown model (there are: camera, rod, rover, station), 'rovr', "
+          "nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
          "4:5: templates.rover: unknown key, 'colour'"),
         (("      pose:", "      echo:"),
@@ -174,7 +175,8 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
          ["7:57: templates.other.sensors.p.rate: not a whole number of ticks of 20 ms, '3 Hz', "
           "nearest is '50/17 Hz' and '3.125 Hz'"]),
         ("  other: {model: rower}\n",
-         ["7:18: templates.other.model: not one of camera, rod, rover, station, 'rower', nearest is 'rover'"]),
+         ["7:18: templates.other.model: unknown model (there are: camera, rod, rover, station), 'rower', "
+           "nearest is 'rover'"]),
         ("  other: {class: 'a.b:C', rate: 1 Hx}\n",
          ["7:33: templates.other.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', nearest is '1 Hz'"]),
         ("  other: {shape: box, length: 1 kg}\n",

@@ -13,8 +13,8 @@ from foosim.node.inputs import Inputs
 from foosim.node.tick import Stepper
 from foosim.protocol import channels
 from foosim.protocol.handshake import Member
-from foosim.world.islands import Assignment
-from foosim.world.scenes.table_world import TableWorld
+from foosim.world.assembly.islands import Assignment
+from foosim.world.assembly.world import World
 from tests.gate.planting import Mutant, Planting, Register
 
 register = Register()
@@ -28,7 +28,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 280)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 9)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -113,7 +113,7 @@ def _running_noise(planting: Planting) -> None:
 
 @register("no quarantine", "a result that cannot be is not taken", 5)
 def _no_quarantine(planting: Planting) -> None:
-    planting.swap(TableWorld, "plausible", lambda self, entity, numbers, before: True)
+    planting.swap(World, "plausible", lambda self, entity, numbers, before: True)
 
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)

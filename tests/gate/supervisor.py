@@ -34,7 +34,7 @@ class _AnyDigest(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 24)
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 6)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
         state = self.state
@@ -190,7 +190,7 @@ def _kept_robots(planting: Planting) -> None:
     before: Any = planting.swap(NodeLoss, "join", join)
 
 
-@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 1)
+@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 7)
 def _unmoved(planting: Planting) -> None:
     planting.swap(NodeLoss, "moved", lambda self, robot: None)
 

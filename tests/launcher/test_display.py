@@ -21,6 +21,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.run_status import NO_PACKETS
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
+from foosim.world.kits.hall import HallKit
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 HERE = {"host": "", "lost": False, "stopped": False}
@@ -40,16 +41,15 @@ def running() -> dict[str, Any]:
         "handovers": 41,
         "moves": 2,
         "waiting_for": "red",
-        "score": {"red": 2, "blue": 1},
+        "summary": ["red 2 : 1 blue", "ball at +0.123 -0.045 +0.018 m"],
         "lag_ms": {"p50": 0.31, "p99": 1.62, "max": 7.4},
         "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6170},
-        "ball": {"position": [0.123, -0.045, 0.0175], "solver": "red"},
-        "rovers": None,
+        "solvers": {"ball": "red"},
         "recording": {"state": "on", "problem": "", "offered": 9000, "written": 8990, "refused": 0},
         "packets": {"offered": 22510, "delivered": 22390, "dropped": 113, "in_flight": 7, "refused": 0},
         "nodes": {
-            "blue": {"owned": ["blue.attack", "blue.goal"], "solved_ticks": 6001, "ball_ticks": 1543},
-            "red": {"owned": [f"red.{number}" for number in range(8)], "solved_ticks": 6170, "ball_ticks": 4627},
+            "blue": {"owned": ["blue.attack", "blue.goal"], "solved_ticks": 6001, "free_ticks": 1543},
+            "red": {"owned": [f"red.{number}" for number in range(8)], "solved_ticks": 6170, "free_ticks": 4627},
         },
         "processes": {
             "blue": {"role": "node", **HERE, "busy": 0.314, "tick": 6170, "waiting_for": "order"},
@@ -75,13 +75,13 @@ def row_of(text: str, *words: str) -> str:
 def test_the_table_has_time_pace_lag_score_and_ball(running: dict[str, Any]) -> None:
     text = render_text(running)
     assert "12.34 s · tick 6170 · 1.00x (wanted realtime)" in text
-    assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m, solved by red · 41 hand-overs, 2 moves" in text
+    assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m · ball solved by red · 41 hand-overs, 2 moves" in text
     assert "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue" in text
 
 
 def test_a_hall_has_rovers_and_no_score(running: dict[str, Any]) -> None:
     rovers = {"count": 20, "drive": 18, "least": "rover07", "charge": 0.3412}
-    running |= {"score": None, "ball": None, "rovers": rovers}
+    running |= {"summary": [HallKit.text({"rovers": rovers})], "solvers": {}}
     assert "20 rovers, 18 drive, rover07 has 34% of its charge · 41 hand-overs" in render_text(running)
     assert " | 20 rovers, 18 drive, rover07 has 34% of its charge | packets" in plain_line(running)
 
@@ -103,7 +103,7 @@ def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict
     text = render_text(running)
     assert row_of(text, "blue.attack").split() == ["blue", "blue.attack,", "blue.goal", "25%", "31%", "order"]
     assert "red.5 and 2 more" in row_of(text, "not here yet")
-    assert "75%" in row_of(text, "not here yet") and "ball ticks" in text
+    assert "75%" in row_of(text, "not here yet") and "free bodies" in text
     assert row_of(text, "vhub").split() == ["vhub", "22%", "Done", "of", "player-blue"]
     assert row_of(text, "supervisor").split() == ["supervisor", "11%", "red"]
 
@@ -137,7 +137,7 @@ def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
     assert plain_line(running) == (
         "12.34 s | 1.00x (wanted realtime) | "
         "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue | red 2 : 1 blue | "
-        "ball at +0.123 -0.045 +0.018 m, solved by red | packets 22510 offered, 22390 delivered, 113 dropped | "
+        "ball at +0.123 -0.045 +0.018 m | ball solved by red | packets 22510 offered, 22390 delivered, 113 dropped | "
         "load blue 31% vhub 22% supervisor 11%"
     )
 

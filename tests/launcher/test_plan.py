@@ -14,6 +14,7 @@ from foosim.launcher.run_options import RunOptions
 from foosim.runtime.run_folder import RunFolder
 from foosim.supervisor import main as supervisor_main
 from foosim.supervisor.settings import RunSettings
+from foosim.world.parameters.table import table_of
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(
@@ -31,7 +32,7 @@ EVERYTHING = RunOptions(
 
 def test_a_plan_has_what_was_asked_for() -> None:
     plan = make_plan(EVERYTHING)
-    assert (plan.deployment.seed, plan.deployment.engine, plan.deployment.table.ball.mass) == (7, "pure", 0.027)
+    assert (plan.deployment.seed, plan.deployment.engine, table_of(plan.deployment).ball.mass) == (7, "pure", 0.027)
     assert (str(plan.pace), plan.ticks, plan.address) == ("2x", 750, Address("0.0.0.0", 7447))
 
 

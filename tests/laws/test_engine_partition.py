@@ -17,17 +17,18 @@ import pytest
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.engines.analytic import PureEngine
-from foosim.node.engines.bullet import BulletEngine
-from foosim.node.engines.interface import Engine, EngineFactory
+from foosim.node.physics.bullet_engine import BulletEngine
+from foosim.node.physics.interface import Engine, EngineFactory
+from foosim.node.physics.pure_engine import PureEngine
+from foosim.world.assembly.islands import Assignment, reach_of
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import View
-from foosim.world.initial_state import initial_numbers, place_ball
-from foosim.world.islands import Assignment, reach_of
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.models.rod import RodRobot, figure_ys
+from foosim.world.parameters.table import table_of
 from foosim.world.scene import Body, Shape
-from foosim.world.scenes.football_table import figure_ys
+from tests.placing import place_ball
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 KEY = draw_key(20, "partition")
@@ -78,7 +79,7 @@ def launch_piles(layout: Layout, numbers: list[float], tick: int) -> None:
     """Pile balls up in all corners: four touch one another and the walls, the fifth drops on them."""
     if tick % 300:
         return
-    for index, ball in enumerate(layout.balls):
+    for index, ball in enumerate(layout.of("ball")):
         pile, number = index % 4, index // 4
         out, aside, up = (
             (0.0, 0.0, 0.0),
@@ -105,16 +106,16 @@ class Comparison:
         self.reach = reach_of(self.deployment, self.layout)
         self.actuators = {
             rod.index: fitted.actuator
-            for rod in self.layout.rods
+            for rod in self.layout.of("rod")
             for fitted in actuators_of(self.deployment, self.layout, rod)
         }
-        lines = self.deployment.table.lines
+        lines = table_of(self.deployment).lines
         self.figures = {
             name: figure_ys(lines[robot.line])
             for name, robot in self.deployment.robots.items()
             if isinstance(robot, RodRobot)
         }
-        self.bodies = [entity for entity in self.layout.entities if entity.has_body]
+        self.bodies = [entity for entity in self.layout.entities if entity.is_solved]
         self.factory = factory
         self.one = factory(self.deployment, self.layout)
         self.parts = [factory(self.deployment, self.layout) for _ in range(parts)]
@@ -147,7 +148,7 @@ class Comparison:
     def _want(self, tick: int) -> None:
         """Let every rod follow the ball with its nearest figure, and kick every 100 ms."""
         ball = self.numbers[self.layout["ball"].offsets["position"] + 1]
-        for rod in self.layout.rods:
+        for rod in self.layout.of("rod"):
             start = rod.offsets["position.set_point"]
             if tick % 10 == 0:
                 side = min((ball - y for y in self.figures[rod.name]), key=abs)
@@ -166,7 +167,7 @@ class Comparison:
     def _deal(self, tick: int) -> Assignment:
         """Give every rod an owner by draw."""
         parts = len(self.parts)
-        owners = {rod.name: self.roster[int(draw(400 + rod.index, tick, 0, parts))] for rod in self.layout.rods}
+        owners = {rod.name: self.roster[int(draw(400 + rod.index, tick, 0, parts))] for rod in self.layout.of("rod")}
         return Assignment(self.layout, self.reach, self.roster, owners)
 
     def _solve_in_parts(self, tick: int, numbers: list[float]) -> None:
@@ -189,8 +190,8 @@ class Comparison:
                 self._solve(part, bodies, numbers, tick)
 
     def _count(self, numbers: Sequence[float]) -> None:
-        self.outcome.rod_touches += sum(numbers[rod.offsets["contacts"]] for rod in self.layout.rods)
-        self.outcome.ball_touches += sum(numbers[ball.offsets["contacts"]] for ball in self.layout.balls)
+        self.outcome.rod_touches += sum(numbers[rod.offsets["contacts"]] for rod in self.layout.of("rod"))
+        self.outcome.ball_touches += sum(numbers[ball.offsets["contacts"]] for ball in self.layout.of("ball"))
 
 
 def dome() -> bytes:
@@ -329,11 +330,11 @@ class SomeOtherOrder(BulletEngine):
         return sorted(names, reverse=SomeOtherOrder._made % 2 == 0)
 
 
-class RigidBall(BulletEngine):
-    """Makes balls rigid bodies."""
+class RigidSpheres(BulletEngine):
+    """Makes free bodies rigid ones."""
 
-    def _make_ball(self, body: Body, rigid: bool = False) -> int:
-        return super()._make_ball(body, rigid=True)
+    def _make_free(self, body: Body, rigid: bool = False) -> int:
+        return super()._make_free(body, rigid=True)
 
 
 class StillAsleep(BulletEngine):
@@ -352,7 +353,7 @@ class StillAsleep(BulletEngine):
         (DefaultIslands, (), True),
         (SomeOtherOrder, (), True),
         (ContactOrder, (), True),
-        (RigidBall, (), False),
+        (RigidSpheres, (), False),
         (StillAsleep, (), False),
     ],
 )

@@ -319,7 +319,7 @@ def test_spoiled_commands_are_refused_by_the_robot(fuzz: Fuzz, disturbed: Distur
     system = running().system
     core = system.processes["n1"].core
     stepper, frame = core.stepper(core.frame.layout), core.frame
-    rods = list(frame.layout.rods)
+    rods = list(frame.layout.of("rod"))
     true = pack("<2d", 0.05, 1.0)
 
     def bring(rng: random.Random, count: int) -> Iterator[bytes]:

@@ -21,8 +21,8 @@ from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame
 from foosim.world.robot_packets import RobotPacket
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

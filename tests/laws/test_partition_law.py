@@ -35,7 +35,7 @@ class Contacts:
     frames: list[Frame] = field(default_factory=list)
 
     def __call__(self, frame: Frame) -> None:
-        if any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.rods):
+        if any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.of("rod")):
             self.count += 1
 
 

@@ -15,14 +15,16 @@ import pytest
 
 from foosim.common.batched.noise import NoiseKeys
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.engines.analytic import PureEngine
+from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
+from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers, place_ball
-from foosim.world.islands import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
 from foosim.world.layout import build_layout
+from foosim.world.parameters.table import table_of
+from tests.placing import place_ball
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 250
@@ -34,7 +36,7 @@ def differs() -> bool:
 
     def count(frame: Frame) -> None:
         nonlocal touched
-        touched += any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.rods)
+        touched += any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.of("rod"))
 
     text = TABLE.read_text()
     sets = ["engine=pure", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s"]
@@ -72,8 +74,8 @@ def kicked_towards_the_next_rod() -> tuple[Stepper, list[float]]:
     deployment = load_deployment(text, TABLE.name)
     layout = build_layout(deployment)
     numbers = initial_numbers(deployment, layout)
-    radius_m = deployment.table.ball.radius
-    place_ball(numbers, layout["ball"], (-deployment.table.lines["midfield"].x - 0.05, 0.0, radius_m))
+    radius_m = table_of(deployment).ball.radius
+    place_ball(numbers, layout["ball"], (-table_of(deployment).lines["midfield"].x - 0.05, 0.0, radius_m))
     kicker = layout["blue.midfield"]
     numbers[kicker.offsets["joint_velocities"] + 1] = 140.0
     numbers[kicker.offsets["position.set_point"] + 1] = 100.0
@@ -97,9 +99,9 @@ def test_reach_from_present_speed_is_caught() -> None:
     """A resting ball has no present speed, and reaches the next rod within the tick in which it is kicked."""
     stepper, numbers = kicked_towards_the_next_rod()
     declared = reach_of(stepper.deployment, stepper.layout)
-    present = replace(declared, ball_m=stepper.deployment.table.ball.radius)
+    present = replace(declared, ball_m=table_of(stepper.deployment).ball.radius)
     together = list(numbers)
-    bodies = tuple(entity for entity in stepper.layout.entities if entity.has_body)
+    bodies = tuple(entity for entity in stepper.layout.entities if entity.is_solved)
     work = Work(0, stepper.layout, (bodies,), tuple(body.index for body in bodies), together, {})
     stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
     for name in ("red.midfield", "blue.midfield"):

@@ -74,7 +74,7 @@ def alone(text: str) -> Rehearsed:
     """The world on one node; its rovers drive, and meet."""
     frames: list[Frame] = []
     run = rehearse(text, "hall.yaml", TICKS, 1, settings=Settings(on_commit=frames.append))
-    names = [rover.name for rover in frames[0].layout.rovers]
+    names = [rover.name for rover in frames[0].layout.of("rover")]
     drive = sum(any(frame.vector(name, "wheel_speeds", 2)) for frame in frames for name in names)
     assert drive > 0.5 * len(names) * TICKS
     blocked = sum(frame.at(name, "blocked") for frame in frames for name in names)
@@ -146,7 +146,7 @@ def test_the_rovers_of_a_node_that_is_lost_can_brake_and_wait_for_it(text: str) 
 
     assert max(speeds(35, lost)) > 0.3
     assert set(speeds(140, lost)) == {0.0} and all(frames[140].at(name, "down") for name in lost)
-    assert max(speeds(140, [rover.name for rover in frames[0].layout.rovers if rover.name not in lost])) > 0.3
+    assert max(speeds(140, [rover.name for rover in frames[0].layout.of("rover") if rover.name not in lost])) > 0.3
     assert max(speeds(240, lost)) > 0.3 and not any(frames[240].at(name, "down") for name in lost)
 
 
@@ -163,9 +163,9 @@ def test_what_is_of_a_table_is_refused_in_a_hall(text: str) -> None:
     refused = [systems[0].answers[identity] for identity in asked]
     assert not any(answer.accepted for answer in refused)
     assert [answer.text for answer in refused] == [
-        "this world is a hall: balls are added to a table",
-        "no free body 'ball'; there are none",
-        "'rover01' cannot be removed: only a ball that was added can, and none was",
+        "nothing can be added to this world: no kit of it says of what there can be more",
+        "nothing can be pushed: this world has no free bodies",
+        "'rover01' cannot be removed: only what was added can, and nothing was",
     ]
 
 

@@ -22,9 +22,9 @@ from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.series_math import ln
 from foosim.vhub.state.hub_state import HubState
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame
 from foosim.world.robot_packets import RobotPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -15,11 +15,12 @@ from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.materials import slab_loss_db
 from foosim.vhub.radio.propagation import Place
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame, place_ball
 from foosim.world.scene import Vector
 from tests.links.offered import deployment_of, uniforms
 from tests.links.proof import Proof
+from tests.placing import place_ball
 
 HIGH: Final = 0.5
 """Above the table (m)."""

@@ -9,7 +9,7 @@ import pytest
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns
-from foosim.world.initial_state import initial_frame
+from foosim.world.assembly.initial_state import initial_frame
 from tests.links.offered import ENDS, MS, S, deployment_of, fabric_of, play
 
 PLACES: Final = "{a: [0 m, 0 m, 1 m], b: [3 m, 0 m, 1 m], c: [0 m, 3 m, 1 m], '*': [3 m, 3 m, 1 m]}"

@@ -11,8 +11,8 @@ from foosim.protocol.messages import Sent
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.state.hub_state import HubState
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import deployment_of
 

@@ -128,8 +128,8 @@ def test_what_a_model_is_given() -> None:
 
 def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
     from foosim.vhub.line_of_sight.placement import World
+    from foosim.world.assembly.initial_state import initial_frame
     from foosim.world.frame import Frame
-    from foosim.world.initial_state import initial_frame
 
     def velocity(deployment: Any, name: str, **fields: tuple[float, ...]) -> Vector:
         start = initial_frame(deployment)

@@ -24,8 +24,8 @@ from foosim.vhub.radio.airtime import wifi_airtime_ns
 from foosim.vhub.radio.errors import DOT11N_MODES, LORA_GATEWAY_SENSITIVITY_DBM, LORA_SENSITIVITY_DBM, MODES
 from foosim.vhub.radio.path_loss import ENVIRONMENTS
 from foosim.vhub.radio.timings import WIFI_5, with_category
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame
 from tests.links.offered import TABLE, deployment_of
 from tests.links.proof import Proof
 
@@ -52,7 +52,7 @@ def signal(
     """One packet between rovers that stand at places (m), all others far off."""
     start = initial_frame(deployment)
     values = start.values.copy()
-    for number, entity in enumerate(start.layout.rovers):
+    for number, entity in enumerate(start.layout.of("rover")):
         at = entity.offsets["position"]
         values[at : at + 2] = places.get(entity.name, (15.0, 11.0 - number))
     fabric = Fabric(deployment)

@@ -17,7 +17,7 @@ from foosim.vhub.radio.airtime import wifi_ack_ns
 from foosim.vhub.radio.contention import TURNS_SAVED, contention, wifi_access
 from foosim.vhub.radio.timings import WIFI_5
 from foosim.vhub.state.hub_state import HubState
-from foosim.world.initial_state import initial_frame
+from foosim.world.assembly.initial_state import initial_frame
 from tests.links.offered import ENDS, Hub, deployment_of
 
 RADIO: Final = (

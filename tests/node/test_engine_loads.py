@@ -11,8 +11,8 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.engines.analytic import PureEngine
 from foosim.node.engines_pool import FINGERPRINT_TICKS
+from foosim.node.physics.pure_engine import PureEngine
 from foosim.protocol.channels import PART
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part
@@ -55,7 +55,7 @@ def counted(nodes: int) -> tuple[Rehearsed, dict[str, list[set[str]]], dict[str,
         if traced.what == "publish" and traced.channel == PART.name:
             part = decode(Part, traced.payload)
             entities = (LAYOUT.entities[index] for index in part.solved)
-            solved.setdefault(part.node, {})[part.tick] = {entity.name for entity in entities if entity.has_body}
+            solved.setdefault(part.node, {})[part.tick] = {entity.name for entity in entities if entity.is_solved}
 
     def prepare(system: System) -> None:
         for name, solver in system.solvers.items():
@@ -71,7 +71,7 @@ def counted(nodes: int) -> tuple[Rehearsed, dict[str, list[set[str]]], dict[str,
 def test_each_engine_loads_what_its_node_solves_and_every_body_is_loaded_once(nodes: int) -> None:
     result, loads, solved = counted(nodes)
     assert result.json["handovers"] > 1, "else nothing was handed over"
-    bodies = {entity.name for entity in LAYOUT.entities if entity.has_body}
+    bodies = {entity.name for entity in LAYOUT.entities if entity.is_solved}
     for tick in range(1, TICKS + 1):
         shares = [solved[node][tick] for node in sorted(solved)]
         assert sorted(name for share in shares for name in share) == sorted(bodies), tick

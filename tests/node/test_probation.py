@@ -10,8 +10,8 @@ import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.engines import mesh_trial
-from foosim.node.engines.mesh_trial import check_models
+from foosim.node.physics import mesh_trial
+from foosim.node.physics.mesh_trial import check_models
 from foosim.world.mesh import AssetError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -32,7 +32,7 @@ def broken(statements: str) -> list[str]:
     """A throw-away process in which building the world with the mesh of `z` alone does something else."""
     program = f"""if True:
         import ctypes, os, resource, sys, time
-        from foosim.node.engines import mesh_trial
+        from foosim.node.physics import mesh_trial
         real = mesh_trial._try
         def tried(deployment):
             if "z" in deployment.scenery:

@@ -16,15 +16,17 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.engines.analytic import PureEngine
+from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.state.records import Closing
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers, place_ball
 from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.parameters.table import table_of
+from tests.placing import place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -32,7 +34,7 @@ DEPLOYMENT: Final = load_deployment(TEXT, TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 STEPPER: Final = Stepper(DEPLOYMENT, LAYOUT)
 BALL: Final = LAYOUT["ball"]
-SPEED: Final = DEPLOYMENT.table.ball.speed_limit
+SPEED: Final = table_of(DEPLOYMENT).ball.speed_limit
 TICK_S: Final = DEPLOYMENT.tick_ns / 1e9
 EMPTY_LOG: Final = [0.0, 0.0, -1.0]
 
@@ -72,6 +74,7 @@ def start() -> list[float]:
     for name in ("red.attack", "red.goal"):
         numbers[LAYOUT[name].offsets["position.set_point"]] = 0.1
         numbers[LAYOUT[name].offsets["contacts"]] = 5.0
+        numbers[LAYOUT[name].offsets["joint_efforts"] + 1] = 7.0
     return numbers
 
 
@@ -95,8 +98,8 @@ def but_for(values: list[float], name: str, **fields: Sequence[float]) -> list[f
     return values
 
 
-STROKE: Final = DEPLOYMENT.table.lines["attack"].half_stroke
-DRIVE: Final = DEPLOYMENT.table.drive
+STROKE: Final = table_of(DEPLOYMENT).lines["attack"].half_stroke
+DRIVE: Final = table_of(DEPLOYMENT).drive
 BAD: Final[dict[str, tuple[str, str, int, float]]] = {
     "no number": ("ball", "position", 1, nan),
     "no number in the orientation": ("ball", "orientation", 0, nan),
@@ -124,7 +127,8 @@ def test_the_island_keeps_its_edited_state_and_the_bad_one_is_marked(what: str) 
     STEPPER.solve(faulty(*BAD[what]), work)
     for name in ("ball", "red.attack"):
         marked = {"quarantined": [1.0]} if name == victim else {}
-        expected = but_for(slots(edited, name), name, contacts=EMPTY_LOG, **marked)
+        unmoved = {"joint_efforts": [0.0, 0.0]} if name == "red.attack" else {}
+        expected = but_for(slots(edited, name), name, contacts=EMPTY_LOG, **marked, **unmoved)
         assert slots(work.numbers, name) == expected, name
     sound = work_on(edited.copy())
     STEPPER.solve(PureEngine(DEPLOYMENT, LAYOUT), sound)
@@ -169,8 +173,10 @@ def test_a_contact_is_not_logged_again_by_who_was_not_solved() -> None:
     STEPPER.solve(faulty("red.attack", "joint_positions", 0, nan), work)
     assert work.numbers[LAYOUT["red.attack"].offsets["contacts"]] == 0.0
     work.numbers[LAYOUT["red.attack"].offsets["contacts"]] = 2.0
+    work.numbers[LAYOUT["red.attack"].offsets["joint_efforts"]] = 2.0
     STEPPER.solve(PureEngine(DEPLOYMENT, LAYOUT), work)
     assert work.numbers[LAYOUT["red.attack"].offsets["contacts"]] == 0.0
+    assert work.numbers[LAYOUT["red.attack"].offsets["joint_efforts"]] == 0.0, "its motors did nothing"
 
 
 # --- in a whole run --------------------------------------------------------------------------------------------------

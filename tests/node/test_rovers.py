@@ -12,13 +12,15 @@ import pytest
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.engines import ENGINES, make_engine
-from foosim.node.engines.planar import RoverEngine, wheel_slips
+from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.swarm.world_bounds import strays
+from foosim.world.assembly.world import initial_numbers
+from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.motions.two_wheels import wheel_slips
+from foosim.world.parameters.hall import hall_of
 
 EMPTY: Final = (
     "scenery={}",
@@ -41,7 +43,7 @@ class Hall:
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.stepper = Stepper(self.deployment, self.layout)
         self.engine = make_engine(self.deployment, self.layout)
-        self.rovers = self.layout.rovers
+        self.rovers = self.layout.of("rover")
 
     def at(self, rover: Entity, field: str, offset: int = 0) -> float:
         return self.numbers[rover.offsets[field] + offset]
@@ -55,25 +57,25 @@ class Hall:
         at = rover.offsets["drive.set_point"]
         self.numbers[at : at + 2] = left, right
 
-    def step(self, ticks: int = 1, engine: RoverEngine | None = None) -> None:
+    def step(self, ticks: int = 1) -> None:
         for tick in range(ticks):
             self._solve(self.rovers, self.numbers, tick)
 
-    def _solve(self, rovers: Sequence[Entity], numbers: list[float], tick: int, engine: object = None) -> None:
+    def _solve(self, rovers: Sequence[Entity], numbers: list[float], tick: int, stepper: Stepper | None = None) -> None:
         islands = tuple((rover,) for rover in rovers)
         work = Work(tick, self.layout, islands, tuple(rover.index for rover in rovers), numbers, {})
-        self.stepper.solve(engine or self.engine, work)  # type: ignore[arg-type]
+        (stepper or self.stepper).solve(self.engine, work)
 
-    def shared(self, tick: int, engines: list[object]) -> list[float]:
-        """The next numbers, each rover computed by an engine that is drawn."""
+    def shared(self, tick: int, steppers: list[Stepper]) -> list[float]:
+        """The next numbers, each rover computed by a node that is drawn."""
         before = self.numbers.copy()
         joined = before.copy()
-        owner = [draw_words(draw_key(3, rover.name), tick)[0] % len(engines) for rover in self.rovers]
-        for number, engine in enumerate(engines):
+        owner = [draw_words(draw_key(3, rover.name), tick)[0] % len(steppers) for rover in self.rovers]
+        for number, stepper in enumerate(steppers):
             mine = [rover for rover, of in zip(self.rovers, owner, strict=True) if of == number]
             numbers = before.copy()
             if mine:
-                self._solve(mine, numbers, tick, engine)
+                self._solve(mine, numbers, tick, stepper)
             for rover in mine:
                 joined[rover.start : rover.split] = numbers[rover.start : rover.split]
         return joined
@@ -104,7 +106,7 @@ def test_straight_on_it_goes_as_far_as_its_wheels_roll(alone: Hall) -> None:
 def test_with_unequal_wheels_it_goes_along_a_circle(fleet_text: Callable[..., str], substeps: int) -> None:
     hall = Hall(fleet_text(1, *EMPTY, f"substeps={substeps}"))
     (rover,) = hall.rovers
-    left, right, track = 0.5, 0.8, hall.deployment.hall.rover.drive.track
+    left, right, track = 0.5, 0.8, hall_of(hall.deployment).rover.drive.track
     spin, radius = (right - left) / track, (right + left) / 2 / ((right - left) / track)
     hall.want(rover, left, right)
     speeds = rover.offsets["wheel_speeds"]
@@ -170,7 +172,7 @@ def test_it_stops_at_what_stands_in_its_way_and_its_wheels_slip(
     hall.want(rover, 0.5, 0.5)
     hall.step(500)
     x = hall.at(rover, "position")
-    radius = hall.deployment.hall.rover.radius
+    radius = hall_of(hall.deployment).rover.radius
     assert gap - 0.06 < x + radius <= gap + 1e-12, "at the thing, and not in it"
     assert hall.at(rover, "blocked") == 1.0 and hall.at(rover, "wheel_travel") == pytest.approx(5.0)
     assert hall.strays() == []
@@ -209,7 +211,7 @@ def test_two_that_meet_stop_before_they_touch_and_pass_on_when_they_can(fleet_te
     for rover in (one, other):
         hall.want(rover, 1.2, 1.2)
     hall.step(300)
-    gap = hall.at(other, "position") - hall.at(one, "position") - 2 * hall.deployment.hall.rover.radius
+    gap = hall.at(other, "position") - hall.at(one, "position") - 2 * hall_of(hall.deployment).rover.radius
     assert 0.0 < gap < 0.01 and hall.at(one, "blocked") == hall.at(other, "blocked") == 1.0
     hall.want(one, -0.5, -0.5)
     hall.step(50)
@@ -243,15 +245,15 @@ def drive_at_random(hall: Hall, tick: int) -> None:
 
 
 def test_in_a_crowd_nobody_is_ever_in_anything_else_whoever_computes_whom(fleet_text: Callable[..., str]) -> None:
-    """Law 1 for rovers: three engines that share them, one of them new now and then, give what one engine gives."""
+    """Law 1 for rovers: three nodes that share them, one of them new now and then, give what one gives."""
     hall = crowd(fleet_text)
-    engines: list[object] = [make_engine(hall.deployment, hall.layout) for _ in range(3)]
+    steppers = [Stepper(hall.deployment, hall.layout) for _ in range(3)]
     blocked = near = 0
     for tick in range(600):
         drive_at_random(hall, tick)
         if tick % 37 == 0:
-            engines[tick % 3] = make_engine(hall.deployment, hall.layout)
-        shared = hall.shared(tick, engines)
+            steppers[tick % 3] = Stepper(hall.deployment, hall.layout)
+        shared = hall.shared(tick, steppers)
         hall.step()
         assert shared == hall.numbers, f"tick {tick}"
         assert hall.strays() == [], f"tick {tick}"
@@ -263,7 +265,7 @@ def test_in_a_crowd_nobody_is_ever_in_anything_else_whoever_computes_whom(fleet_
 
 def test_both_engines_that_a_deployment_can_name_move_rovers_alike(fleet_text: Callable[..., str]) -> None:
     frames = []
-    for engine in ENGINES:
+    for engine in names("engine"):
         hall = Hall(fleet_text(2, f"engine={engine}"))
         for rover in hall.rovers:
             hall.want(rover, 0.4, 0.5)
@@ -277,7 +279,7 @@ def test_both_engines_that_a_deployment_can_name_move_rovers_alike(fleet_text: C
 
 def test_standing_and_driving_cost_what_the_deployment_says(alone: Hall) -> None:
     (rover,) = alone.rovers
-    battery = alone.deployment.hall.rover.battery
+    battery = hall_of(alone.deployment).rover.battery
     full = alone.at(rover, "charge")
     assert full == pytest.approx(0.9 * 250 * 3600)
     alone.step(100)
@@ -303,8 +305,8 @@ def test_an_empty_rover_stands_still(fleet_text: Callable[..., str]) -> None:
 
 def test_a_station_charges_who_is_near_and_no_more_than_full(alone: Hall) -> None:
     (rover,) = alone.rovers
-    station, capacity = alone.deployment.hall.station, alone.deployment.hall.rover.battery.capacity
-    gain = station.charge_power - alone.deployment.hall.rover.battery.idle
+    station, capacity = hall_of(alone.deployment).station, hall_of(alone.deployment).rover.battery.capacity
+    gain = station.charge_power - hall_of(alone.deployment).rover.battery.idle
     alone.put(rover, -15.0 + station.charge_radius - 0.01, 0.0)
     before = alone.at(rover, "charge")
     alone.step(50)

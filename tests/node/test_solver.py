@@ -7,14 +7,14 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
-from foosim.node.engines.bullet import BulletEngine
 from foosim.node.engines_pool import ENGINES_KEPT, Solver, engine_fingerprint
+from foosim.node.physics.bullet_engine import BulletEngine
 from foosim.node.tick import Stepper, Work
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Build, Prepare, Ready
-from foosim.world.initial_state import initial_numbers
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.layout import Layout, build_layout
 from foosim.world.start import AddedEntity
 
@@ -51,7 +51,7 @@ def work_on(layout: Layout, tick: int = 0) -> Work:
     numbers = initial_numbers(DEPLOYMENT, layout)
     velocity = layout["ball"].offsets["linear_velocity"]
     numbers[velocity : velocity + 3] = [-2.0, 0.1, 0.0]
-    bodies = tuple(entity for entity in layout.entities if entity.has_body)
+    bodies = tuple(entity for entity in layout.entities if entity.is_solved)
     return Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
 
 

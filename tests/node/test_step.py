@@ -12,20 +12,23 @@ import pytest
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
-from foosim.node.engines import ENGINES
+from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, check_edits
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame, initial_numbers, place_ball
 from foosim.world.layout import Layout, build_layout
+from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
+from tests.placing import place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 STEPPER: Final = Stepper(DEPLOYMENT, LAYOUT)
 EVERY: Final = tuple(range(len(LAYOUT.entities)))
-MASS: Final = DEPLOYMENT.table.ball.mass
+MASS: Final = table_of(DEPLOYMENT).ball.mass
 HERE: Final = (0.1, -0.2, 0.03)
 THERE: Final = (1.0, 2.0, -3.0)
 REST: Final = (0.0, 0.0, 0.0)
@@ -34,7 +37,7 @@ REST: Final = (0.0, 0.0, 0.0)
 def in_play(layout: Layout = LAYOUT, tick: int = 7) -> Frame:
     """A frame in which the ball rolls and a rod turns, so that nothing is zero by chance."""
     numbers = initial_numbers(DEPLOYMENT, layout)
-    for number, ball in enumerate(layout.balls):
+    for number, ball in enumerate(layout.of("ball")):
         place_ball(numbers, ball, (0.2 - 0.1 * number, 0.1, 0.0175), (-1.5, 0.3, 0.0))
     numbers[layout["red.goal"].offsets["joint_velocities"]] = 0.4
     return Frame(tick, layout, np.array(numbers))
@@ -176,7 +179,7 @@ def work_on(frame: Frame, *names: str) -> Work:
 
 def test_solving_writes_the_solved_bodies_and_nothing_else() -> None:
     frame = in_play()
-    engine = ENGINES["pure"](DEPLOYMENT, LAYOUT)
+    engine = PureEngine(DEPLOYMENT, LAYOUT)
     work = work_on(frame, "ball", "red.goal")
     STEPPER.solve(engine, work)
     changed = {e.name for e in LAYOUT.entities if work.numbers[e.start : e.stop] != frame.numbers[e.start : e.stop]}
@@ -188,7 +191,7 @@ def test_solving_writes_the_solved_bodies_and_nothing_else() -> None:
 
 def test_solving_again_gives_the_same_bits_whatever_the_engine_did_before() -> None:
     frame = in_play()
-    engine = ENGINES["pure"](DEPLOYMENT, LAYOUT)
+    engine = PureEngine(DEPLOYMENT, LAYOUT)
     results = []
     for names in (("ball", "red.attack"), ("blue.goal",), ("ball", "red.attack")):
         work = work_on(frame, *names)

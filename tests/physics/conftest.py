@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.engines import ENGINES
-from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.node.physics.making import make_engine
+from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
-from foosim.world.scene import Vector
-from foosim.world.scenes.build import build_scene
-from foosim.world.scenes.football_table import spin_inertia
+from foosim.world.parameters.table import table_of
+from foosim.world.scene import Vector, inertia_about_axis
+from tests.placing import place_ball
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 Motors = tuple[tuple[float, float], tuple[float, float]]
@@ -24,10 +24,10 @@ class World:
 
     def __init__(self, *sets: str) -> None:
         self.deployment = load_deployment(apply_sets(TABLE.read_text(), "table.yaml", sets), "table.yaml")
-        self.table = self.deployment.table
+        self.table = table_of(self.deployment)
         self.layout = build_layout(self.deployment)
         self.scene = build_scene(self.deployment, self.layout)
-        self.engine = ENGINES[self.deployment.engine](self.deployment, self.layout)
+        self.engine = make_engine(self.deployment, self.layout)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.ball = self.layout["ball"]
         self.tick_s = self.deployment.tick_ns / 1e9
@@ -77,7 +77,7 @@ class World:
         return motion / 2 + ball.mass * self.table.gravity * (self.position[2] - ball.radius)
 
     def rod_inertia(self, name: str) -> float:
-        return spin_inertia(self.scene.bodies[name].links[1])
+        return inertia_about_axis(self.scene.bodies[name].links[1])
 
     def rod_mass(self, name: str) -> float:
         return sum(link.mass for link in self.scene.bodies[name].links)

@@ -8,18 +8,18 @@ import pytest
 
 from foosim.client.player import Sample
 from foosim.common.errors import BadValue, UnknownName
-from foosim.common.names import LINE_NAMES
 from foosim.deployment.loader import load_deployment
 from foosim.players.football import Team
 from foosim.rehearsal.run import rehearse
 from foosim.world.actuators.joint_position import Command
+from foosim.world.parameters.table import LINE_NAMES, table_of
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.encoder import RodPosition
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
-LINES = DEPLOYMENT.table.lines
-RADIUS = DEPLOYMENT.table.ball.radius
+LINES = table_of(DEPLOYMENT).lines
+RADIUS = table_of(DEPLOYMENT).ball.radius
 PERIOD = 5
 SIDE = {"red": 1.0, "blue": -1.0}
 
@@ -66,7 +66,7 @@ def test_the_keeper_stands_between_ball_and_goal(name: str, y: float) -> None:
     bench = Bench(name)
     for _ in range(5):
         commands = bench.act(0.0, y)
-    goal_x = -DEPLOYMENT.table.field.length / 2
+    goal_x = -table_of(DEPLOYMENT).field.length / 2
     for line in ("goal", "defence"):
         command = commands[f"{name}.{line}"]
         stands = [command.slide + figure for figure in figures(line)]

@@ -18,6 +18,8 @@ from foosim.players.warehouse_rover import Patrol
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.frame import Frame
+from foosim.world.models.station import StationRobot
+from foosim.world.parameters.hall import hall_of
 from foosim.world.sensors.pose import Pose
 
 ROVERS: Final = 6
@@ -44,7 +46,7 @@ class Patrolled:
         players = systems[0].players
         self.pilots: dict[str, Any] = {f"rover{name[5:]}": players[name].player for name in players if "pilot" in name}
         self.dispatch: Any = players["dispatch"].player
-        self.names = [rover.name for rover in self.frames[0].layout.rovers]
+        self.names = [rover.name for rover in self.frames[0].layout.of("rover")]
         self.paths = {name: [frame.vector(name, "position", 2) for frame in self.frames] for name in self.names}
 
     def way(self, name: str) -> float:
@@ -92,8 +94,8 @@ def test_who_has_little_charge_goes_to_the_charger_and_is_charged(together: Patr
     charges = [frame.at("rover06", "charge") for frame in together.frames]
     station = together.deployment.robots["base"]
     x, y = together.paths["rover06"][-1]
-    reach = together.deployment.hall.station.charge_radius
-    assert station.model == "station" and hypot(x - station.x, y - station.y) <= reach
+    reach = hall_of(together.deployment).station.charge_radius
+    assert isinstance(station, StationRobot) and hypot(x - station.x, y - station.y) <= reach
     assert together.pilots["rover06"].charging and charges[-1] > min(charges) + 1000
     assert not together.pilots["rover01"].charging
 

@@ -11,6 +11,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.players.roadmap import Roadmap, roadmap_of
 from foosim.players.steering import Estimate, Steering, least
 from foosim.world.actuators.wheel_speeds import Drive
+from foosim.world.parameters.hall import hall_of
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
 
@@ -19,7 +20,7 @@ FAR = (4.0,) * 16
 
 @pytest.fixture
 def steering(fleet_text: Callable[..., str]) -> Steering:
-    return Steering(load_deployment(fleet_text(2), "hall.yaml").hall.rover)
+    return Steering(hall_of(load_deployment(fleet_text(2), "hall.yaml")).rover)
 
 
 def at(x: float, y: float, heading: float) -> Estimate:

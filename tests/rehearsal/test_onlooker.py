@@ -58,7 +58,8 @@ def test_a_line_each_second_tells_time_speed_score_and_who_is_waited_for() -> No
         name = "n1" if look % 4 else "player-red"
         lines.append(onlooker.look(look * LOOK_S, AtWork(name, turns=look)))
     assert [at for at, line in enumerate(lines, 1) if line] == [20, 40, 60, 80, 100]
-    assert lines[39] == "0.80 s of 20.00 s simulated, 0.40x, red 0 : 0 blue, waits for n1 (75 %)"
+    world = "red 0 : 0 blue, ball at +0.000 +0.000 +0.018 m"
+    assert lines[39] == f"0.80 s of 20.00 s simulated, 0.40x, {world}, waits for n1 (75 %)"
 
 
 def test_a_player_is_overdue_by_the_time_of_one_turn_in_which_this_process_ran() -> None:
@@ -136,7 +137,7 @@ def test_the_command_shows_lines_of_progress(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(onlooker, "LINE_S", 0.0)
     Hangs.how = shown.wait
     assert rehearsed("--for", "0.1 s").exit_code == 0
-    what = r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, waits for "
+    what = r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, ball at [-+.0-9 ]+ m, waits for "
     assert all(re.match(what, line) for line in lines)
 
 

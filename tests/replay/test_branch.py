@@ -21,8 +21,8 @@ from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.supervisor import records
 from foosim.vhub.state.records import fold
+from foosim.world.assembly.initial_state import first_frame, start_with
 from foosim.world.frame import Frame
-from foosim.world.initial_state import first_frame, start_with
 from foosim.world.start import AddedEntity, Start
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

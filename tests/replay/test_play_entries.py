@@ -16,7 +16,6 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import Scan, deployment_of, open_capture, read_about
 from foosim.capture.rows import PacketRow
 from foosim.common.errors import BadValue
-from foosim.common.names import LINE_NAMES
 from foosim.protocol.codec import decode
 from foosim.protocol.replay_messages import (
     LOG,
@@ -33,6 +32,7 @@ from foosim.protocol.replay_messages import (
 from foosim.replay.core import Span
 from foosim.replay.entries import Entries, Entry, Selection, make_selection
 from foosim.replay.main import entries_at, read_span
+from foosim.world.parameters.table import LINE_NAMES
 from tests.replay.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000

@@ -154,7 +154,7 @@ def test_starting_paused_publishes_nothing_until_resumed() -> None:
 def test_steps_publish_ticks_at_once_and_stand() -> None:
     theatre = Theatre([t / 2 for t in range(41)], paused=True)
     theatre.playback.step(1, theatre.now_ns)
-    assert theatre.playback.goal_ns(theatre.now_ns) == TICK_NS
+    assert theatre.playback.heading_ns(theatre.now_ns) == TICK_NS
     theatre.turn()
     assert theatre.heard_ms == [0, 0.5, 1, 1.5, 2] and theatre.playback.state() == "paused"
     assert theatre.playback.time_ns(theatre.now_ns) == TICK_NS

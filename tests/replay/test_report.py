@@ -23,9 +23,11 @@ from foosim.console.report.page import page
 from foosim.console.report.tallies import SAMPLES, LinkTally, Sample
 from foosim.console.shown.asked import moves
 from foosim.replay.what_if import what_if
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_frame, kickoff_ticks
-from foosim.world.layout import BALL, WORLD
+from foosim.world.kits.table import BALL
+from foosim.world.layout import WORLD
+from foosim.world.rules.football import kickoff_ticks
 from tests.replay.conftest import damaged, messages_of, packet, replay, rewritten, with_row
 from tests.replay.report_pages import Page
 
@@ -134,10 +136,10 @@ def test_what_the_rules_did_is_among_the_events_as_on_the_time_line_of_the_conso
     capture = open_capture(run)
     gathered, frame, wait = _Gathered(capture), initial_frame(capture.deployment), kickoff_ticks(capture.deployment)
     gathered.take_frame(frame)
-    goal = {(BALL, "wait_ticks"): wait - 3, (WORLD, "score"): 1}
-    for tick, written in ((wait + 6, {(WORLD, "kickoffs"): 1}), (1000, goal)):
+    goal = {(BALL, "football.wait_ticks"): wait - 3, (WORLD, "football.score"): 1}
+    for tick, written in ((wait + 6, {(WORLD, "football.kickoffs"): 1}), (1000, goal)):
         values = np.array(frame.values)
-        for (entity, field), value in {(BALL, "wait_ticks"): 0, **written}.items():
+        for (entity, field), value in {(BALL, "football.wait_ticks"): 0, **written}.items():
             values[frame.layout[entity].offsets[field]] = value
         frame = Frame(tick, frame.layout, values)
         gathered.take_frame(frame)

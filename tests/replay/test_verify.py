@@ -20,8 +20,8 @@ from foosim.cli.replay import app
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
-from foosim.node.engines import ENGINES
-from foosim.node.engines.interface import Engine
+from foosim.node.physics.interface import Engine
+from foosim.node.physics.pure_engine import PureEngine
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify, verify_capture
@@ -138,7 +138,7 @@ class OtherNode(NodeCore):
 def heavier(deployment: Deployment, layout: Layout) -> Engine:
     """An engine in which everything falls a little faster: another arithmetic, another world."""
     text = apply_sets(TEXT, TABLE.name, ["table.gravity=9.82 m/s2"])
-    return ENGINES["pure"](load_deployment(text, TABLE.name), layout)
+    return PureEngine(load_deployment(text, TABLE.name), layout)
 
 
 def test_where_ticks_differ_the_command_says_that_the_arithmetic_does(tmp_path: Path) -> None:

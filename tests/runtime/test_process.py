@@ -125,7 +125,7 @@ from foosim.node import main as node
 from foosim.vhub import main as vhub
 print([name for name in ("ssl", "cryptography", "foosim.capture.reader") if name in sys.modules])
 from foosim.deployment.schema import Deployment
-from foosim.world.kits.table import Table
+from foosim.world.parameters.table import Table
 from foosim.cli import supervisor as up
 print([name for name in ("ssl", "cryptography") if name in sys.modules])
 print([model.__name__ for model in (Deployment, Table) if model.__pydantic_complete__])

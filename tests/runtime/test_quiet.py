@@ -16,7 +16,7 @@ def run(program: str) -> tuple[int, str, str]:
 def test_only_the_known_line_is_left_out() -> None:
     program = """
 import os
-from foosim.node.engines.quiet import without_lines
+from foosim.node.physics.quiet import without_lines
 os.write(1, b"known before\\n")
 with without_lines(b"known"):
     for stream in (1, 2):
@@ -29,7 +29,7 @@ os.write(2, b"known after\\n")
 def test_an_error_passes() -> None:
     program = """
 import os
-from foosim.node.engines.quiet import without_lines
+from foosim.node.physics.quiet import without_lines
 with without_lines(b"known"):
     os.write(2, b"known\\nit failed since")
     raise ImportError("no such library")
@@ -41,7 +41,7 @@ with without_lines(b"known"):
 def test_a_process_without_standard_streams_goes_on() -> None:
     program = """
 import os
-from foosim.node.engines.quiet import without_lines
+from foosim.node.physics.quiet import without_lines
 for stream in (1, 2):
     os.close(stream)
 with without_lines(b"known"):
@@ -52,7 +52,7 @@ os._exit(7 if done else 1)
 
 
 def test_pybullet_is_imported_without_a_word() -> None:
-    assert run("import foosim.node.engines.bullet") == (0, "", "")
+    assert run("import foosim.node.physics.bullet_engine") == (0, "", "")
 
 
 def test_a_rehearsal_prints_nothing_but_its_progress_and_result() -> None:

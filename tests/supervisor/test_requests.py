@@ -157,7 +157,7 @@ def test_an_add_waits_for_the_engines_of_all_nodes_and_the_world_does_not() -> N
 def test_a_removed_ball_is_gone_from_the_frame_after_its_tick() -> None:
     run = Run().ask_at(20, "add", name="second").ask_at(50, "remove", name="ball").ask_at(60, "remove", name="second")
     added, other, removed = run.go().answers
-    assert other.text == "'ball' cannot be removed: only a ball that was added can, and those are second"
+    assert other.text == "'ball' cannot be removed: only what was added can, and those are second"
     assert removed.text == f"second removed at tick {removed.tick}"
     present = [frame.tick for frame in run.frames if "second" in frame.layout]
     assert present == list(range(added.tick + 1, removed.tick + 1))
@@ -171,7 +171,7 @@ def test_changes_of_layout_go_one_after_the_other() -> None:
     *adds, early, late = run.answers
     assert [answer.accepted for answer in adds] == [True] * 4
     assert not early.accepted, "it was not there yet"
-    assert early.text == "'b3' cannot be removed: only a ball that was added can, and none was"
+    assert early.text == "'b3' cannot be removed: only what was added can, and nothing was"
     assert late.accepted and {"b2", "b4", "ball2"} <= set(run.frames[-1].layout.names)
     assert "b3" not in run.frames[-1].layout
     for answer, name in zip(adds, ("b2", "b3", "b4", "ball2"), strict=True):
@@ -418,7 +418,7 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("push", {"impulse": [0, 0, GREAT]}, "three numbers of at most 1e+100 are needed"),
     ("push", {"impulse": ["1", "2", "3"]}, "not ['1', '2', '3']"),
     ("push", {"impulse": [0.0, 0.0, 11.0]}, "impulse: 11 N s in all are too much, valid are at most 0.84 N s, "),
-    ("push", {"impulse": [0.6, 0.6, 0.0]}, "which are the ball's limit of 40 m/s at 0.021 kg"),
+    ("push", {"impulse": [0.6, 0.6, 0.0]}, "which are the limit of ball, 40 m/s, at 0.021 kg"),
     ("push", {"name": "bal", "impulse": [0, 0, 0]}, "no free body 'bal'; there are ball, nearest is ball"),
     ("push", {"name": 7, "impulse": [0, 0, 0]}, "name: a name is needed, not 7"),
     ("add", {"name": "ball"}, "name 'ball' is taken; taken are ball, "),
@@ -433,7 +433,7 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("add", {"velocity": [1e99, 1e99, 1e99]}, "is above the ball's limit"),
     ("add", {"velocity": 5}, "three numbers of at most 1e+100 are needed, not 5"),
     ("remove", {}, "name: a name is needed, not null"),
-    ("remove", {"name": "ball"}, "'ball' cannot be removed: only a ball that was added can, and none was"),
+    ("remove", {"name": "ball"}, "'ball' cannot be removed: only what was added can, and nothing was"),
     ("remove", {"name": "red.goal"}, "'red.goal' cannot be removed"),
 )
 

@@ -16,7 +16,8 @@ from foosim.node.engines_pool import Solver
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Epoch, FormVersion, Heartbeat, Hello, Ready, Refusal
+from foosim.supervisor import roster as roster_module
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.roster import SILENT_NS, Roster
 from foosim.supervisor.settings import RunSettings
@@ -84,6 +85,29 @@ def test_a_deployment_may_allow_mixed_processors() -> None:
     assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT)) == ""
     assert roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER)) == ""
     assert roster.arithmetic == b"", "there are several"
+
+
+@pytest.mark.parametrize(
+    ("there", "here", "why"),
+    [
+        ({"sensor own:Gauge": "1.1 ab"}, {"sensor own:Gauge": "1.0 cd"}, "has version 1.1 ab there and 1.0 cd here"),
+        ({}, {"sensor own:Gauge": "cd"}, "has version missing there and cd here"),
+    ],
+)
+def test_nodes_with_another_version_of_a_form_are_refused(
+    monkeypatch: pytest.MonkeyPatch, there: dict[str, str], here: dict[str, str], why: str
+) -> None:
+    """Also where processors may be mixed: another version is another world."""
+    monkeypatch.setattr(roster_module, "foreign_versions", lambda deployment: here)
+    for deployment in (DEPLOYMENT, MIXED):
+        roster = Roster(deployment, PRINT)
+        one, other = roster.take(HELLO, 0), roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+        same = [FormVersion(name, version) for name, version in here.items()]
+        assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, same)) == ""
+        others = [FormVersion(name, version) for name, version in there.items()]
+        reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, PRINT, others))
+        assert reason == f"sensor own:Gauge {why}: install the same on all machines"
+        assert "blue" not in roster.by_name and "red" in roster.by_name
 
 
 def test_engines_whose_small_run_differs_are_refused() -> None:

@@ -45,9 +45,9 @@ from foosim.vhub.recording import writer as capture_writer
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
 from foosim.world.start import AddedEntity
@@ -204,7 +204,7 @@ class Driver:
         added = [AddedEntity("ball2", "ball")] if ADDED_AT <= tick < REMOVED_AT else []
         layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
         numbers = initial_numbers(self.deployment, layout)
-        for entity in layout.rods:
+        for entity in layout.of("rod"):
             at = entity.offsets["joint_positions"]
             numbers[at : at + 2] = np.frombuffer(noise(16, tick, entity.name), np.uint64).astype(float) * 2.0**-66
         numbers[layout["red.attack"].offsets["down"]] = float(DOWN_FROM <= tick < DOWN_TO)

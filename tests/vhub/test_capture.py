@@ -24,9 +24,10 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import ROW_TYPES, EpochRow, OwnerRow, row_schema
 from foosim.vhub.recording.model_hash import model_hash
+from foosim.world.assembly.world import build_scene
 from foosim.world.frame import CHAIN_START, chain_next
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.scenes.build import build_scene
+from foosim.world.parameters.table import table_of
 from tests.vhub.conftest import RECOVERED, noise
 
 if TYPE_CHECKING:
@@ -305,7 +306,7 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
         shapes = scene.scenery if entity.id == "scenery" else links[entity.id].shapes
         assert len(entity.cubes) + len(entity.spheres) + len(entity.cylinders) == len(shapes) > 0
     ball = next(entity for entity in first.entities if entity.id == "ball").spheres[0]
-    assert (ball.size.x, ball.color.r, ball.color.a) == (2 * hub_run.deployment.table.ball.radius, 1.0, 1.0)
+    assert (ball.size.x, ball.color.r, ball.color.a) == (2 * table_of(hub_run.deployment).ball.radius, 1.0, 1.0)
     assert "ball2" in {entity.id for entity in added.entities}
     assert [deletion.id for deletion in removed.deletions] == ["ball2"]
     assert not first.deletions and not added.deletions

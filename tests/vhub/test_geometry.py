@@ -15,12 +15,13 @@ import pytest
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.vhub.line_of_sight import occlusion as geometry_module
 from foosim.vhub.line_of_sight.occlusion import Crossing, Geometry, LineOfSight, Sight
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers, place_ball
-from foosim.world.layout import Layout, build_layout
+from foosim.world.layout import Declared, Layout, build_layout
 from foosim.world.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
 from foosim.world.mesh import Mesh
 from foosim.world.mesh_files import read_mesh
+from foosim.world.parameters.table import table_of
 from foosim.world.scene import (
     UPRIGHT,
     Body,
@@ -35,6 +36,7 @@ from foosim.world.scene import (
     place,
     rotate,
 )
+from tests.placing import place_ball
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 GREY: Final = (0.5, 0.5, 0.5, 1.0)
@@ -56,7 +58,7 @@ def thing(
 
 def sight_of(*things: Shape) -> Sight:
     """The sight in a world of scenery alone."""
-    return Geometry(Scene({}, things)).sight(Layout({}, {}), ())
+    return Geometry(Scene({}, things)).sight(Layout({}, Declared()), ())
 
 
 def faces(*statements: str) -> Mesh:
@@ -368,7 +370,7 @@ def rovers(*places: Vector) -> tuple[Geometry, Layout, list[float]]:
     names = [f"rover{n}" for n in range(len(places))]
     links = {name: (Link(name, "free", shapes, 1.0, (1.0, 1.0, 1.0)),) for name in names}
     bodies = {name: Body(name, "ball", (0.0, 0.0, 0.0), links[name]) for name in names}
-    layout = Layout(dict.fromkeys(names, "ball"), {})
+    layout = Layout(dict.fromkeys(names, "ball"), Declared())
     numbers = [0.0] * layout.size
     for name, spot in zip(names, places, strict=True):
         place_ball(numbers, layout[name], spot)
@@ -450,7 +452,7 @@ def test_on_the_table_rods_and_figures_stand_between_and_follow_the_frame() -> N
     layout = build_layout(deployment)
     numbers = initial_numbers(deployment, layout)
     rays = LineOfSight(deployment)
-    rod = deployment.table.lines["goal"].x
+    rod = table_of(deployment).lines["goal"].x
     a, b = (rod - 0.05, 0.0, 0.084), (rod + 0.1, 0.0, 0.084)
 
     def frame() -> Frame:

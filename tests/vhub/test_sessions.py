@@ -41,7 +41,7 @@ from foosim.vhub.network.memory import Joining
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.members import may_lockstep
-from foosim.world.initial_state import initial_frame
+from foosim.world.assembly.initial_state import initial_frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS: Final = (

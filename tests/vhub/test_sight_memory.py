@@ -12,7 +12,7 @@ from foosim.vhub.line_of_sight import occlusion
 from foosim.vhub.line_of_sight.occlusion import Geometry
 from foosim.vhub.line_of_sight.rays import box_span
 from foosim.vhub.line_of_sight.solids import TOUCH_M
-from foosim.world.layout import Layout
+from foosim.world.layout import Declared, Layout
 from foosim.world.scene import Box, Scene, Shape, Vector
 
 GREY: Final = (0.5, 0.5, 0.5, 1.0)
@@ -44,7 +44,7 @@ def test_lines_that_drive_through_litter_cross_what_is_there(monkeypatch: pytest
     monkeypatch.setattr(occlusion, "PAIRS_KEPT", 50)
     boxes = {f"box{n}": at_random(rng, 1.5) for n in range(LITTER)}
     things = tuple(Shape(Box(HALF), "walls", GREY, place, name=name) for name, place in boxes.items())
-    sight = Geometry(Scene({}, things)).sight(Layout({}, {}), ())
+    sight = Geometry(Scene({}, things)).sight(Layout({}, Declared()), ())
     found = 0
     for _ in range(DRIVES):
         a, b, way = at_random(rng, 1.5), at_random(rng, 1.5), at_random(rng, 0.1)

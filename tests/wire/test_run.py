@@ -17,7 +17,6 @@ from foosim.capture.reader import open_capture
 from foosim.capture.rows import PacketRow
 from foosim.client import control
 from foosim.client.control import Control, RequestRefused
-from foosim.common.names import LINE_NAMES, TEAMS
 from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
@@ -27,6 +26,7 @@ from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.inbox import Inbox
 from foosim.world.frame import frame_from_bytes
 from foosim.world.layout import build_layout
+from foosim.world.parameters.table import LINE_NAMES, TEAMS
 from tests.wire.conftest import LIMIT_S, LONG, NO_CAPTURE_TO_CLOSE
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from foosim.common import limits
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
 from foosim.protocol.codec import decode_any
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 

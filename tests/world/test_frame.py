@@ -18,10 +18,11 @@ from foosim.deployment.loader import load_deployment
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Order
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import initial_frame
 from foosim.world.layout import build_layout
+from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Outbox
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -122,13 +123,13 @@ def test_bytes_of_another_layout_are_malformed() -> None:
 
 def test_numbers_have_names() -> None:
     start = initial_frame(DEPLOYMENT)
-    radius = DEPLOYMENT.table.ball.radius
+    radius = table_of(DEPLOYMENT).ball.radius
     assert start.vector("ball", "position", 3) == [0.0, 0.0, radius]
     assert start.at("ball", "position", 2) == radius
     assert start.at("ball", "orientation", 3) == 1.0
-    assert start.score == (0, 0) and start.tick == 0
+    assert start.vector("world", "football.score", 2) == [0.0, 0.0] and start.tick == 0
     assert start.at("ball", "contacts", 2) == start.at("red.goal", "contacts", 2) == -1.0
-    assert start.at("ball", "wait_ticks") == DEPLOYMENT.table.rules.kickoff_delay_ns // DEPLOYMENT.tick_ns
+    assert start.at("ball", "football.wait_ticks") == table_of(DEPLOYMENT).rules.kickoff_delay_ns // DEPLOYMENT.tick_ns
 
 
 # --- input digest and chain -------------------------------------------------------------------------------------------

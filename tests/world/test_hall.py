@@ -12,15 +12,15 @@ import pytest
 from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.assembly.islands import Assignment, reach_of
+from foosim.world.assembly.world import build_scene, initial_numbers, world_status
+from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacle, obstacles_of
+from foosim.world.clearance.hall_start import start_findings
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
-from foosim.world.initial_state import initial_frame, initial_numbers
-from foosim.world.islands import Assignment, reach_of
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.scene import Cylinder, Shape
-from foosim.world.scenes.build import build_scene
-from foosim.world.scenes.hall_start import start_findings
-from foosim.world.scenes.obstacles import Circle, Rectangle, obstacle, obstacles_of
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 WAREHOUSE: Final = (DEPLOY / "warehouse.yaml").read_text()
@@ -65,7 +65,7 @@ def problems(text: str, *sets: str) -> list[str]:
          "robots.rover01.sensors: a reserved name, 'echo'"),
         ("robots.base.heading=0 deg", "robots.base: unknown key, 'heading'"),
         ("scenery.goods-1.surface=floor",
-         "scenery.goods-1.surface: a surface for a ball, in a world without one, 'floor'"),
+         "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"),
         ("hall.rover.radius=13 m", "hall.rover.radius: more than half of the hall's least side, '13 m'"),
         ("hall.rover.drive.track=70 cm",
          "hall.rover.drive.track: the wheels would be outside of the rover: more than twice its radius, '70 cm'"),
@@ -118,11 +118,10 @@ def test_a_process_has_its_players_on_one_host() -> None:
     assert found[0] == "players.pilot01.process: a process whose roles are not all on the same host, 'fleet-west'"
 
 
-def test_a_world_is_a_table_or_a_hall() -> None:
-    hall = "hall={length: 4 m, width: 4 m}"
-    assert "a hall beside a table: a world is one of them, 'hall'" in problems(TABLE, hall)
-    neither = WAREHOUSE.replace("\nhall:\n", "\nhal:\n")
-    assert "missing key of a world, which is a table or a hall, 'table'" in problems(neither)
+def test_robots_of_a_kit_need_its_section() -> None:
+    neither = problems(WAREHOUSE.replace("\nhall:\n", "\nhal:\n"))
+    assert "unknown key, 'hal', nearest is 'hall'" in neither
+    assert "robots.base.model: a robot of a hall in a world without one, 'station'" in neither
     rover = "{model: rover, x: 0 m, y: 0 m, sensors: {}}"
     assert "robots.camera.model: a robot of a hall in a world without one, 'rover'" in problems(
         TABLE, f"robots.camera={rover}"
@@ -132,8 +131,8 @@ def test_a_world_is_a_table_or_a_hall() -> None:
 def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
     layout = build_layout(DEPLOYMENT)
     assert {entity.model for entity in layout.entities} == {"rover", "station"} and "world" not in layout
-    assert initial_frame(DEPLOYMENT).score is None
-    with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to a hall"):
+    assert world_status(DEPLOYMENT, initial_frame(DEPLOYMENT)).keys() == {"rovers"}
+    with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to this world"):
         build_layout(DEPLOYMENT, [("b2", "ball")])
     still = (0.0, 0.0, 0.0)
     edits: list[Edit] = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still)]

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.initial_state import initial_numbers
-from foosim.world.islands import Assignment, islands_of, reach_of, touching_of
+from foosim.world.assembly.islands import Assignment, islands_of, reach_of, touching_of
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.layout import Layout, build_layout
-from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.models.rod import RodRobot
+from foosim.world.parameters.table import table_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -25,13 +26,13 @@ LAYOUT: Final = build_layout(DEPLOYMENT)
 THREE: Final = build_layout(DEPLOYMENT, [("a", "ball"), ("c", "ball")])
 """Balls a, ball and c."""
 AXES: Final = {
-    name: DEPLOYMENT.table.lines[robot.line].x * (1.0 if robot.team == "red" else -1.0)
+    name: table_of(DEPLOYMENT).lines[robot.line].x * (1.0 if robot.team == "red" else -1.0)
     for name, robot in DEPLOYMENT.robots.items()
     if isinstance(robot, RodRobot)
 }
-SPEED: Final = DEPLOYMENT.table.ball.speed_limit
-RADIUS: Final = DEPLOYMENT.table.ball.radius
-CORNER: Final = hypot(DEPLOYMENT.table.rod.foot_radius, DEPLOYMENT.table.rod.foot.length / 2)
+SPEED: Final = table_of(DEPLOYMENT).ball.speed_limit
+RADIUS: Final = table_of(DEPLOYMENT).ball.radius
+CORNER: Final = hypot(table_of(DEPLOYMENT).rod.foot_radius, table_of(DEPLOYMENT).rod.foot.length / 2)
 """How far a figure reaches from its rod's axis, whatever the rod's angle."""
 
 Position = tuple[float, float, float]
@@ -109,7 +110,7 @@ def test_nothing_outside_its_island_is_touched_within_the_tick(
     length = dist(direction, (0.0, 0.0, 0.0))
     x, _, z = (at + way / length * SPEED * time_s for at, way in zip(position, direction, strict=True))
     island = with_ball(position)
-    height = DEPLOYMENT.table.rod.axis_height
+    height = table_of(DEPLOYMENT).rod.axis_height
     touched = {rod for rod, axis in AXES.items() if hypot(x - axis, z - height) <= RADIUS + CORNER}
     assert touched <= island
 
@@ -131,7 +132,7 @@ def test_the_tick_makes_the_island_not_the_speed() -> None:
     at_rest = islands_of(numbers, reach, touching_of(numbers, reach))
     start = LAYOUT["ball"].offsets["linear_velocity"]
     numbers[start : start + 3] = [-SPEED, SPEED, 0.0]
-    for rod in LAYOUT.rods:
+    for rod in LAYOUT.of("rod"):
         numbers[rod.offsets["joint_velocities"] + 1] = 200.0
     assert islands_of(numbers, reach, touching_of(numbers, reach)) == at_rest
     slower = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["tick=10 ms", "substeps=20"]), TABLE.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -11,15 +12,16 @@ from hypothesis import strategies as st
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.forms.models import MODELS
-from foosim.world.layout import ADDABLE, BALL, NOTHING, WORLD, Carried, Layout, build_layout
+from foosim.world.forms.registry import find_model, names
+from foosim.world.kits.table import BALL
+from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 
 models = st.dictionaries(
-    st.text("abcdefgh.-_0123456789", min_size=1, max_size=8), st.sampled_from(["ball", "rod", "camera", "world"])
+    st.text("abcdefgh.-_0123456789", min_size=1, max_size=8), st.sampled_from(["ball", "rod", "camera", "rover"])
 )
 
 
@@ -33,16 +35,16 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
             {f"{one}.seen": count for one, count in data.draw(slots).items()},
         )
         for name, model in models.items()
-        if MODELS[model].is_robot
+        if Layout.kind_of(model).is_robot
     }
-    layout = Layout(models, carried)
+    layout = Layout(models, Declared(carried=carried))
     assert list(layout.names) == sorted(models)
     position = 0
     for index, entity in enumerate(layout.entities):
         assert (entity.index, entity.start) == (index, position)
         assert entity.start < entity.split <= entity.stop
         its = carried.get(entity.name, NOTHING)
-        assert entity.counts == {**MODELS[entity.model].slots, **its.solver, **its.owner}
+        assert entity.counts == {**entity.kind.slots, **its.solver, **its.owner}
         assert entity.stop - entity.split == sum(its.owner.values())
         assert list(entity.offsets) == list(entity.counts)
         for field, count in entity.counts.items():
@@ -51,19 +53,22 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
             position += count
         assert entity.stop == position
     assert layout.size == position
-    again = Layout(dict(reversed(models.items())), dict(reversed(carried.items())))
+    again = Layout(dict(reversed(models.items())), Declared(carried=dict(reversed(carried.items()))))
     assert again.digest == layout.digest, "the order in which things are named is nothing"
 
 
 def test_the_table_has_its_entities() -> None:
     assert set(LAYOUT.names) == {BALL, WORLD, *DEPLOYMENT.robots}
-    assert [entity.name for entity in LAYOUT.rods] == sorted(name for name in DEPLOYMENT.robots if name != "camera")
+    assert [entity.name for entity in LAYOUT.of("rod")] == sorted(
+        name for name in DEPLOYMENT.robots if name != "camera"
+    )
     assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
-    assert [entity.name for entity in LAYOUT.balls] == [BALL]
-    assert {entity.name for entity in LAYOUT.entities if not entity.has_body} == {WORLD, "camera"}
-    assert {name for name, model in MODELS.items() if model.has_body and model.is_robot} == {"rod", "rover"}
-    assert ADDABLE == ("ball",) and MODELS["ball"].has_body and not MODELS["ball"].is_robot
-    assert {name for name, model in MODELS.items() if model.actuators} == {"rod", "rover"}
+    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL]
+    assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
+    models = [find_model(name) for name in names("model")]
+    assert {model.name for model in models if model.is_solved and model.is_robot} == {"rod", "rover"}
+    assert LAYOUT.declared.addable == ("ball",) and find_model("ball").is_free and not find_model("ball").is_robot
+    assert {model.name for model in models if model.actuators} == {"rod", "rover"}
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 
 
@@ -76,7 +81,7 @@ def test_what_the_owner_writes_is_the_memory_of_sensors() -> None:
 
 
 def test_what_an_actuator_remembers_is_the_solvers() -> None:
-    for rod in LAYOUT.rods:
+    for rod in LAYOUT.of("rod"):
         held = [field for field in rod.offsets if "." in field and rod.offsets[field] < rod.split]
         assert held == ["position.set_point"] and rod.counts["position.set_point"] == 2
         assert LAYOUT.components(rod.name) == ["encoder", "position"]
@@ -117,7 +122,7 @@ def test_a_robot_without_actuators_has_its_models_and_one_that_names_them_has_th
 
 def test_every_difference_has_another_digest() -> None:
     solver, owner = {"position.set_point": 2}, {"encoder.samples": 1}
-    assert LAYOUT.carried["red.goal"] == Carried(solver, owner)
+    assert LAYOUT.declared.carried["red.goal"] == Carried(solver, owner)
     others = [
         NOTHING,
         Carried(solver, {}),
@@ -137,8 +142,11 @@ def test_every_difference_has_another_digest() -> None:
         build_layout(DEPLOYMENT, [("ball2", "ball")]),
         build_layout(DEPLOYMENT, [("ball3", "ball")]),
         build_layout(DEPLOYMENT, [("ball2", "ball"), ("ball3", "ball")]),
-        Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.carried),
-        *(Layout(LAYOUT.models, {**LAYOUT.carried, "red.goal": other}) for other in others),
+        Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.declared),
+        *(
+            Layout(LAYOUT.models, replace(LAYOUT.declared, carried={**LAYOUT.declared.carried, "red.goal": other}))
+            for other in others
+        ),
     ]
     assert len({layout.digest for layout in layouts}) == len(layouts)
     assert build_layout(DEPLOYMENT).digest == LAYOUT.digest

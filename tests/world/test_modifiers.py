@@ -19,12 +19,12 @@ from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper, moved_slots
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.edits import Add, Freeze
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
 

@@ -20,7 +20,7 @@ from foosim.world.actuators.joint_position import Command
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import FORMS, names
+from foosim.world.forms.registry import names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
 from foosim.world.sensors.encoder import RodPosition
@@ -47,7 +47,7 @@ SIZES = {"encoder": 16, "ball": 24, "joint_position": 16, "pose": 24, "odometry"
 
 
 def codec(kind: str) -> PayloadCodec:
-    return codec_of(kind, next(form for form in FORMS if kind in names(form)))
+    return codec_of(kind, "sensor" if kind in names("sensor") else "actuator")
 
 
 def test_every_kind_is_tested() -> None:

@@ -15,18 +15,19 @@ from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
 from foosim.world.actuators.joint_position import ANGLE_RAD_MAX, Command, PositionActuator
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import View, WritableView
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
+from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 ROD: Final = LAYOUT["red.goal"]
-STROKE: Final = DEPLOYMENT.table.lines["goal"].half_stroke
-DRIVE: Final = DEPLOYMENT.table.drive
+STROKE: Final = table_of(DEPLOYMENT).lines["goal"].half_stroke
+DRIVE: Final = table_of(DEPLOYMENT).drive
 
 
 def packed(slide: float, spin: float) -> bytes:
@@ -122,7 +123,7 @@ def test_the_loop_is_proportional_and_limited(wants: tuple[float, float], positi
 def test_each_line_has_its_own_stroke() -> None:
     for name, stroke in (("red.midfield", "midfield"), ("blue.defence", "defence")):
         numbers = initial_numbers(DEPLOYMENT, LAYOUT)
-        reach = DEPLOYMENT.table.lines[stroke].half_stroke  # type: ignore[index]
+        reach = table_of(DEPLOYMENT).lines[stroke].half_stroke  # type: ignore[index]
         assert takes(Command(-reach, 0.0), numbers, name)
         assert not takes(Command(-reach - 1e-6, 0.0), numbers, name)
         assert fitted(name).actuator.limits()["slide"] == (-reach, reach)

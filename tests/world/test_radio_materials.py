@@ -12,11 +12,11 @@ import yaml
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.assembly.world import build_scene
 from foosim.world.layout import build_layout
 from foosim.world.materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
 from foosim.world.mesh_files import is_closed, read_mesh
 from foosim.world.scene import Cylinder
-from foosim.world.scenes.build import build_scene
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, z: 1 m, surface: walls"

@@ -30,7 +30,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import FOLDERS, FORMS, find, names, sensor
+from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, sensor
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.frame import Frame
 
@@ -244,6 +244,7 @@ def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]
+    assert names("engine") == ["bullet", "pure"]
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -296,7 +297,7 @@ def test_a_class_of_any_module_is_found_by_its_path() -> None:
     assert (gauge.form, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
     assert gauge.made is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
     assert find("sensor", "reach") is gauge, "it has its name from then on"
-    winch = find("actuator", "own_winch:Winch")
+    winch = find_component("actuator", "own_winch:Winch")
     assert winch.slots == {"rate": 1, "taken": 1} and "own_winch" in sys.modules
 
 

@@ -15,10 +15,10 @@ from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.tick import Stepper
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, actuators_of, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered
 
@@ -124,14 +124,16 @@ def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callabl
     """Whoever computes which rovers: with other ranges and numbers of rays among them, near each other or far."""
     other = ("robots.rover02.sensors.proximity.rays=5", "robots.rover03.sensors.proximity.range=30 m")
     fitted = Fitted(fleet_text(5, *other))
-    sensors = [one for rover in fitted.layout.rovers for one in sensors_of(fitted.deployment, fitted.layout, rover)]
+    sensors = [
+        one for rover in fitted.layout.of("rover") for one in sensors_of(fitted.deployment, fitted.layout, rover)
+    ]
     assert [one.channel for one in sensors] == ["battery", "odometry", "pose", "proximity"] * 5
     place = st.tuples(st.floats(-19.0, 19.0), st.floats(-12.0, 12.0), st.floats(-3.0, 3.0))
 
     @settings(max_examples=30)
     @given(places=st.lists(place, min_size=5, max_size=5), tick=st.integers(0, 100))
     def hold(places: list[tuple[float, float, float]], tick: int) -> None:
-        for rover, (x, y, heading) in zip(fitted.layout.rovers, places, strict=True):
+        for rover, (x, y, heading) in zip(fitted.layout.of("rover"), places, strict=True):
             at = rover.offsets["position"]
             fitted.numbers[at : at + 2] = x, y
             fitted.numbers[rover.offsets["heading"]] = heading

@@ -11,16 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.initial_state import initial_numbers, kickoff_ticks, place_ball
+from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import initial_numbers, rules_of
+from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.rules.football import TableRules
+from foosim.world.parameters.table import table_of
+from foosim.world.rules.football import kickoff_ticks
+from tests.placing import place_ball
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")
-TABLE: Final = DEPLOYMENT.table
+TABLE: Final = table_of(DEPLOYMENT)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 TWO: Final = build_layout(DEPLOYMENT, [("second", "ball")])
-RULES: Final = TableRules.of(DEPLOYMENT)
 BALL: Final = LAYOUT["ball"]
 RADIUS: Final = TABLE.ball.radius
 LINE_X: Final = TABLE.field.length / 2 + RADIUS
@@ -33,7 +36,7 @@ Position = tuple[float, float, float]
 
 def in_play(position: Position, velocity: Position = ROLLING, layout: Layout = LAYOUT) -> list[float]:
     numbers = initial_numbers(DEPLOYMENT, layout)
-    for ball in layout.balls:
+    for ball in layout.of("ball"):
         place_ball(numbers, ball, (0.3, 0.1, RADIUS), ROLLING)
     place_ball(numbers, layout["ball"], position, velocity)
     return numbers
@@ -45,18 +48,22 @@ def field(numbers: list[float], name: str, count: int = 1, entity: Entity = BALL
 
 
 def score(numbers: list[float], layout: Layout = LAYOUT) -> list[float]:
-    return field(numbers, "score", 2, layout["world"])
+    return field(numbers, "football.score", 2, layout["world"])
 
 
-def apply(numbers: list[float], ticks: int = 1, layout: Layout = LAYOUT, rules: TableRules = RULES) -> list[float]:
-    for _ in range(ticks):
-        rules.apply(numbers, layout)
+def apply(
+    numbers: list[float], ticks: int = 1, layout: Layout = LAYOUT, deployment: Deployment = DEPLOYMENT
+) -> list[float]:
+    rules = rules_of(deployment, layout)
+    assert list(rules) == ["football"]
+    for tick in range(ticks):
+        rules["football"].apply(WritableView(tick, numbers))
     return numbers
 
 
 def is_reset(numbers: list[float], entity: Entity = BALL) -> bool:
     moves = field(numbers, "linear_velocity", 3, entity) + field(numbers, "angular_velocity", 3, entity)
-    waits = field(numbers, "wait_ticks", 1, entity) == [kickoff_ticks(DEPLOYMENT)]
+    waits = field(numbers, "football.wait_ticks", 1, entity) == [kickoff_ticks(DEPLOYMENT)]
     return field(numbers, "position", 3, entity) == SPOT and not any(moves) and waits
 
 
@@ -118,13 +125,13 @@ def test_any_ball_scores_and_the_others_play_on() -> None:
 # --- kick-off --------------------------------------------------------------------------------------------------------
 
 
-def kicked_off(kickoffs: int, rules: TableRules = RULES) -> list[float]:
+def kicked_off(kickoffs: int, deployment: Deployment = DEPLOYMENT) -> list[float]:
     """The velocity of the ball after this many kick-offs before it."""
     numbers = in_play((0.0, 0.0, RADIUS))
-    numbers[LAYOUT["world"].offsets["kickoffs"]] = float(kickoffs)
-    numbers[BALL.offsets["wait_ticks"]] = 1.0
-    apply(numbers, rules=rules)
-    assert field(numbers, "kickoffs", 1, LAYOUT["world"]) == [kickoffs + 1.0]
+    numbers[LAYOUT["world"].offsets["football.kickoffs"]] = float(kickoffs)
+    numbers[BALL.offsets["football.wait_ticks"]] = 1.0
+    apply(numbers, deployment=deployment)
+    assert field(numbers, "football.kickoffs", 1, LAYOUT["world"]) == [kickoffs + 1.0]
     return field(numbers, "linear_velocity", 3)
 
 
@@ -137,13 +144,13 @@ def test_a_kick_off_follows_its_delay() -> None:
     apply(numbers)
     vx, vy, vz = field(numbers, "linear_velocity", 3)
     assert abs(vx) == TABLE.rules.kickoff_speed and abs(vy) <= abs(vx) and vz == 0.0
-    assert field(numbers, "position", 3) == SPOT and field(numbers, "wait_ticks") == [0.0]
+    assert field(numbers, "position", 3) == SPOT and field(numbers, "football.wait_ticks") == [0.0]
 
 
 def test_a_ball_that_was_touched_while_it_waited_is_kicked_off_from_the_spot() -> None:
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     place_ball(numbers, BALL, (0.4, 0.1, RADIUS), (2.0, 0.0, 0.0))
-    numbers[BALL.offsets["wait_ticks"]] = 1.0
+    numbers[BALL.offsets["football.wait_ticks"]] = 1.0
     apply(numbers)
     assert field(numbers, "position", 3) == SPOT and abs(field(numbers, "linear_velocity")[0]) == 1.0
 
@@ -154,7 +161,7 @@ def test_kick_offs_are_drawn_by_their_number_and_the_seed() -> None:
     assert len(set(drawn)) == 400
     to_red = sum(vx < 0 for vx, _, _ in drawn)
     assert abs(to_red - 200) < 3.29 * sqrt(100), "neither side is favoured (99.9 %)"
-    other = TableRules.of(load_deployment(apply_sets(TEXT, "table.yaml", ["seed=2"]), "table.yaml"))
+    other = load_deployment(apply_sets(TEXT, "table.yaml", ["seed=2"]), "table.yaml")
     assert [tuple(kicked_off(number, other)) for number in range(9)] != drawn[:9]
 
 
@@ -166,7 +173,7 @@ def test_a_dead_ball_comes_back_after_its_time() -> None:
     numbers = in_play((0.4, 0.2, RADIUS), slow)
     ticks = TABLE.rules.dead_ball_after_ns // DEPLOYMENT.tick_ns
     apply(numbers, ticks - 1)
-    assert field(numbers, "position", 3) == [0.4, 0.2, RADIUS] and field(numbers, "still_ticks") == [ticks - 1]
+    assert field(numbers, "position", 3) == [0.4, 0.2, RADIUS] and field(numbers, "football.still_ticks") == [ticks - 1]
     assert is_reset(apply(numbers)) and score(numbers) == [0.0, 0.0]
 
 
@@ -176,10 +183,10 @@ def test_a_ball_that_moves_in_between_is_not_dead(axis: int) -> None:
     apply(numbers, 1000)
     numbers[BALL.offsets["linear_velocity"] + axis] = -1.1 * TABLE.rules.dead_ball_speed
     apply(numbers)
-    assert field(numbers, "still_ticks") == [0.0]
+    assert field(numbers, "football.still_ticks") == [0.0]
     numbers[BALL.offsets["linear_velocity"] + axis] = 0.0
     apply(numbers, 1000)
-    assert field(numbers, "still_ticks") == [1000.0] and not is_reset(numbers)
+    assert field(numbers, "football.still_ticks") == [1000.0] and not is_reset(numbers)
 
 
 OUT: Final[dict[str, Position]] = {
@@ -201,7 +208,7 @@ def test_a_ball_off_the_table_comes_back_after_its_time(where: str) -> None:
 def test_a_ball_that_falls_back_is_not_out() -> None:
     numbers = apply(in_play(OUT["over the side"]), 100)
     numbers[BALL.offsets["position"] + 1] = 0.0
-    assert field(apply(numbers), "out_ticks") == [0.0]
+    assert field(apply(numbers), "football.out_ticks") == [0.0]
 
 
 def test_a_quarantined_ball_comes_back_and_is_free_again() -> None:
@@ -233,5 +240,7 @@ def test_rules_touch_nothing_but_balls_and_the_world() -> None:
 
 def test_times_shorter_than_a_tick_are_a_tick() -> None:
     sets = ["table.rules.kickoff_delay=1 ms", "table.rules.dead_ball_after=1 ms", "table.rules.off_table_after=1 ms"]
-    rules = TableRules.of(load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml"))
-    assert (rules.wait_ticks, rules.dead_ticks, rules.out_ticks) == (1, 1, 1)
+    short = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    assert kickoff_ticks(short) == 1
+    for position, velocity in (((0.4, 0.2, RADIUS), (0.0, 0.0, 0.0)), ((0.0, 0.0, -0.1), ROLLING)):
+        assert field(apply(in_play(position, velocity), deployment=short), "position", 3) == SPOT

@@ -6,16 +6,17 @@ from pathlib import Path
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.world.initial_state import initial_numbers, place_ball
-from foosim.world.islands import reach_of
+from foosim.world.assembly.islands import reach_of
+from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.scene import Box, Shape, Vector, multiply, place, rotate, swept_box, turn
-from foosim.world.scenes.build import build_scene
-from foosim.world.scenes.football_table import spin_inertia
+from foosim.world.models.rod import RodRobot
+from foosim.world.parameters.table import table_of
+from foosim.world.scene import Box, Shape, Vector, inertia_about_axis, multiply, place, rotate, swept_box, turn
+from tests.placing import place_ball
 
 DEPLOYMENT = load_deployment((Path(__file__).parents[2] / "deploy" / "table.yaml").read_text(), "table.yaml")
-TABLE = DEPLOYMENT.table
+TABLE = table_of(DEPLOYMENT)
 LAYOUT = build_layout(DEPLOYMENT)
 SCENE = build_scene(DEPLOYMENT, LAYOUT)
 
@@ -45,7 +46,7 @@ def test_red_stands_at_negative_x_and_blue_is_mirrored() -> None:
         red, blue = SCENE.bodies[f"red.{line}"], SCENE.bodies[f"blue.{line}"]
         assert red.position[0] == TABLE.lines[line].x == -blue.position[0]
     assert SCENE.bodies["red.goal"].position == (-0.522, 0.0, 0.084)
-    assert list(SCENE.bodies) == [entity.name for entity in LAYOUT.entities if entity.has_body]
+    assert list(SCENE.bodies) == [entity.name for entity in LAYOUT.entities if entity.is_solved]
 
 
 def test_feet_hang_down_slide_and_turn() -> None:
@@ -110,7 +111,9 @@ def test_islands_reach_as_far_as_bodies_do() -> None:
         low, high = swept_box(SCENE.bodies[name])
         assert axis - reach.half_width_m <= low[0] and high[0] <= axis + reach.half_width_m
         assert reach.z_low_m <= low[2] and high[2] <= reach.z_high_m
-        stroke = TABLE.lines[DEPLOYMENT.robots[name].line].half_stroke  # type: ignore[union-attr]
+        rod = DEPLOYMENT.robots[name]
+        assert isinstance(rod, RodRobot)
+        stroke = TABLE.lines[rod.line].half_stroke
         assert high[1] == pytest.approx(TABLE.rod.length / 2 + stroke)
     assert swept_box(SCENE.bodies["ball"])[1] == (TABLE.ball.radius,) * 3
 
@@ -121,7 +124,7 @@ def test_inertia_comes_from_the_parts() -> None:
     rod = TABLE.rod
     tube = rod.mass * (rod.radius**2 + rod.inner_radius**2) / 2
     figure = rod.figure_mass * ((0.02**2 + 0.09**2) / 12 + 0.016**2)
-    assert spin_inertia(link) == pytest.approx(tube + figure)
+    assert inertia_about_axis(link) == pytest.approx(tube + figure)
     assert link.mass == pytest.approx(0.946)
     assert link.mass * link.centre_of_mass[2] == pytest.approx(-rod.figure_mass * 0.016)
     assert link.inertia[0] == pytest.approx(link.inertia[2], rel=0.01)

@@ -16,13 +16,14 @@ from foosim.common.keyed_random import draw_key
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.tick import Stepper
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
-from foosim.world.initial_state import initial_numbers
 from foosim.world.layout import build_layout
+from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import RobotPacket
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
@@ -126,7 +127,7 @@ def test_noise_does_not_depend_on_what_is_measured() -> None:
 def test_without_noise_a_sample_is_the_frame() -> None:
     quiet = deployed("robots.camera.sensors.ball.modifiers=[]")
     seen = {tuple(sample) for sample in samples("camera", "ball", NUMBERS, quiet)}
-    assert seen == {(0.0, 0.0, DEPLOYMENT.table.ball.radius)}
+    assert seen == {(0.0, 0.0, table_of(DEPLOYMENT).ball.radius)}
 
 
 def test_every_kind_of_the_deployment_has_its_sensor() -> None:

@@ -16,9 +16,10 @@ from typing import Final, Generic, NamedTuple, TypeVar
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
 from foosim.vhub.line_of_sight.solids import BOX, CYLINDER, MESH, SPHERE, Line, Piece, Solid, chord_of, joined, ray_of
+from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Layout
+from foosim.world.layout import Declared, Layout
 from foosim.world.materials import RadioMaterial
 from foosim.world.mesh import Mesh
 from foosim.world.scene import (
@@ -37,7 +38,6 @@ from foosim.world.scene import (
     shape_box,
     swept_box,
 )
-from foosim.world.scenes.build import build_scene
 
 REACH_M: Final = 0.5
 """Of a line it is remembered what of the scenery may be there as long as no end has moved further along an axis."""
@@ -380,7 +380,7 @@ class LineOfSight:
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._geometry = Geometry(Scene({}, ()))
-        self._layout = Layout({}, {})
+        self._layout = Layout({}, Declared())
         self._frame: Frame | None = None
         self._sight = self._geometry.sight(self._layout, ())
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import Final
 
 import numpy as np
 
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.occlusion import Crossing, LineOfSight, Sight, Trace
+from foosim.world.assembly.world import build_scene
+from foosim.world.forms import registry
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics, velocity
 from foosim.world.layout import Entity, Layout
-from foosim.world.robots.rover import RoverRobot
-from foosim.world.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, rotate
-from foosim.world.scenes.build import build_scene
+from foosim.world.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, rotate, shape_box
+
+VEHICLE: Final = "vehicle"
+"""The tag of robots that drive: their hulls are in the way of waves between others as those of cars are."""
 
 
 class _Robot:
@@ -117,10 +121,12 @@ class World:
         return velocity(robot.body, robot.entity, self._values())
 
     def vehicle_height_m(self, name: str) -> float | None:
-        """Return how high the hull of a rover is; None for what is no vehicle."""
-        deployment = self._deployment
-        is_rover = deployment.is_hall and isinstance(deployment.robots.get(name), RoverRobot)
-        return deployment.hall.rover.height if is_rover else None
+        """Return how high the hull of a vehicle is, without its antenna (m); None for what is no vehicle."""
+        robot = self._deployment.robots.get(name)
+        if robot is None or not (VEHICLE in robot.tags or VEHICLE in registry.find_model(robot.model).tags):
+            return None
+        body = self._robot(name).body
+        return None if body is None else shape_box(body.links[0].shapes[0])[1][2]
 
     def _robot(self, endpoint: str) -> _Robot:
         """Return the robot that an endpoint is or is on board of, as the newest frame's layout has it."""

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final
 
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-
-DRIVEN: Final = ("rod", "rover")
-"""The models of robots that take commands."""
 
 Key = tuple[str, str]
 """Settings that links share: the rule and the radio."""
@@ -56,7 +52,7 @@ def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
             rate_hz = 0.0 if sensor is None else float(sensor.rate_hz)
             yield Flow(profiles.find(source, player, channel), source, player, channel, rate_hz)
         for name in spec.robots:
-            if deployment.robots[name].model in DRIVEN:
+            if deployment.robots[name].actuators:
                 yield Flow(profiles.find(player, name, ""), player, name, "", float(spec.rate_hz))
 
 

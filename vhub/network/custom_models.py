@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, NoReturn, Pro
 from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
-from foosim.deployment.checks import quoted
+from foosim.common.plain_data import quoted
 from foosim.deployment.loader import Text, refuse_findings
 from foosim.deployment.network.impairments import OwnModel
 from foosim.deployment.network.rules import Network

@@ -45,6 +45,7 @@ from foosim.vhub.recording.rows_of_closing import add_packets, epoch_entry, fram
 from foosim.vhub.recording.split import Split
 from foosim.vhub.recording.unfinished import Left, Progress, look, run_of
 from foosim.vhub.state.records import Closing
+from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.frame import Frame
 
 
@@ -297,7 +298,9 @@ class CaptureFile:
     @cached_property
     def _versions(self) -> bytes:
         described = self._described
-        return encode_json(described.versions or library_versions() | model_versions(described.deployment.network))
+        deployment = described.deployment
+        now = library_versions() | model_versions(deployment.network) | foreign_versions(deployment)
+        return encode_json(described.versions or now)
 
     def _let_go(self) -> None:
         if self._file >= 0:

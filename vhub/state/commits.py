@@ -10,9 +10,9 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Commit
+from foosim.world.assembly.initial_state import added_to
 from foosim.world.edits import layout_after
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import added_to
 from foosim.world.layout import Layout
 from foosim.world.start import AddedEntity
 
@@ -69,7 +69,7 @@ class Commits:
         """Return the newest commit (empty before the first), the chain up to it, and its layout's added entities."""
         assert self.layout is not None
         last = self._frames.get(self.next_tick - 1)
-        chain, added = self._chains[self.next_tick - 1], added_to(deployment, self.layout)
+        chain, added = self._chains[self.next_tick - 1], added_to(self.layout)
         return b"" if last is None else last[0], chain, added
 
     def forget(self, tick: int) -> None:

@@ -244,7 +244,7 @@ class HubState:
             return 0
         for following in range(limits.RELEASE_AHEAD):
             sent, arrival = tick + 1 + following, tick + 2 + following
-            if self.sampling.is_due(sent) or any(member.may_be_due(sent) for member in members):
+            if self.sampling.may_be_due(sent) or any(member.may_be_due(sent) for member in members):
                 return following
             if self._here.on_arrival and any(map(self._here.calls, self._flights.get(sent, ()))):
                 return following

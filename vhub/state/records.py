@@ -21,9 +21,9 @@ from foosim.protocol.messages import Build, Commit, Epoch, Recovered, Samples, S
 from foosim.vhub.network.memory import Age, Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.state.hub_state import HubState
+from foosim.world.assembly.initial_state import first_chain
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.world.initial_state import first_chain
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered, RobotPacket
 from foosim.world.sampling import Sampling

@@ -14,7 +14,8 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.models.rod import RodRobot
+from foosim.world.parameters.table import table_of
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle that a rod's actuator accepts."""
@@ -45,8 +46,8 @@ class PositionActuator:
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
         assert isinstance(robot, RodRobot)
-        drive = at.spec.table.drive
-        self._slide_m_max = at.spec.table.lines[robot.line].half_stroke
+        drive = table_of(at.spec).drive
+        self._slide_m_max = table_of(at.spec).lines[robot.line].half_stroke
         self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
         self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
         self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)

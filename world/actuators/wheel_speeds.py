@@ -8,6 +8,7 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.parameters.hall import hall_of
 
 
 class WheelSpeedsSettings(ActuatorSettings):
@@ -26,7 +27,7 @@ class DriveActuator:
     """The two wheels of a rover."""
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
-        drive = at.spec.hall.rover.drive
+        drive = hall_of(at.spec).rover.drive
         self._set_point = at.slot("set_point")
         self._speed, self._acceleration = drive.speed, drive.acceleration
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final
@@ -20,9 +20,9 @@ from foosim.world.components.view import (
     WritableView,
 )
 from foosim.world.forms import registry
+from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
-from foosim.world.forms.registry import SAMPLES, Component
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
 from foosim.world.layout import Entity, Layout, modifier_labels
 from foosim.world.spec import WorldSpec
@@ -63,10 +63,12 @@ class FittedSensor:
     modifiers: tuple[FittedModifier, ...]
     size: int
     """How many numbers a reading has; 0 of one that is not all numbers."""
+    speaks_at: int = -1
+    """The place of the number that makes it measure where it is not 0; -1 without one."""
 
-    def is_due(self, tick: int) -> bool:
-        """Whether it measures at a tick."""
-        return tick % self.period == self.offset
+    def is_due(self, tick: int, numbers: Sequence[float]) -> bool:
+        """Whether it measures at a tick, at whose start the numbers of the frame are these."""
+        return tick % self.period == self.offset or (self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0)
 
     def sample(self, view: WritableView) -> Any:
         """Return what is measured. Raises ComponentError."""
@@ -153,7 +155,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
     """Return the sensors of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
-        component = registry.find("sensor", settings.kind)
+        component = registry.find_component("sensor", settings.kind)
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "sensor", robot.name, channel))
         period, offset = spec.turns(settings)
         sensor = _made(component, settings, mounting)
@@ -170,6 +172,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(settings.kind, "sensor"),
                 modifiers,
                 0 if numbers is None else numbers.size,
+                robot.offsets[component.speaks] if component.speaks else -1,
             )
         )
     return tuple(fitted)
@@ -179,7 +182,7 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
     """Return the actuators of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].actuators.items()):
-        component = registry.find("actuator", settings.kind)
+        component = registry.find_component("actuator", settings.kind)
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "actuator", robot.name, channel))
         made = _made(component, settings, mounting)
         modifiers = tuple(_modifiers(component, settings, mounting, made, spec.tick_ns))
@@ -211,5 +214,5 @@ def _modifiers(
         key = draw_key(spec.seed, component.form, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, period_ns / 1e9, key)
-        made_modifier = _made(registry.find("modifier", its.kind), its, at)
+        made_modifier = _made(registry.find_component("modifier", its.kind), its, at)
         yield FittedModifier(f"modifier {label} of {robot.name} {channel}", made_modifier)

@@ -103,6 +103,16 @@ class WritableView(View):
         self._written[slot.at : slot.at + slot.size] = values
 
 
+class SolvingView(WritableView):
+    """A view in which entities go on: `numbers` are those before the tick, what is written is after it."""
+
+    __slots__ = ()
+
+    def __init__(self, tick: int, numbers: Sequence[float], written: list[float]) -> None:
+        super().__init__(tick, written)
+        self.numbers = numbers
+
+
 class SensingView(WritableView):
     """A view in which sensors and their modifiers remember: what they write is in the next frame, not in this one."""
 
@@ -130,19 +140,28 @@ def check_write(slot: Slot, values: Sequence[float]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """Where a component is: on which robot of which world, under which name, and the key of its draws."""
+    """Where a component is: on which entity of which world, under which name, and the key of its draws.
+
+    `writes` are the fields of the entity itself that it may write, beside its own slots.
+    """
 
     spec: WorldSpec
     layout: Layout
     robot: Entity
     name: str
     key: bytes
+    writes: frozenset[str] = frozenset()
 
     def slot(self, field: str) -> Slot:
-        """Return a slot of the component itself, else one of its robot's body, by field."""
+        """Return a slot of the component itself, else one of its entity, by field."""
         own = f"{self.name}.{field}"
         name = own if own in self.robot.offsets else field
-        return Slot(self.robot.offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", name is own)
+        is_own = name is own or field in self.writes
+        return Slot(self.robot.offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", is_own)
+
+    def of(self, entity: Entity, field: str) -> Slot:
+        """Return a field of any entity, to be read."""
+        return Slot(entity.offsets[field], entity.counts[field], f"{entity.name} {field}", False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +191,11 @@ class ModifierMounting:
 class Sensor(Protocol):
     """What the tick of a node asks of a sensor. It is made from its settings and its mounting.
 
-    A class may have two more methods: `limits()`, the least and greatest value of each field that it can measure, and
+    A class may have three more methods: `limits()`, the least and greatest value of each field that it can measure;
     the static `together(sensors)`, which returns an object whose `sample(view)` gives the numbers of the readings of
-    several as an array of shape (sensors, numbers), with the same bits. Their readings are of one length.
+    several as an array of shape (sensors, numbers), with the same bits; and the static `rays(sensors, numbers)`, which
+    returns both ends of each ray that several send, as an array of shape (rays, 6) in the world's frame (m), to be
+    drawn. Readings of those that are asked together are of one length.
     """
 
     def sample(self, view: WritableView) -> Any:

@@ -18,8 +18,8 @@ from foosim.common import units
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.units import Dimension, custom_error
 from foosim.world.forms import registry
+from foosim.world.forms.forms import Component
 from foosim.world.forms.payloads import Field, PayloadCodec
-from foosim.world.forms.registry import Component
 from foosim.world.forms.settings import ComponentSettings
 
 Quantity: TypeAlias = str | StrictInt | StrictFloat
@@ -78,7 +78,7 @@ class Numbers:
 @cache
 def codec_of(kind: str, form: str) -> PayloadCodec:
     """Return the codec of a component's readings or commands."""
-    component = registry.find(form, kind)
+    component = registry.find_component(form, kind)
     assert component.value is not None, f"{form} {kind} carries nothing"
     return PayloadCodec(component.value, component.name)
 

@@ -1,4 +1,4 @@
-"""The registry of forms: sensors, actuators and whatever else a world is made of, by form and name.
+"""The registry of forms: models, sensors, rules and whatever else a world is made of, by form and name.
 
 Each stands in a file of its own and registers itself there, under the name by which deployments ask for it. One of
 foosim's own is in the folder of its form, in a module of its name; one of another package is in a module that the
@@ -11,95 +11,57 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from foosim.common.errors import Refused, UnknownName
 from foosim.common.names import CLASS_PATTERN, NAME_RULE, is_name
+from foosim.world.forms.forms import (
+    NO_SETTINGS,
+    NO_SLOTS,
+    SAMPLES,
+    Component,
+    Engine,
+    EntityRule,
+    Form,
+    Kit,
+    Model,
+    Motion,
+    Scene,
+    SlotsOf,
+    WorldRule,
+)
+from foosim.world.forms.settings import ComponentSettings
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
     from msgspec import Struct
 
-    from foosim.world.forms.settings import ComponentSettings
+    from foosim.common.spec_base import SpecBase
+    from foosim.world.forms.settings import RobotSettings
 
 GROUP: Final = "foosim.world"
 FOLDERS: Final[Mapping[str, str]] = {
+    "model": "foosim.world.models",
+    "motion": "foosim.world.motions",
     "sensor": "foosim.world.sensors",
     "actuator": "foosim.world.actuators",
     "modifier": "foosim.world.modifiers",
+    "rule": "foosim.world.rules",
+    "entity_rule": "foosim.world.entity_rules",
+    "scene": "foosim.world.scenes",
+    "kit": "foosim.world.kits",
+    "engine": "foosim.node.engines",
 }
 """Where foosim's own are, by form."""
 FORMS: Final = tuple(FOLDERS)
 
-SAMPLES: Final = "samples"
-"""The slot of each sensor that counts what it has sampled; no component declares one of this name."""
-NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
-NO_SETTINGS: Final[Mapping[str, float | None]] = MappingProxyType({})
-
 Made = TypeVar("Made", bound=Callable[..., Any])
 
-
-@dataclass(frozen=True, slots=True)
-class Carrier:
-    """What a modifier is on: how many numbers a value has, and in which time they come one after the other (ns).
-
-    Commands come in a tick's time at the earliest.
-    """
-
-    size: int
-    period_ns: int
-
-
-SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
-"""The slots of a modifier, by its settings and what it is on. Raises BadValue for settings that do not fit that."""
-
-
-@dataclass(frozen=True, slots=True)
-class Component:
-    """A registered class, and what there is to know of it without making one.
-
-    `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
-    field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have, `kit` is the section that a deployment must have; empty where any will do.
-    `several` is the setting that says how many numbers the last field of a reading has, if it has several. `moves` says
-    that an actuator commands the motors of its robot: one of a robot may. `per_field` are the settings with a number
-    for each field (`forms.per_field`), and the least that is valid of each; None without a least one.
-    """
-
-    form: str
-    name: str
-    made: Callable[..., Any]
-    settings: type[ComponentSettings]
-    value: type[Struct] | None = None
-    slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
-    needs: tuple[str, ...] = ()
-    kit: str = ""
-    several: str = ""
-    moves: bool = False
-    per_field: Mapping[str, float | None] = field(default_factory=dict)
-
-    def slots_on(self, settings: ComponentSettings, carrier: Carrier) -> Mapping[str, int]:
-        """Return its slots with these settings. Raises BadValue where a modifier does not fit what it is on."""
-        return self.slots(settings, carrier) if callable(self.slots) else self.slots
-
-    @property
-    def module(self) -> str:
-        """The module that it is in."""
-        return self.made.__module__
-
-    @property
-    def summary(self) -> str:
-        """The first line of its docstring."""
-        return (self.made.__doc__ or "").strip().partition("\n")[0]
-
-
-_known: Final[dict[tuple[str, str], Component]] = {}
+_known: Final[dict[tuple[str, str], Form]] = {}
 _loaded: Final[dict[str, str]] = {}
 """Of each entry point that was loaded: why that failed, empty if it did not."""
 
@@ -113,9 +75,25 @@ def sensor(
     needs: tuple[str, ...] = (),
     kit: str = "",
     several: str = "",
+    speaks: str = "",
 ) -> Callable[[Made], Made]:
     """Register a sensor: a class with the methods of `components.view.Sensor`."""
-    return _registering(lambda made: Component("sensor", name, made, settings, reading, slots, needs, kit, several))
+
+    def describe(made: Callable[..., Any]) -> Component:
+        return Component(
+            form="sensor",
+            name=name,
+            made=made,
+            settings=settings,
+            value=reading,
+            slots=slots,
+            needs=needs,
+            kit=kit,
+            several=several,
+            speaks=speaks,
+        )
+
+    return _registering(describe)
 
 
 def actuator(
@@ -129,9 +107,21 @@ def actuator(
     moves: bool = True,
 ) -> Callable[[Made], Made]:
     """Register an actuator: a class with the methods of `components.view.Actuator`."""
-    return _registering(
-        lambda made: Component("actuator", name, made, settings, command, slots, needs, kit, moves=moves)
-    )
+
+    def describe(made: Callable[..., Any]) -> Component:
+        return Component(
+            form="actuator",
+            name=name,
+            made=made,
+            settings=settings,
+            value=command,
+            slots=slots,
+            needs=needs,
+            kit=kit,
+            moves=moves,
+        )
+
+    return _registering(describe)
 
 
 def modifier(
@@ -142,24 +132,70 @@ def modifier(
     per_field: Mapping[str, float | None] = NO_SETTINGS,
 ) -> Callable[[Made], Made]:
     """Register a modifier: a class with the methods of `components.view.Modifier`."""
-    return _registering(lambda made: Component("modifier", name, made, settings, slots=slots, per_field=per_field))
+    return _registering(
+        lambda made: Component(
+            form="modifier", name=name, made=made, settings=settings, slots=slots, per_field=per_field
+        )
+    )
 
 
-def _registering(describe: Callable[[Callable[..., Any]], Component]) -> Callable[[Made], Made]:
+def model(name: str, settings: type[RobotSettings], **about: Any) -> Callable[[Made], Made]:
+    """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`."""
+    return _registering(lambda made: Model(form="model", name=name, made=made, settings=settings, **about))
+
+
+def motion(name: str, **about: Any) -> Callable[[Made], Made]:
+    """Register a motion: a class with the methods of `entities.Motion`; `about` are fields of `forms.Motion`.
+
+    Its settings are those of the models that go on by it.
+    """
+    return _registering(lambda made: Motion(form="motion", name=name, made=made, settings=ComponentSettings, **about))
+
+
+def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Callable[[Made], Made]:
+    """Register a rule of worlds: a class with the methods of `entities.Rule`; `about`: fields of `forms.WorldRule`."""
+    return _registering(lambda made: WorldRule(form="rule", name=name, made=made, settings=settings, **about))
+
+
+def entity_rule(name: str, settings: type[ComponentSettings], **about: Any) -> Callable[[Made], Made]:
+    """Register a rule of entities: a class with the methods of `entities.EntityRule`; `about` are fields of
+    `forms.EntityRule`."""
+    return _registering(lambda made: EntityRule(form="entity_rule", name=name, made=made, settings=settings, **about))
+
+
+def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Callable[[Made], Made]:
+    """Register a scene: a function of its settings that returns its shapes."""
+    return _registering(lambda made: Scene(form="scene", name=name, made=made, settings=settings, kit=kit))
+
+
+def engine(name: str, *, meshes: bool) -> Callable[[Made], Made]:
+    """Register an engine: a class with the methods of `node.physics.interface.EngineKind`."""
+    return _registering(
+        lambda made: Engine(form="engine", name=name, made=made, settings=ComponentSettings, meshes=meshes)
+    )
+
+
+def kit(name: str, settings: type[SpecBase], **about: Any) -> Callable[[Made], Made]:
+    """Register a kit: a class with the methods of `entities.Kit`; `about` are fields of `forms.Kit`."""
+    return _registering(lambda made: Kit(form="kit", name=name, made=made, settings=settings, **about))
+
+
+def _registering(describe: Callable[[Callable[..., Any]], Form]) -> Callable[[Made], Made]:
     def register(made: Made) -> Made:
-        component = describe(made)
-        key = component.form, component.name
-        if not is_name(component.name):
-            raise Refused(f"{component.module} registers a {component.form} as {component.name!r}: {NAME_RULE}")
-        if not callable(component.slots) and SAMPLES in component.slots:
-            raise Refused(f"{component.form} {component.name} has a slot {SAMPLES}, which each sensor has already")
-        own = f"{FOLDERS[component.form]}.{component.name}"
-        if component.module != own and _is_there(*key):
-            raise Refused(f"{component.form} {component.name} is registered by {component.module}, and is in {own}")
-        first = _known.setdefault(key, component)
-        if (first.module, first.made.__qualname__) != (component.module, made.__qualname__):
-            raise Refused(f"{component.form} {component.name} is registered by {first.module} and {component.module}")
-        _known[key] = component
+        found = describe(made)
+        key = found.form, found.name
+        if not is_name(found.name):
+            raise Refused(f"{found.module} registers a {found.form} as {found.name!r}: {NAME_RULE}")
+        slots = getattr(found, "slots", NO_SLOTS)
+        if found.form == "sensor" and SAMPLES in slots:
+            raise Refused(f"{found.form} {found.name} has a slot {SAMPLES}, which each sensor has already")
+        own = f"{FOLDERS[found.form]}.{found.name}"
+        if found.module != own and _is_there(*key):
+            raise Refused(f"{found.form} {found.name} is registered by {found.module}, and is in {own}")
+        first = _known.setdefault(key, found)
+        if (first.module, first.made.__qualname__) != (found.module, made.__qualname__):
+            raise Refused(f"{found.form} {found.name} is registered by {first.module} and {found.module}")
+        _known[key] = found
         return made
 
     return register
@@ -168,7 +204,7 @@ def _registering(describe: Callable[[Callable[..., Any]], Component]) -> Callabl
 # --- finding ---------------------------------------------------------------------------------------------------------
 
 
-def find(form: str, kind: str) -> Component:
+def find(form: str, kind: str) -> Form:
     """Return what a deployment calls `kind`: a registered name, or `module:Class`.
 
     Raises UnknownName, which says what is nearest, and Refused for a module that cannot be imported, or a class in it
@@ -182,6 +218,20 @@ def find(form: str, kind: str) -> Component:
         found = _known.get((form, kind))
         if found is None:
             raise UnknownName("; ".join([f"unknown {form}", *failures]), kind, names(form))
+    return found
+
+
+def find_component(form: str, kind: str) -> Component:
+    """Return a sensor, actuator or modifier; raises like `find`."""
+    found = find(form, kind)
+    assert isinstance(found, Component), found
+    return found
+
+
+def find_model(kind: str) -> Model:
+    """Return a model of entities; raises like `find`."""
+    found = find("model", kind)
+    assert isinstance(found, Model), found
     return found
 
 
@@ -217,7 +267,7 @@ def _load(entry: EntryPoint) -> str:
     return ""
 
 
-def _own(form: str, name: str) -> Component | None:
+def _own(form: str, name: str) -> Form | None:
     """Return one of foosim's own, imported from its module; None where there is none."""
     if _is_there(form, name):
         import_module(f"{FOLDERS[form]}.{name}")
@@ -230,7 +280,7 @@ def _is_there(form: str, name: str) -> bool:
     return name.isidentifier() and (module in sys.modules or find_spec(module) is not None)
 
 
-def _of_class(form: str, path: str) -> Component:
+def _of_class(form: str, path: str) -> Form:
     """Return the one that `module:Class` registered."""
     if not re.fullmatch(CLASS_PATTERN, path):
         raise Refused("not a class (module:Class)")
@@ -253,7 +303,7 @@ def _of_class(form: str, path: str) -> Component:
     raise Refused(f"registered as no {form}")
 
 
-def _forget_new(known: Mapping[tuple[str, str], Component]) -> None:
+def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:
     """Forget what a module has registered that then could not be imported."""
     for key in _known.keys() - known.keys():
         del _known[key]

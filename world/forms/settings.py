@@ -1,12 +1,17 @@
-"""What the settings of all components of robots have, in a deployment."""
+"""What the settings of all forms have, in a deployment."""
 
-from typing import Final
+from typing import Annotated, Final
 
-from pydantic import Field, SerializeAsAny
+from pydantic import Field, SerializeAsAny, StringConstraints
 
-from foosim.common.spec_base import Offset, Rate, SpecBase, default
+from foosim.common import limits, names
+from foosim.common.spec_base import Name, Offset, Rate, SpecBase, default
 
 MODIFIERS_MAX: Final = 8
+COMPONENTS_MAX: Final = 16
+TAGS_MAX: Final = 16
+
+Tag = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 
 
 class ComponentSettings(SpecBase):
@@ -31,3 +36,30 @@ class ActuatorSettings(ComponentSettings):
     """What the settings of each actuator have: what is done to its commands, in order."""
 
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
+
+
+class EntityRuleSettings(ComponentSettings):
+    """What the settings of each rule of an entity have."""
+
+
+class RuleSettings(ComponentSettings):
+    """What the settings of each rule of the world have."""
+
+
+class SceneSettings(ComponentSettings):
+    """What the settings of each scene have."""
+
+
+class RobotSettings(SpecBase):
+    """What the settings of every robot have: its model, a registered name or `module:Class`; its sensors and actuators
+    by the names of their channels, its rules by name.
+
+    A robot that says nothing of its actuators, or of its rules, has those of its model. `tags` are for those who look
+    for robots of a kind, beside the tags of its model.
+    """
+
+    model: str
+    sensors: dict[Name, SerializeAsAny[SensorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
+    actuators: dict[Name, SerializeAsAny[ActuatorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
+    rules: dict[Name, SerializeAsAny[EntityRuleSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
+    tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)

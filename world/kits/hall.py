@@ -1,79 +1,76 @@
-"""The world parameters of a hall with mobile robots: `hall:` of a deployment.
+"""The hall: `hall:` of a deployment makes a hall with walls, and says what its rovers and stations are like."""
 
-Frame of reference: x along the hall, y across it, z up, the origin on the floor in the middle. Every value is in SI
-units here. Sources of the numbers are in deploy/warehouse.yaml.
-"""
+from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-from foosim.common import units
-from foosim.common.spec_base import Length, SpecBase
-from foosim.common.units import Quantity
+from foosim.common.finding import Finding
+from foosim.common.plain_data import PlainData
+from foosim.world.clearance.hall_obstacles import obstacles_of
+from foosim.world.clearance.hall_start import start_findings
+from foosim.world.forms.registry import kit
+from foosim.world.parameters.hall import HALL, Hall
+from foosim.world.parameters.hall_checks import hall_findings
+from foosim.world.scene import Shape
+from foosim.world.scenes.hall import hall_scenery
+from foosim.world.spec import WorldSpec
 
-Side = Annotated[float, Quantity(units.LENGTH, "1 m", "1000 m")]
-WheelSpeed = Annotated[float, Quantity(units.SPEED, "1 mm/s", "20 m/s")]
-WheelAcceleration = Annotated[float, Quantity(units.ACCELERATION, "1 mm/s2", "100 m/s2")]
-Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
-Capacity = Annotated[float, Quantity(units.ENERGY, "1 J", "100 kWh")]
-Load = Annotated[float, Quantity(units.POWER, "0 W", "100 kW")]
-Drag = Annotated[float, Quantity(units.FORCE, "0 N", "10 kN")]
-Voltage = Annotated[float, Quantity(units.VOLTAGE, "0 V", "1 kV")]
-
-
-class HallWalls(SpecBase):
-    """The walls around the hall: height above the floor, thickness outwards."""
-
-    height: Length
-    thickness: Length
+if TYPE_CHECKING:
+    from foosim.world.frame import Frame
 
 
-class RoverDrive(SpecBase):
-    """Two driven wheels, `track` apart: greatest speed and acceleration of their rims.
+@kit(HALL, Hall)
+class HallKit:
+    """A hall with walls, in which rovers drive and stations charge them."""
 
-    A wheel rolls less far than it turns, each by a share of its own between none and `slip`.
-    """
+    def __init__(self, section: Hall, spec: WorldSpec) -> None:
+        self._hall, self._spec = section, spec
 
-    track: Length
-    speed: WheelSpeed
-    acceleration: WheelAcceleration
-    slip: Slip
+    def shapes(self) -> tuple[Shape, ...]:
+        """Return floor and walls."""
+        return hall_scenery(self._hall)
 
+    def physics(self) -> None:
+        """A hall has no rigid bodies of its own."""
 
-class RoverBattery(SpecBase):
-    """What a rover lives on: `idle` power always, and `drag` times the way of its wheels; the voltage falls evenly."""
+    def findings(self) -> Iterator[Finding]:
+        """Yield rovers and stations that are in something."""
+        return start_findings(self._spec)
 
-    capacity: Capacity
-    idle: Load
-    drag: Drag
-    full: Voltage
-    empty: Voltage
+    def strays(self, frame: Frame) -> list[str]:
+        """Return which rovers are in an obstacle, or in one another."""
+        radius, obstacles = self._hall.rover.radius, obstacles_of(self._spec)
+        rovers = [rover.name for rover in frame.layout.of("rover")]
+        places = [(name, frame.at(name, "position"), frame.at(name, "position", 1)) for name in rovers]
+        found: list[str] = []
+        for number, (name, x, y) in enumerate(places):
+            found += [f"{name} is in {obstacle}" for obstacle in obstacles if not obstacle.is_clear(x, y, radius)]
+            for other, there_x, there_y in places[:number]:
+                if (x - there_x) * (x - there_x) + (y - there_y) * (y - there_y) < 4.0 * radius * radius:
+                    found.append(f"{name} is in {other}")
+        return found
 
+    @staticmethod
+    def check(data: PlainData) -> Iterator[Finding]:
+        """Yield parts of a rover that do not fit each other, or the hall."""
+        return hall_findings(data)
 
-class Rover(SpecBase):
-    """A round rover on two wheels; its antenna stands on its middle, `antenna_height` above the floor."""
+    def status(self, frame: Frame) -> dict[str, Any]:
+        """Return how many rovers there are and drive, and which has the least charge (a share)."""
+        rovers = frame.layout.of("rover")
+        if not rovers:
+            return {}
+        capacity = self._hall.rover.battery.capacity
+        least, name = min((frame.at(rover.name, "charge"), rover.name) for rover in rovers)
+        drive = sum(any(frame.vector(rover.name, "wheel_speeds", 2)) for rover in rovers)
+        return {"rovers": {"count": len(rovers), "drive": drive, "least": name, "charge": round(least / capacity, 4)}}
 
-    radius: Length
-    height: Length
-    antenna_height: Length
-    drive: RoverDrive
-    battery: RoverBattery
-
-
-class Station(SpecBase):
-    """A base station: round, with an antenna; it charges every rover whose middle is within `charge_radius`."""
-
-    radius: Length
-    height: Length
-    antenna_height: Length
-    charge_radius: Length
-    charge_power: Load
-
-
-class Hall(SpecBase):
-    """The whole hall: its bounds, which are walls, and what its rovers and base stations are like."""
-
-    length: Side
-    width: Side
-    walls: HallWalls
-    rover: Rover
-    station: Station
+    @staticmethod
+    def text(status: dict[str, Any]) -> str:
+        """Return `20 rovers, 18 drive, rover07 has 34 % of its charge`."""
+        if "rovers" not in status:
+            return ""
+        rovers = status["rovers"]
+        count, drive, least, charge = (rovers[key] for key in ("count", "drive", "least", "charge"))
+        return f"{count} rovers, {drive} drive, {least} has {charge:.0%} of its charge"

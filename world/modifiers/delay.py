@@ -10,7 +10,8 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.units import Quantity
 from foosim.world.components.view import ModifierMounting, WritableView
-from foosim.world.forms.registry import Carrier, modifier
+from foosim.world.forms.forms import Carrier
+from foosim.world.forms.registry import modifier
 from foosim.world.forms.settings import ModifierSettings
 
 Delay = Annotated[int, Quantity(units.TIME, "0 s", "10 s")]

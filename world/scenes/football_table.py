@@ -1,37 +1,20 @@
-"""The football table as a scene: floor, walls, goals, corner ramps, rods with figures, balls.
-
-A pure function of the deployment and the layout. All rods slide along world +y and turn about world +y, at angle 0 the
-feet hang straight down.
-"""
+"""The football table's scenery: floor, walls, goals, corner ramps."""
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Final, Protocol
 
 from foosim.world import materials
-from foosim.world.islands import line_x_m
-from foosim.world.kits.table import Line, Table
-from foosim.world.layout import Layout
-from foosim.world.robots.foosball_rod import RodRobot
-from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Scene, Shape, Sphere, Vector
-from foosim.world.spec import WorldSpec
+from foosim.world.forms.registry import scene
+from foosim.world.forms.settings import SceneSettings
+from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Walls
+from foosim.world.scene import Box, Colour, Shape, Vector
 
 GREEN: Final[Colour] = (0.16, 0.45, 0.24, 1.0)
 DARK_GREEN: Final[Colour] = (0.13, 0.38, 0.20, 1.0)
 WOOD: Final[Colour] = (0.45, 0.30, 0.18, 1.0)
 GREY: Final[Colour] = (0.35, 0.35, 0.38, 1.0)
-STEEL: Final[Colour] = (0.75, 0.75, 0.78, 1.0)
-ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
-"""A white ball would be confused with highlights on the rods."""
-TEAM_COLOURS: Final[dict[str, Colour]] = {"red": (0.80, 0.10, 0.10, 1.0), "blue": (0.10, 0.20, 0.80, 1.0)}
-
-ALONG_Y: Final[Quaternion] = (-sqrt(0.5), 0.0, 0.0, sqrt(0.5))
-"""Turns a cylinder's axis from z to y."""
-Y_AXIS: Final[Vector] = (0.0, 1.0, 0.0)
-
-TABLE: Final = "table"
-"""What its floor, walls, goals and ramps are called, all together, where waves cross them."""
 
 _COS_EIGHTH: Final = sqrt((1.0 + sqrt(0.5)) / 2.0)
 _SIN_EIGHTH: Final = sqrt((1.0 - sqrt(0.5)) / 2.0)
@@ -44,109 +27,43 @@ _TO_CORNER: Final[dict[tuple[float, float], tuple[float, float]]] = {
 """Sine and cosine of half the angle from +x to each corner (45, 135, 225 - 360 and 315 - 360 degrees)."""
 
 
-def table_scene(spec: WorldSpec, layout: Layout) -> Scene:
-    """Return the scene of a layout's bodies on the deployment's table."""
-    table = spec.table
-    bodies = {}
-    for entity in layout.entities:
-        if entity.model == "ball":
-            bodies[entity.name] = ball_body(table, entity.name)
-        elif entity.model == "rod":
-            robot = spec.robots[entity.name]
-            assert isinstance(robot, RodRobot)
-            bodies[entity.name] = _rod_body(table, entity.name, robot, line_x_m(spec, robot))
-    return Scene(bodies, (*table_scenery(table), *spec.scenery_shapes()))
+class FootballTableSettings(SceneSettings):
+    """The table without what moves."""
+
+    field: Playfield
+    floor: Floor
+    walls: Walls
+    goal: Goal
+    ramps: Ramps
 
 
-def ball_body(table: Table, name: str) -> Body:
-    """Return a ball: a solid sphere, I = 2/5 m r^2."""
-    ball = table.ball
-    inertia = 0.4 * ball.mass * ball.radius * ball.radius
-    shape = Shape(Sphere(ball.radius), "ball", ORANGE, radio=materials.PLASTIC)
-    return Body(name, "ball", (0.0, 0.0, 0.0), (Link(name, "free", (shape,), ball.mass, (inertia, inertia, inertia)),))
+class Table(Protocol):
+    """What the table's scenery follows from."""
+
+    @property
+    def field(self) -> Playfield:
+        """Between the walls."""
+
+    @property
+    def floor(self) -> Floor:
+        """Its upper face is z = 0."""
+
+    @property
+    def walls(self) -> Walls:
+        """Around the field."""
+
+    @property
+    def goal(self) -> Goal:
+        """Either of them."""
+
+    @property
+    def ramps(self) -> Ramps:
+        """In the corners; without a height or a leg there are none."""
 
 
-def _rod_body(table: Table, name: str, robot: RodRobot, x: float) -> Body:
-    """Return a rod: a carriage that slides, and on it what turns.
-
-    The tube's shape is the carriage's: it has a surface of its own, a link has one, and a further link costs a fifth
-    of a step. So a ball that flies against the tube does not feel it spin; the tube's inertia turns with the figures.
-    """
-    rod, line = table.rod, table.lines[robot.line]
-    tube = Shape(Cylinder(rod.radius, rod.length), "rods", STEEL, orientation=ALONG_Y, radio=materials.METAL)
-    thin = rod.carriage_mass * rod.length * rod.length / 12.0
-    mass, centre, inertia = _spin_mass(table, line)
-    slide = Link(
-        name=f"{name}/slide",
-        joint="prismatic",
-        shapes=(tube,),
-        mass=rod.carriage_mass,
-        inertia=(thin, rod.carriage_mass * rod.radius * rod.radius, thin),
-        axis=Y_AXIS,
-        limits=(-line.half_stroke, line.half_stroke),
-    )
-    figures = _figures(table, line, TEAM_COLOURS[robot.team])
-    spin = Link(f"{name}/spin", "revolute", figures, mass, inertia, (0.0, 0.0, centre), Y_AXIS)
-    return Body(name, "rod", (x, 0.0, rod.axis_height), (slide, spin))
-
-
-def figure_ys(line: Line) -> list[float]:
-    """Return where a line's figures stand along their rod, from its middle."""
-    return [(index - (line.figures - 1) / 2.0) * line.pitch for index in range(line.figures)]
-
-
-def _figures(table: Table, line: Line, colour: Colour) -> tuple[Shape, ...]:
-    """Return foot and body of each figure; the body stands on the foot."""
-    rod = table.rod
-    foot = Box((rod.foot.length / 2, rod.foot.width / 2, rod.foot.height / 2))
-    body = Box((rod.body.length / 2, rod.body.width / 2, rod.body.height / 2))
-    foot_z = rod.foot.height / 2 - rod.foot_radius
-    body_z = rod.foot.height + rod.body.height / 2 - rod.foot_radius
-    shapes = []
-    for y in figure_ys(line):
-        shapes.append(Shape(foot, "figures", colour, (0.0, y, foot_z), radio=materials.PLASTIC))
-        shapes.append(Shape(body, "figures", colour, (0.0, y, body_z), radio=materials.PLASTIC))
-    return tuple(shapes)
-
-
-def _spin_mass(table: Table, line: Line) -> tuple[float, float, Vector]:
-    """Return mass, height of the centre of mass over the axis, and inertia about that centre of what turns.
-
-    Parts: a hollow cylinder on the axis, and for each figure a solid box as tall as foot and body and as long and wide
-    as the body, whose centre of mass hangs below the axis; all moved by the parallel axis theorem.
-    """
-    rod = table.rod
-    below = rod.figure_com_below_axis
-    count = line.figures
-    mass = rod.mass + count * rod.figure_mass
-    centre = -count * rod.figure_mass * below / mass
-    radii = rod.radius * rod.radius + rod.inner_radius * rod.inner_radius
-    long, wide, tall = rod.body.length, rod.body.width, rod.foot.height + rod.body.height
-    squares = sum(y * y for y in figure_ys(line))
-    tube_across = rod.mass * (radii / 4.0 + rod.length * rod.length / 12.0)
-    figure_x = (wide * wide + tall * tall) / 12.0 + below * below
-    figure_y = (long * long + tall * tall) / 12.0 + below * below
-    figure_z = (long * long + wide * wide) / 12.0
-    shift = mass * centre * centre
-    return (
-        mass,
-        centre,
-        (
-            tube_across + rod.figure_mass * (count * figure_x + squares) - shift,
-            rod.mass * radii / 2.0 + rod.figure_mass * count * figure_y - shift,
-            tube_across + rod.figure_mass * (count * figure_z + squares),
-        ),
-    )
-
-
-def spin_inertia(link: Link) -> float:
-    """Return the moment of inertia of a turning link about its joint's axis (y), in kg m2."""
-    x, _, z = link.centre_of_mass
-    return link.inertia[1] + link.mass * (x * x + z * z)
-
-
+@scene("football_table", FootballTableSettings)
 def table_scenery(table: Table) -> tuple[Shape, ...]:
-    """Return what the table itself has that never moves; boxes only, since a concave mesh lets fast balls through."""
+    """Floor, walls, goals and ramps; boxes only, since a concave mesh lets fast balls through."""
     return (_floor(table), *_side_walls(table), *_end_walls(table), *_goals(table), *_ramps(table))
 
 

@@ -10,7 +10,6 @@ from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
-from foosim.world.layout import BALL
 
 
 class BallSettings(SensorSettings):
@@ -32,7 +31,7 @@ class BallTracker:
     """The ball's position in the world frame."""
 
     def __init__(self, settings: BallSettings, at: Mounting) -> None:
-        self._start = at.layout[BALL].offsets["position"]
+        self._start = at.layout["ball"].offsets["position"]
 
     def sample(self, view: View) -> BallPosition:
         return BallPosition(*view.numbers[self._start : self._start + 3])

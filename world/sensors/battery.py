@@ -8,6 +8,7 @@ from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Share, Volts
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
+from foosim.world.parameters.hall import hall_of
 
 
 class BatterySettings(SensorSettings):
@@ -26,7 +27,7 @@ class BatteryGauge:
     """Charge of a battery as a share of its capacity, and its voltage, which falls evenly with the charge."""
 
     def __init__(self, settings: BatterySettings, at: Mounting) -> None:
-        battery = at.spec.hall.rover.battery
+        battery = hall_of(at.spec).rover.battery
         self._charge = at.slot("charge")
         self._capacity_j = battery.capacity
         self._empty_v, self._span_v = battery.empty, battery.full - battery.empty

@@ -19,11 +19,12 @@ from pydantic import Field
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacles_of
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
-from foosim.world.scenes.obstacles import Circle, Rectangle, obstacles_of
+from foosim.world.parameters.hall import hall_of
 
 Numbers: TypeAlias = NDArray[np.float64]
 Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "100 m")]
@@ -53,11 +54,12 @@ class Proximity:
     """The free way from the hull along each ray; the sensor's range where nothing is hit."""
 
     def __init__(self, settings: ProximitySettings, at: Mounting) -> None:
-        rover = at.spec.hall.rover
+        rover = hall_of(at.spec).rover
+        self._height_m = rover.height / 2
         obstacles = obstacles_of(at.spec)
         self._position = at.robot.offsets["position"]
         self._heading = at.robot.offsets["heading"]
-        self._rovers = [rover.offsets["position"] for rover in at.layout.rovers]
+        self._rovers = [rover.offsets["position"] for rover in at.layout.of("rover")]
         self.radius_m, self.range_m = rover.radius, settings.range
         angles = [2.0 * pi * ray / settings.rays for ray in range(settings.rays)]
         self._cos = np.array([[cos(angle)] for angle in angles])
@@ -79,6 +81,23 @@ class Proximity:
     def together(sensors: Sequence[Proximity]) -> ProximityBatch:
         """Return these as one; all have as many rays."""
         return ProximityBatch(sensors)
+
+    @staticmethod
+    def rays(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Numbers:
+        """Return both ends of each ray: from a rover's hull to what it meets, or as far as the sensor reaches.
+
+        All have as many rays.
+        """
+        ways, found = ways_of(sensors, numbers), []
+        turns = 2.0 * np.pi * np.arange(sensors[0]._rays) / sensors[0]._rays
+        for row, one in enumerate(sensors):
+            x, y, z = numbers[one._position : one._position + 3]
+            angles, radius = numbers[one._heading] + turns, one.radius_m
+            ends = np.clip(ways[row], radius, radius + one.range_m)
+            east, north, height = np.cos(angles), np.sin(angles), np.full(len(turns), z + one._height_m)
+            lines = [x + radius * east, y + radius * north, height, x + ends * east, y + ends * north, height]
+            found.append(np.stack(lines, axis=1))
+        return np.concatenate(found)
 
 
 class ProximityBatch:

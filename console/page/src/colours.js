@@ -64,13 +64,8 @@ export function lossGradient() {
 
 /** Colour and sign of each kind of mark: nobody has to tell them by colour alone. */
 export const MARKS = /** @type {Record<string, {colour: string, sign: string, text: string}>} */ ({
-  goal: { colour: "#e69f00", sign: "★", text: "goals" },
-  kickoff: { colour: "#56b4e9", sign: "○", text: "kick-offs" },
-  out: { colour: "#56b4e9", sign: "◇", text: "out" },
-  dead: { colour: "#56b4e9", sign: "–", text: "lay still" },
   event: { colour: "#56b4e9", sign: "◆", text: "events" },
   down: { colour: "#d55e00", sign: "▼", text: "out of service" },
-  empty: { colour: "#d55e00", sign: "▽", text: "empty batteries" },
   quarantine: { colour: "#cc79a7", sign: "□", text: "quarantine" },
   recovery: { colour: "#cc79a7", sign: "▲", text: "recoveries" },
   epoch: { colour: "#cc79a7", sign: "△", text: "epochs" },
@@ -83,7 +78,28 @@ export const MARKS = /** @type {Record<string, {colour: string, sign: string, te
   move: { colour: "#009e73", sign: "⇄", text: "moves" },
 });
 
-/** @param {string} kind */
-export function markStyle(kind) {
-  return MARKS[kind] ?? { colour: "#8c8c8c", sign: "■", text: kind };
+/** How marks look whose kinds the rules of a world bring. */
+const LOOKS = /** @type {Record<string, {colour: string, sign: string}>} */ ({
+  score: { colour: "#e69f00", sign: "★" },
+  start: { colour: "#56b4e9", sign: "○" },
+  away: { colour: "#56b4e9", sign: "◇" },
+  rest: { colour: "#56b4e9", sign: "–" },
+  lost: { colour: "#d55e00", sign: "▽" },
+});
+
+/** @param {string | null | undefined} look */
+export function lookStyle(look) {
+  return look ? LOOKS[look] : undefined;
+}
+
+/**
+ * Colour, sign and name of a kind of marks; `ofRules` are those that the scene brings.
+ * @param {string} kind
+ * @param {Record<string, SceneMark>} [ofRules]
+ */
+export function markStyle(kind, ofRules) {
+  const own = ofRules?.[kind];
+  const look = lookStyle(own?.look);
+  if (own && look) return { ...look, text: own.text };
+  return MARKS[kind] ?? { colour: "#8c8c8c", sign: "■", text: own?.text ?? kind };
 }

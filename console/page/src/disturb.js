@@ -35,7 +35,7 @@ export class Disturb {
 
   async partition() {
     const [from, to] = this.chosen() ?? ["", "rest"];
-    const first = input(from, "rover01, rover02", { required: true });
+    const first = input(from, "names, with commas", { required: true });
     const second = input(to, "rest", { required: true });
     const lasts = lasting("10 s");
     const oneWay = h("input", { type: "checkbox" });

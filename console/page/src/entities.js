@@ -1,7 +1,7 @@
 // The tab "World": what the rules say, the bodies, and what can be done with the one that is selected.
 
 import { dialog, vector } from "./dialogs.js";
-import { counted, number, time } from "./text.js";
+import { counted, time } from "./text.js";
 import { button, byId, field, h, keyed, select, setText } from "./ui.js";
 
 const ROWS_MAX = 400;
@@ -61,15 +61,7 @@ export class Entities {
     const { status } = source;
     /** @type {[string, string][]} */
     const facts = [];
-    if (status?.score) facts.push(["Score", `red ${status.score.red} : ${status.score.blue} blue`]);
-    if (status?.ball) {
-      const [x, y, z] = status.ball.position;
-      facts.push(["Ball", `${number(x)}, ${number(y)}, ${number(z)} m${status.ball.solver ? `, solved by ${status.ball.solver}` : ""}`]);
-    }
-    if (status?.rovers) {
-      const { count, drive, least, charge } = status.rovers;
-      facts.push(["Rovers", `${count}, ${drive} drive; ${least} has ${Math.round(charge * 100)} % of its charge`]);
-    }
+    if (status?.summary?.length) facts.push(["World", status.summary.join("; ")]);
     if (status?.epoch !== undefined) facts.push(["Epoch", String(status.epoch)]);
     if (status?.handovers !== undefined) facts.push(["So far", `${counted(status.handovers, "hand-over")}, ${counted(status.moves ?? 0, "move")}`]);
     if (status?.recording?.state) facts.push(["Capture", [status.recording.state, status.recording.problem].filter(Boolean).join(": ")]);
@@ -107,19 +99,28 @@ export class Entities {
   }
 
   async askAdd() {
-    const [addable] = this.store.main?.scene?.addable ?? [];
+    const addable = this.store.main?.scene?.addable ?? [];
+    const model = select(addable.map((one) => [one.model, one.model]), addable[0]?.model ?? "");
     const name = h("input", { placeholder: "chosen for you", maxlength: 64 });
-    const position = h("input", { value: (addable?.position ?? [0, 0, 0]).join(" "), required: true });
-    const velocity = h("input", { value: (addable?.velocity ?? [0, 0, 0]).join(" "), required: true });
-    const content = [field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
-    await dialog(`Add a ${addable?.model}`, content, {
+    const position = h("input", { value: "", required: true });
+    const velocity = h("input", { value: "", required: true });
+    const usual = () => {
+      const one = addable.find((one) => one.model === model.value);
+      position.value = (one?.position ?? [0, 0, 0]).join(" ");
+      velocity.value = (one?.velocity ?? [0, 0, 0]).join(" ");
+    };
+    model.addEventListener("change", usual);
+    usual();
+    const models = addable.length > 1 ? [field("Model", model)] : [];
+    const content = [...models, field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
+    await dialog(addable.length > 1 ? "Add an entity" : `Add: ${model.value}`, content, {
       action: "Add",
       send: () => {
         const at = vector(position.value, "Position");
         const speed = vector(velocity.value, "Velocity");
         if (typeof at === "string") return at;
         if (typeof speed === "string") return speed;
-        return this.desk.ask("add", { ...(name.value ? { name: name.value } : {}), position: at, velocity: speed });
+        return this.desk.ask("add", { model: model.value, ...(name.value ? { name: name.value } : {}), position: at, velocity: speed });
       },
     });
   }

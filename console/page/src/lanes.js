@@ -1,6 +1,6 @@
 // What held and what happened over a run, a lane for each kind. It needs no server: a report inlines it.
 
-import { markStyle } from "./colours.js";
+import { lookStyle, markStyle } from "./colours.js";
 import { ticks } from "./text.js";
 import { h } from "./ui.js";
 
@@ -8,6 +8,7 @@ import { h } from "./ui.js";
  * @typedef {object} Lane
  * @property {string} name
  * @property {string} [mark] the kind of what happened, by whose sign it is drawn
+ * @property {string | null} [look] how that looks, where a rule of the world says so
  * @property {string} [colour] of what held
  * @property {{from: number, to?: number, text: string}[]} entries (s); without an end it is a moment
  */
@@ -20,8 +21,8 @@ import { h } from "./ui.js";
 export function drawLanes(place, lanes, [start, end]) {
   const share = (/** @type {number} */ at) => (end > start ? (Math.min(end, Math.max(start, at)) - start) / (end - start) : 0);
   const percent = (/** @type {number} */ part) => `${(100 * part).toFixed(3)}%`;
-  const rows = lanes.map(({ name, mark, colour, entries }) => {
-    const style = markStyle(mark ?? "");
+  const rows = lanes.map(({ name, mark, look, colour, entries }) => {
+    const style = lookStyle(look) ?? markStyle(mark ?? "");
     const drawn = entries.map(({ from, to, text }) => {
       const element = to === undefined ? h("b", { title: text }, style.sign) : h("i", { title: text });
       element.style.left = percent(share(from));

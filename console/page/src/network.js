@@ -206,7 +206,7 @@ export function oldText(status) {
 }
 
 /**
- * An event in words, as the supervisor's answers have it: `partition rover01 | rest, for 10 s`. @param {any} event
+ * An event in words, as the supervisor's answers have it: `partition arm1 | rest, for 10 s`. @param {any} event
  */
 export function eventText(event) {
   const lasts = event.for ? `, for ${typeof event.for === "string" ? event.for : `${event.for.exponential} on average`}` : "";

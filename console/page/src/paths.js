@@ -12,9 +12,6 @@ const STEP_M = 0.004;
 /** A page that is behind gets poses that lie apart: what may be a way, and what a jump, is told by no more than this. */
 const GAP_S = 0.04;
 
-/** What puts a body elsewhere. */
-const CUTS = new Set(["goal", "kickoff", "out", "dead"]);
-
 class Path {
   /** @param {number} link @param {string} colour */
   constructor(link, colour) {
@@ -64,11 +61,14 @@ export class Paths {
     /** @type {Path[]} */
     this.paths = [];
     this.tick = -1;
+    /** @type {Record<string, SceneMark>} */
+    this.kinds = {};
   }
 
   /** Begin anew with the bodies of a scene. @param {SceneMessage} scene */
   build(scene) {
     this.clear();
+    this.kinds = scene.marks;
     scene.bodies.slice(0, BODIES_MAX).forEach((body, index) => {
       if (!body.links.length) return;
       const path = new Path(body.links[body.links.length - 1], paletteColour(index + 1));
@@ -84,7 +84,7 @@ export class Paths {
    * @param {Mark[]} marks
    */
   add(poses, tick_s, marks) {
-    const cut = poses.jump || marks.some(({ tick, kind }) => tick > this.tick && tick <= poses.tick && CUTS.has(kind));
+    const cut = poses.jump || marks.some(({ tick, kind }) => tick > this.tick && tick <= poses.tick && this.kinds[kind]?.cut);
     for (const path of this.paths) path.add(poses.links, poses.tick, tick_s, cut);
     this.tick = poses.tick;
   }

@@ -35,7 +35,7 @@ export class PlotPanel {
     this.end_s = null;
     this.next_ms = 0;
     this.names = h("datalist", { id: "plottable" });
-    this.pick = h("input", { id: "pick", list: "plottable", placeholder: "Pick a value: red.goal, command, lag_ms, loss …", autocomplete: "off", spellcheck: false });
+    this.pick = h("input", { id: "pick", list: "plottable", placeholder: "Pick a value: an entity, command, lag_ms, loss …", autocomplete: "off", spellcheck: false });
     this.span = select(SPANS, String(this.span_s), { "aria-label": "Length of the time axis", onchange: () => this._spanned() });
     this.back = h("input", { type: "range", min: 0, max: 0, value: 0, step: "any", "aria-label": "Scroll back", oninput: () => this._scrolled() });
     this.live = button("Live", () => this.follow(), { "aria-pressed": "true", title: "Follow the newest values" });

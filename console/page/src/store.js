@@ -51,7 +51,7 @@ export class Source {
   ownerOf(body) {
     const nodes = this.status?.nodes ?? {};
     for (const [node, account] of Object.entries(nodes)) if (account.owned?.includes(body)) return node;
-    return this.status?.ball && body === "ball" ? (this.status.ball.solver ?? "") : "";
+    return this.status?.solvers?.[body] ?? "";
   }
 }
 

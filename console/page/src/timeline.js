@@ -1,6 +1,6 @@
 // The bar at the bottom: marks of what happened, by time; for captures and replays the slider, a frame-exact step, loop.
 
-import { MARKS, markStyle } from "./colours.js";
+import { markStyle } from "./colours.js";
 import { time } from "./text.js";
 import { button, byId, h, keyed, setText } from "./ui.js";
 
@@ -60,7 +60,8 @@ export class Timeline {
     setText(this.first, time(source.seconds(first)));
     setText(this.last, time(source.seconds(last)));
     const shown = thinned(source.marks.filter(({ kind }) => !this.hidden.has(kind)), first, last);
-    keyed(this.marks, shown, (mark) => `${mark.tick} ${mark.kind} ${mark.text}`, (mark) => this._mark(mark, source), (element, mark) => {
+    const scene = source.scene?.generation ?? -1; // which says how marks of the world's rules look
+    keyed(this.marks, shown, (mark) => `${scene} ${mark.tick} ${mark.kind} ${mark.text}`, (mark) => this._mark(mark, source), (element, mark) => {
       element.style.left = `${((mark.tick - first) / (last - first)) * 100}%`;
     });
     const kinds = [...new Set(source.marks.map(({ kind }) => kind))].sort();
@@ -70,7 +71,7 @@ export class Timeline {
 
   /** @param {Mark} mark @param {import("./store.js").Source} source */
   _mark(mark, source) {
-    const { colour, sign } = markStyle(mark.kind);
+    const { colour, sign } = markStyle(mark.kind, source.scene?.marks);
     const text = `${time(source.seconds(mark.tick))}, tick ${mark.tick}: ${mark.text}`;
     return button(sign, () => this._went(mark, text), { class: `mark ${mark.kind === "drops" ? "many" : ""}`, style: `color:${colour}`, title: text, "aria-label": text, tabindex: -1 });
   }
@@ -83,8 +84,8 @@ export class Timeline {
 
   /** @param {string} kind */
   _kind(kind) {
-    const { colour, sign, text } = markStyle(kind);
-    const toggle = h("button", { type: "button", "aria-pressed": "true", title: `Show or hide ${text}` }, h("i", { style: `color:${colour}`, "aria-hidden": "true" }, sign), ` ${MARKS[kind] ? text : kind}`);
+    const { colour, sign, text } = markStyle(kind, this.store.main?.scene?.marks);
+    const toggle = h("button", { type: "button", "aria-pressed": "true", title: `Show or hide ${text}` }, h("i", { style: `color:${colour}`, "aria-hidden": "true" }, sign), ` ${text}`);
     toggle.addEventListener("click", () => {
       if (!this.hidden.delete(kind)) this.hidden.add(kind);
       toggle.setAttribute("aria-pressed", String(!this.hidden.has(kind)));

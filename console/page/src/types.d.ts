@@ -21,6 +21,8 @@ interface SceneBody { name: string; model: string; links: number[]; removable: b
 interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
 interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
 interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
+/** A kind of marks that a rule of the world brings; with `cut` something is put elsewhere then. */
+interface SceneMark { look: string; text: string; cut: boolean }
 interface Addable { model: string; position: Vec3; velocity: Vec3 }
 
 interface SceneMessage {
@@ -37,6 +39,8 @@ interface SceneMessage {
   meshes: Record<string, { vertices: string; triangles: string }>;
   bounds: [Vec3, Vec3];
   addable: Addable[];
+  /** The kinds of marks that the rules of the world bring. */
+  marks: Record<string, SceneMark>;
   /** Ids of the link rules that can be set, and all endpoints; absent where there is no deployment. */
   network?: {rules: string[], endpoints: string[]};
 }

@@ -1,0 +1,1 @@
+"""The engines themselves: their interface, what makes them, the bodies of each."""

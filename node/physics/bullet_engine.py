@@ -1,0 +1,531 @@
+"""The Bullet engine: rules under which each tick starts from the frame completely, whatever this engine did before.
+
+Bullet keeps more than positions and velocities: contact points of pairs, search axes, orders of pairs and islands. The
+rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each in turn and sees law 1
+fail, for which the small methods (`_settings`, `_build_order`, `_make_free`, `_make_scenery`, `_end_pairs`) are there.
+This is the only file that imports pybullet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
+from math import fsum, sqrt
+from typing import Any, Final
+
+from foosim.deployment.schema import Deployment
+from foosim.node.physics.quiet import without_lines
+from foosim.world.assembly.sections import physics_of
+from foosim.world.assembly.world import build_scene
+from foosim.world.layout import Entity, Layout
+from foosim.world.mesh import Mesh
+from foosim.world.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
+
+with without_lines(b"pybullet build time:"):
+    import pybullet as p
+
+# Pairs that can touch: free bodies with everything, nothing else. Jointed bodies may run through the scenery, and
+# without a filter a step costs five times as much.
+FREE_GROUP: Final = 1
+JOINTED_GROUP: Final = 2
+SCENERY_GROUP: Final = 4
+
+SPARES_MAX: Final = 4
+MESH_PIECE: Final = 4096
+"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
+PARKING_Z_M: Final = 100.0
+PARKING_STEP_M: Final = 10.0
+"""Parked bodies stand this far apart, far above the scenery: no pair of theirs can touch."""
+REST: Final[Vector] = (0.0, 0.0, 0.0)
+FREE_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_velocity")
+JOINT_TYPES: Final = {"prismatic": p.JOINT_PRISMATIC, "revolute": p.JOINT_REVOLUTE}
+NO_CONTACT: Final = (0.0, 0.0, -1.0)
+SPEED_MAX: Final = 1000.0
+"""Bullet clamps each coordinate's velocity of a multibody at 100 by default: a sphere of 1 cm rolls at 1 m/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """A jointed body: its id in Bullet, its joints, as many zeros, and the places of its numbers in the frame.
+
+    Of each joint `places` are its index and those of position, velocity and effort; `log` is that of the contacts.
+    """
+
+    body: int
+    joints: tuple[int, ...]
+    zeros: tuple[float, ...]
+    places: tuple[tuple[int, int, int, int], ...]
+    log: int
+
+
+_spare_clients: list[int] = []
+"""Connected clients without bodies. Emptied, a client is as new; the laws are tested with such ones, too."""
+
+
+def connect_spares(count: int) -> None:
+    """Connect this many spare clients, so that an engine can be built while ticks continue."""
+    while len(_spare_clients) < count:
+        _spare_clients.append(_connect())
+
+
+def _connect() -> int:
+    client: int = p.connect(p.DIRECT)
+    assert client >= 0, "no physics client is left"
+    return client
+
+
+def _take_client() -> int:
+    return _spare_clients.pop() if _spare_clients else _connect()
+
+
+def _give_client(client: int) -> None:
+    if len(_spare_clients) < SPARES_MAX:
+        p.resetSimulation(physicsClientId=client)
+        _spare_clients.append(client)
+    else:
+        p.disconnect(physicsClientId=client)
+
+
+def _chain(made: int, body: Body, entity: Entity) -> Chain:
+    """Return a jointed body that was made."""
+    count = len(body.links)
+    assert entity.counts["joint_positions"] == count, f"{body.name} has {count} joints"
+    at, speed, effort = (entity.offsets[field] for field in ("joint_positions", "joint_velocities", "joint_efforts"))
+    joints = tuple(range(count))
+    return Chain(
+        made,
+        joints,
+        (0.0,) * count,
+        tuple((joint, at + joint, speed + joint, effort + joint) for joint in joints),
+        entity.offsets["contacts"],
+    )
+
+
+class BulletEngine:
+    """The bodies of one layout in a physics client of their own."""
+
+    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+        """Build scenery and bodies, all parked. Takes about 20 ms for ten bodies, holding the interpreter."""
+        for _ in self._build(deployment, layout):
+            pass
+
+    @classmethod
+    def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletEngine]:
+        """Build one a body at a time, with ticks of another engine in between; a step takes up to 0.5 ms.
+
+        So long as there is a spare client: connecting one takes 15 ms.
+        """
+        engine = cls.__new__(cls)
+        yield from engine._build(deployment, layout)
+        return engine
+
+    def _build(self, deployment: Deployment, layout: Layout) -> Iterator[None]:
+        self._physics = physics_of(deployment)
+        self._substeps = deployment.substeps
+        self._dt = deployment.tick_ns / 1e9 / deployment.substeps
+        self._client: int = _take_client()
+        p.setGravity(0.0, 0.0, -self._physics.gravity, physicsClientId=self._client)
+        p.setPhysicsEngineParameter(**self._settings(), physicsClientId=self._client)
+        yield
+        scene = build_scene(deployment, layout)
+        self._silent: set[int] = set()
+        felt = [shape for shape in scene.scenery if shape.surface in self._physics.surfaces]
+        for shape in in_pieces(felt, MESH_PIECE):
+            made = self._make_scenery(shape)
+            if self._physics.surfaces[shape.surface].silent:
+                self._silent.add(made)
+            yield
+        bodies = {entity.name: scene.bodies[entity.name] for entity in layout.entities if entity.is_rigid}
+        self._free: dict[str, int] = {}
+        self._chains: dict[str, Chain] = {}
+        for name in self._build_order(list(bodies)):
+            if bodies[name].is_free:
+                self._free[name] = self._make_free(bodies[name])
+            else:
+                self._chains[name] = _chain(self._make_jointed(bodies[name]), bodies[name], layout[name])
+            yield
+        self._free, self._chains = dict(sorted(self._free.items())), dict(sorted(self._chains.items()))
+        self._bases = {name: body.position for name, body in bodies.items()}
+        self._jointed_of_id = {chain.body: name for name, chain in self._chains.items()}
+        spots = enumerate(sorted(bodies))
+        self._parking = {name: (0.0, 0.0, PARKING_Z_M + PARKING_STEP_M * index) for index, name in spots}
+        self._loaded_jointed: set[str] = set()
+        self._loaded_free: list[str] = []
+        self._idle: set[str] = set()
+        self._slack: dict[str, list[int]] = {}
+        """Jointed bodies with motors that have no force: the places of these motors' efforts."""
+        self._logs: dict[str, tuple[float, float, float]] = {}
+        self._touching: set[str] = set()
+        for name in self._chains:
+            self._park_jointed(name)
+        self._wipe()
+
+    # --- building ----------------------------------------------------------------------------------------------------
+
+    def _settings(self) -> dict[str, Any]:
+        """Return the parameters of the world (facts, sections 4 and 6)."""
+        return {
+            "fixedTimeStep": self._dt,
+            "numSubSteps": 0,  # more would multiply the force limits of the motors
+            "numSolverIterations": self._physics.solver_iterations,
+            "deterministicOverlappingPairs": 1,  # pairs are solved in an order of names, not of memory
+            "minimumSolverIslandSize": 0,  # else small islands share one solver call, and stop on its common residual
+            "solverResidualThreshold": 0,  # else iteration stops on what the other islands of the call are doing
+            "contactERP": self._physics.contact_erp,  # 0.08 by default: restitution would be e + (0 to 0.08)
+            "contactBreakingThreshold": 0.001,  # 20 mm by default: points of contacts that are no more
+            "restitutionVelocityThreshold": 0.05,  # slower contacts do not bounce: a sphere comes to rest
+            "warmStartingFactor": 0,  # starts from the impulses of the last step, which are not in the frame
+            "contactSlop": 0,  # a tolerated penetration shifts where a contact begins
+            "collisionFilterMode": 0,  # a pair needs both masks
+        }
+
+    def _build_order(self, names: list[str]) -> list[str]:
+        """Return the order in which bodies are made: by name, since it sorts pairs and islands."""
+        return sorted(names)
+
+    def _make_scenery(self, shape: Shape, rigid: bool = True) -> int:
+        """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
+        body: int = p.createMultiBody(
+            baseMass=0.0,
+            baseCollisionShapeIndex=self._make_scenery_shape(shape),
+            basePosition=shape.position,
+            baseOrientation=shape.orientation,
+            useMaximalCoordinates=rigid,
+            physicsClientId=self._client,
+        )
+        p.setCollisionFilterGroupMask(body, -1, SCENERY_GROUP, FREE_GROUP, physicsClientId=self._client)
+        self._make_surface(body, -1, shape.surface)
+        return body
+
+    def _make_free(self, body: Body, rigid: bool = False) -> int:
+        """Make a free body as a multibody: a rigid body's world inertia tensor is not reloaded with its pose."""
+        (link,) = body.links
+        made: int = p.createMultiBody(
+            baseMass=link.mass,
+            baseCollisionShapeIndex=self._make_shape(link.shapes, placed=False),
+            useMaximalCoordinates=rigid,
+            physicsClientId=self._client,
+        )
+        p.setCollisionFilterGroupMask(
+            made, -1, FREE_GROUP, FREE_GROUP | JOINTED_GROUP | SCENERY_GROUP, physicsClientId=self._client
+        )
+        self._make_dynamics(made, -1, link.mass, link.inertia)
+        self._make_surface(made, -1, None)
+        p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=self._client)
+        return made
+
+    def _make_jointed(self, body: Body) -> int:
+        """Make a jointed body as a multibody on a fixed base, with limits on what slides."""
+        links = body.links
+        count = len(links)
+        made: int = p.createMultiBody(
+            baseMass=0.0,
+            basePosition=body.position,
+            linkMasses=[link.mass for link in links],
+            linkCollisionShapeIndices=[self._make_shape(link.shapes, placed=True) for link in links],
+            linkVisualShapeIndices=[-1] * count,
+            linkPositions=[REST] * count,
+            linkOrientations=[UPRIGHT] * count,
+            linkInertialFramePositions=[link.centre_of_mass for link in links],
+            linkInertialFrameOrientations=[UPRIGHT] * count,
+            linkParentIndices=list(range(count)),
+            linkJointTypes=[JOINT_TYPES[link.joint] for link in links],
+            linkJointAxis=[link.axis for link in links],
+            useMaximalCoordinates=False,
+            physicsClientId=self._client,
+        )
+        for index, link in enumerate(links):
+            p.setCollisionFilterGroupMask(made, index, JOINTED_GROUP, FREE_GROUP, physicsClientId=self._client)
+            self._make_dynamics(made, index, link.mass, link.inertia)
+            if link.shapes:
+                self._make_surface(made, index, link.shapes[0].surface)
+            if link.joint == "prismatic":
+                p.changeDynamics(
+                    made,
+                    index,
+                    jointLowerLimit=link.limits[0],
+                    jointUpperLimit=link.limits[1],
+                    physicsClientId=self._client,
+                )
+        return made
+
+    def _make_scenery_shape(self, shape: Shape) -> int:
+        """Make a collision shape; a mesh's triangles are handed over as numbers, never as the name of a file."""
+        mesh = shape.geometry
+        if not isinstance(mesh, Mesh):
+            return self._make_shape((shape,), placed=False)
+        made: int = p.createCollisionShape(
+            p.GEOM_MESH,
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.triangles.ravel().tolist(),
+            physicsClientId=self._client,
+        )
+        assert made >= 0, shape
+        return made
+
+    def _make_shape(self, shapes: Sequence[Shape], placed: bool) -> int:
+        """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1."""
+        if not shapes:
+            return -1
+        parts: dict[str, list[Any]] = {
+            key: [] for key in ("shapeTypes", "halfExtents", "radii", "lengths", "positions", "orientations")
+        }
+        for shape in shapes:
+            geometry = shape.geometry
+            assert not isinstance(geometry, Mesh), "meshes are scenery"
+            kind = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER}[type(geometry)]
+            parts["shapeTypes"].append(kind)
+            parts["halfExtents"].append(geometry.half if isinstance(geometry, Box) else REST)
+            parts["radii"].append(0.0 if isinstance(geometry, Box) else geometry.radius)
+            parts["lengths"].append(geometry.length if isinstance(geometry, Cylinder) else 0.0)
+            parts["positions"].append(shape.position if placed else REST)
+            parts["orientations"].append(shape.orientation if placed else UPRIGHT)
+        made: int = p.createCollisionShapeArray(
+            shapeTypes=parts["shapeTypes"],
+            halfExtents=parts["halfExtents"],
+            radii=parts["radii"],
+            lengths=parts["lengths"],
+            collisionFramePositions=parts["positions"],
+            collisionFrameOrientations=parts["orientations"],
+            physicsClientId=self._client,
+        )
+        assert made >= 0, shapes
+        return made
+
+    def _make_dynamics(self, body: int, link: int, mass: float, inertia: Vector) -> None:
+        """Set mass, inertia and damping of a body, and check that Bullet has accepted them."""
+        client = self._client
+        # Bullet's own inertia is that of the shapes' bounding box. It must be set together with the mass (alone, it
+        # makes the mass 0) and without anything else (together with a damping it is dropped silently).
+        p.changeDynamics(body, link, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
+        # Damping is 0.04 by default, which stops a rolling multibody within seconds.
+        for value in ({"linearDamping": 0.0}, {"angularDamping": 0.0}, {"jointDamping": 0.0}):
+            p.changeDynamics(body, link, **value, physicsClientId=client)
+        p.changeDynamics(body, link, maxJointVelocity=SPEED_MAX, physicsClientId=client)
+        info = p.getDynamicsInfo(body, link, physicsClientId=client)
+        assert (info[0], info[2]) == (mass, inertia), (info, mass, inertia)
+
+    def _make_surface(self, body: int, link: int, surface: str | None) -> None:
+        """Set what makes the values of a pair: products of both sides' restitution and friction.
+
+        A free body (`surface` is None) has the roots of the values of two of them, everything else what makes the
+        product with a free body its pair value; rolling friction is (each side's own times the other's friction), and a
+        free body's own is 0.
+        """
+        between = self._physics.between_free
+        bounce, grip = sqrt(between.restitution), sqrt(between.friction)
+        if surface is None:
+            values = (bounce, grip, 0.0)
+        else:
+            pair = self._physics.surfaces[surface]
+            values = (pair.restitution / bounce, pair.friction / grip, pair.rolling_friction / grip)
+        p.changeDynamics(
+            body,
+            link,
+            restitution=values[0],
+            lateralFriction=values[1],
+            rollingFriction=values[2],
+            spinningFriction=0.0,
+            contactProcessingThreshold=0.0,  # contacts ahead of the touch spoil restitution at low speed
+            physicsClientId=self._client,
+        )
+
+    # --- parking -----------------------------------------------------------------------------------------------------
+
+    def _park_jointed(self, name: str) -> None:
+        """Take a jointed body out of the way, at rest, and let it sleep: awake, it costs 2 us a substep."""
+        chain, client = self._chains[name], self._client
+        p.resetBasePositionAndOrientation(chain.body, self._parking[name], UPRIGHT, physicsClientId=client)
+        for joint in chain.joints:
+            p.resetJointState(chain.body, joint, 0.0, 0.0, physicsClientId=client)
+        self._motors_off(chain)
+        p.changeDynamics(
+            chain.body,
+            -1,
+            activationState=p.ACTIVATION_STATE_ENABLE_SLEEPING | p.ACTIVATION_STATE_SLEEP,
+            physicsClientId=client,
+        )
+
+    def _fetch_jointed(self, name: str) -> None:
+        """Put a parked body's base back to its place and wake it."""
+        body, client = self._chains[name].body, self._client
+        p.resetBasePositionAndOrientation(body, self._bases[name], UPRIGHT, physicsClientId=client)
+        p.changeDynamics(
+            body,
+            -1,
+            activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING | p.ACTIVATION_STATE_WAKE_UP,
+            physicsClientId=client,
+        )
+
+    def _motors_off(self, chain: Chain) -> None:
+        p.setJointMotorControlArray(
+            chain.body,
+            chain.joints,
+            p.VELOCITY_CONTROL,
+            targetVelocities=chain.zeros,
+            forces=chain.zeros,
+            physicsClientId=self._client,
+        )
+
+    def _wipe(self) -> None:
+        """Forget all contacts: of every pair that can touch one is free, and free bodies far away end their pairs."""
+        for name, body in self._free.items():
+            p.resetBasePositionAndOrientation(body, self._parking[name], UPRIGHT, self._client)
+        self._end_pairs()
+
+    def _end_pairs(self) -> None:
+        """Let Bullet notice which pairs are no more."""
+        p.performCollisionDetection(physicsClientId=self._client)
+
+    def _wake_fetched(self) -> None:
+        """Step once: Bullet wakes a body at the end of a step, and does not move it before."""
+        p.stepSimulation(physicsClientId=self._client)
+
+    def _change_jointed(self, wanted: set[str]) -> None:
+        """Park and fetch jointed bodies until `wanted` are at their places. All free bodies are parked."""
+        for name in sorted(self._loaded_jointed - wanted):
+            self._park_jointed(name)
+        fetched = sorted(wanted - self._loaded_jointed)
+        for name in fetched:
+            self._fetch_jointed(name)
+        if fetched:
+            self._wake_fetched()
+        self._loaded_jointed = wanted
+
+    # --- the tick ----------------------------------------------------------------------------------------------------
+
+    def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
+        """Wipe what the engine remembers and set these bodies to their state; park all others."""
+        client, reset = self._client, p.resetJointState
+        self._wipe()
+        chains, free = self._chains, self._free
+        jointed = {entity.name for entity in entities if entity.name in chains}
+        if jointed != self._loaded_jointed:
+            self._change_jointed(jointed)
+        self._idle = jointed.copy()
+        self._slack = {}
+        self._loaded_free = []
+        last = self._substeps - 1.0
+        self._logs = {}
+        self._touching = set()
+        for entity in entities:
+            name = entity.name
+            chain = chains.get(name)
+            if chain is not None:
+                body = chain.body
+                for joint, at, speed, _ in chain.places:
+                    reset(body, joint, state[at], state[speed], client)
+                log = chain.log
+            elif name in free:
+                self._load_free(entity, state)
+                log = entity.offsets["contacts"]
+            else:
+                continue
+            if state[log + 2] == last:
+                self._touching.add(name)
+        if len(self._loaded_free) < len(free):
+            for name, body in free.items():
+                if name not in self._loaded_free:  # it would fall faster and faster
+                    p.resetBaseVelocity(body, REST, REST, client)
+
+    def _load_free(self, entity: Entity, state: Sequence[float]) -> None:
+        body, offsets = self._free[entity.name], entity.offsets
+        at, turned = offsets["position"], offsets["orientation"]
+        velocity, spin = offsets["linear_velocity"], offsets["angular_velocity"]
+        p.resetBasePositionAndOrientation(body, state[at : at + 3], state[turned : turned + 4], self._client)
+        p.resetBaseVelocity(body, state[velocity : velocity + 3], state[spin : spin + 3], self._client)
+        self._loaded_free.append(entity.name)
+
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units).
+
+        Bullet sorts motors by island, unstably. That reorders nothing where the joints of a body do not couple.
+        """
+        client, mode, drive, chains = self._client, p.VELOCITY_CONTROL, p.setJointMotorControlArray, self._chains
+        for entity, motors in zip(entities, commands, strict=True):
+            name = entity.name
+            chain = chains.get(name)
+            if chain is not None:
+                if len(chain.joints) == 2:  # takes a third of what zip does
+                    (one, force), (other, torque) = motors
+                    speeds, forces = (one, other), (force, torque)
+                else:
+                    speeds, forces = zip(*motors, strict=True)
+                drive(chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
+                self._idle.discard(name)
+                if 0.0 in forces:
+                    self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
+
+    def step(self, substeps: int) -> None:
+        """Advance the loaded bodies by `substeps` substeps and log their contacts."""
+        assert substeps == self._substeps, (substeps, self._substeps)
+        for name in sorted(self._idle):  # else it would follow a command of an earlier tick
+            self._motors_off(self._chains[name])
+            self._slack[name] = [place for _, _, _, place in self._chains[name].places]
+        client = self._client
+        for substep in range(substeps):
+            p.stepSimulation(client)
+            touched: dict[str, list[float]] = {}
+            for name in self._loaded_free:
+                self._collect(name, touched)
+            if touched:
+                self._log(substep, touched)
+            self._touching = set(touched)
+
+    def _collect(self, name: str, touched: dict[str, list[float]]) -> None:
+        """Add the normal impulses of a free body's contacts to it and to the jointed bodies that it touches."""
+        body = self._free[name]
+        for point in p.getContactPoints(body, physicsClientId=self._client):
+            other = point[2] if point[1] == body else point[1]
+            force = point[9]
+            if other in self._silent or force <= 0.0:
+                continue
+            impulse = force * self._dt
+            touched.setdefault(name, []).append(impulse)
+            jointed = self._jointed_of_id.get(other)
+            if jointed is not None:
+                touched.setdefault(jointed, []).append(impulse)
+
+    def _log(self, substep: int, touched: dict[str, list[float]]) -> None:
+        """Count touches that begin, sum impulses, note the last substep.
+
+        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
+        """
+        for name, impulses in touched.items():
+            count, total, _ = self._logs.get(name, NO_CONTACT)
+            self._logs[name] = (count + (name not in self._touching), total + fsum(impulses), float(substep))
+
+    def read(self, entities: Sequence[Entity], state: list[float]) -> None:
+        """Write position, velocity and the tick's contact log of these bodies into `state`."""
+        client, states, chains, logs, slack = self._client, p.getJointStates, self._chains, self._logs, self._slack
+        for entity in entities:
+            name = entity.name
+            chain = chains.get(name)
+            if chain is not None:
+                joints = states(chain.body, chain.joints, client)
+                for joint, at, speed, effort in chain.places:
+                    state[at], state[speed], _, state[effort] = joints[joint]
+                log = chain.log
+            elif name in self._free:
+                self._read_free(entity, state)
+                log = entity.offsets["contacts"]
+            else:
+                continue
+            state[log : log + 3] = logs.get(name, NO_CONTACT)
+            if slack and name in slack:
+                for place in slack[name]:  # without a force Bullet keeps what a motor applied last
+                    state[place] = 0.0
+
+    def _read_free(self, entity: Entity, state: list[float]) -> None:
+        body, offsets = self._free[entity.name], entity.offsets
+        position, orientation = p.getBasePositionAndOrientation(body, self._client)
+        velocity, turning = p.getBaseVelocity(body, self._client)
+        for field, values in zip(FREE_FIELDS, (position, orientation, velocity, turning), strict=True):
+            at = offsets[field]
+            state[at : at + len(values)] = values
+
+    def close(self) -> None:
+        """Empty the physics client and keep it for the next engine."""
+        if self._client >= 0:
+            _give_client(self._client)
+            self._client = -1

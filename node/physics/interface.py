@@ -1,0 +1,58 @@
+"""The interface of a physics engine to a node: load, command, step, read; and of what makes one.
+
+An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
+complete load of what is solved, from the frame. What is not loaded is parked, out of everybody's way. A change of
+layout builds another engine.
+
+Its bodies are the scene's bodies of those entities that are rigid (`Entity.is_rigid`); others are no engine's. *Free*
+ones are one link each, a sphere; *jointed* ones are chains of links on a fixed base, each of which slides or turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from typing import Protocol
+
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import Entity, Layout
+
+
+class Engine(Protocol):
+    """One physics engine with the bodies of `layout`. `state` is always the whole frame's numbers, in layout order."""
+
+    def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
+        """Wipe what the engine remembers and set these bodies (those with a body) to their state; park all others."""
+
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units)."""
+
+    def step(self, substeps: int) -> None:
+        """Advance the loaded bodies by `substeps` substeps and log their contacts."""
+
+    def read(self, entities: Sequence[Entity], state: list[float]) -> None:
+        """Write position, velocity and the tick's contact log of these bodies into `state`.
+
+        Of each joint, too, what its motor applied in the last substep: a force (N) or a torque (N m).
+        """
+
+    def close(self) -> None:
+        """Free what the engine holds. It is not used afterwards."""
+
+
+class EngineKind(Protocol):
+    """What a registered engine is made by: one file in `node/engines/`, or a class of another package.
+
+    Its methods import what the engine needs, so that the registry can tell of it where that is not installed.
+    """
+
+    def make(self, deployment: Deployment, layout: Layout) -> Engine:
+        """Return an engine, built at once."""
+
+    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+        """Build an engine in steps, each short enough to do between two ticks of another one."""
+
+    def prepare_spares(self, count: int) -> None:
+        """Get ready what would hold up the ticks when so many more engines are built beside them."""
+
+
+EngineFactory = Callable[[Deployment, Layout], Engine]

@@ -1,0 +1,64 @@
+"""The engine of a deployment, by its name in the registry. Its implementation is imported when it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import Final
+
+from foosim.deployment.schema import Deployment
+from foosim.node.physics.interface import Engine, EngineKind
+from foosim.world.forms import registry
+from foosim.world.layout import Entity, Layout
+
+SPARES: Final = 2
+"""Engines that a node may build before the first one is given back: the next layout's, and the one after that."""
+
+
+def kind_of(deployment: Deployment) -> EngineKind:
+    """Return the registered engine that a deployment names."""
+    kind: EngineKind = registry.find("engine", deployment.engine).made()
+    return kind
+
+
+class NoEngine:
+    """The engine of a layout without rigid bodies."""
+
+    def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
+        """Nothing is loaded."""
+        assert not entities, entities
+
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+        """There are no motors."""
+
+    def step(self, substeps: int) -> None:
+        """Nothing moves."""
+
+    def read(self, entities: Sequence[Entity], state: list[float]) -> None:
+        """Nothing has moved."""
+
+    def close(self) -> None:
+        """It holds nothing."""
+
+
+def has_rigid(layout: Layout) -> bool:
+    """Whether a layout has bodies for an engine."""
+    return any(entity.is_rigid for entity in layout.entities)
+
+
+def make_engine(deployment: Deployment, layout: Layout) -> Engine:
+    """Return the engine of a layout's rigid bodies, built at once."""
+    return kind_of(deployment).make(deployment, layout) if has_rigid(layout) else NoEngine()
+
+
+def prepare_spares(deployment: Deployment, layout: Layout) -> None:
+    """Get ready what would hold up the ticks later, when another engine is built beside them."""
+    if has_rigid(layout):
+        kind_of(deployment).prepare_spares(SPARES)
+
+
+def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+    """Build the engine of a layout's rigid bodies in steps, each short enough to do between two ticks."""
+    if has_rigid(layout):
+        return (yield from kind_of(deployment).in_steps(deployment, layout))
+    yield
+    return NoEngine()

@@ -1,0 +1,149 @@
+"""A mesh from outside meets the physics engine in a throw-away process first, and only then in one that matters.
+
+What Python can check is checked before (`protocol.mesh`); what is left is that Bullet may crash, hang or use up the
+memory. The throw-away process has 1 GiB of address space, 5 s of processor time a mesh, and can open nothing: it builds
+the world with that mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it ends in any
+other way than well, the run does not begin, and the message says which file did it.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from math import isfinite
+from typing import Final
+
+import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.physics.interface import Engine
+from foosim.node.physics.making import kind_of
+from foosim.protocol.codec import decode_any, encode
+from foosim.world.assembly.world import build_scene, initial_numbers
+from foosim.world.layout import Entity, build_layout
+from foosim.world.mesh import AssetError, Mesh
+from foosim.world.scene import Body, Shape, Vector, place, shape_box
+from foosim.world.scenery import SceneryMesh
+
+TICKS: Final = 100
+CPU_S: Final = 5
+ADDRESS_SPACE_BYTES: Final = 1 << 30
+WALL_S: Final = 300.0
+"""Processor time is what is limited; this is for a process that sleeps."""
+DONE: Final = "done"
+COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
+
+
+def check_models(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
+    """Try the meshes of a deployment, whose text is given, with its engine. Raises AssetError for one that fails."""
+    meshes = {thing: spec.file for thing, spec in deployment.scenery.items() if isinstance(spec, SceneryMesh)}
+    if not meshes or not build_layout(deployment).free:  # motions meet the box around a mesh, which is checked
+        return
+    one_thread = {"OPENBLAS_NUM_THREADS": "1"}  # of which each takes address space
+    try:
+        ended = subprocess.run(
+            command,
+            input=encode([name, text, dict(deployment.asset_files)]),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=WALL_S,
+            env={**os.environ, **one_thread},
+            check=False,
+        )
+        code, lines = ended.returncode, ended.stdout.decode(errors="replace").splitlines()
+    except subprocess.TimeoutExpired as late:
+        code, lines = -signal.SIGALRM, (late.stdout or b"").decode(errors="replace").splitlines()
+    if code == 0 and lines and lines[-1] == DONE:
+        return
+    tried = [line for line in lines if line in meshes]
+    said = [line for line in lines if line not in meshes and line != DONE]
+    where = f"{meshes[tried[-1]]}: scenery.{tried[-1]}" if tried else f"{name}: its scenery"
+    raise AssetError(f"{where} failed its trial with the engine {deployment.engine}: {_reason(code, said)}")
+
+
+def _reason(code: int, said: Sequence[str]) -> str:
+    if said:
+        return said[-1]
+    if code in (-signal.SIGXCPU, -signal.SIGALRM):
+        return f"it took more than {CPU_S} s of processor time, or {WALL_S:g} s"
+    return f"the process was ended by {signal.Signals(-code).name}" if code < 0 else f"the process ended with {code}"
+
+
+# --- in the throw-away process ---------------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Try what standard input holds; say each thing's name before, and in the end that all is done."""
+    report = os.dup(1)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 1)  # where Bullet prints
+    name, text, files = decode_any(tuple[str, str, dict[str, bytes]], sys.stdin.buffer.read())
+    deployment = load_deployment(text, name)
+    kind_of(deployment).make(deployment.model_copy(update={"scenery": {}}), build_layout(deployment)).close()
+    _limit(resource.RLIMIT_CORE, 0)
+    _limit(resource.RLIMIT_NOFILE, 0)
+    _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)
+    for thing, spec in sorted(deployment.scenery.items()):
+        if isinstance(spec, SceneryMesh):
+            os.write(report, f"{thing}\n".encode())
+            alone = deployment.model_copy(update={"scenery": {thing: spec}}).with_assets(files)
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + CPU_S)
+            try:
+                _try(alone)
+            except (AssertionError, MemoryError, ArithmeticError) as error:
+                os.write(report, f"{type(error).__name__} {' '.join(str(error).split())[:200]}\n".encode())
+                raise
+    os.write(report, f"{DONE}\n".encode())
+
+
+def _limit(what: int, value: int) -> None:
+    resource.setrlimit(what, (value, resource.getrlimit(what)[1]))
+
+
+def _try(deployment: Deployment) -> None:
+    """Build the world with its one mesh and step it with each free body: from above, and from within a triangle."""
+    layout = build_layout(deployment)
+    engine = kind_of(deployment).make(deployment, layout)
+    (shape,) = deployment.scenery_shapes()
+    assert isinstance(shape.geometry, Mesh), shape
+    low, high = shape_box(shape)
+    bodies = build_scene(deployment, layout).bodies
+    for entity in layout.entities:
+        if entity.is_rigid and bodies[entity.name].is_free:
+            top = ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + _radius(bodies[entity.name]))
+            for start in (top, _inside(shape, shape.geometry)):
+                _drop(deployment, engine, entity, initial_numbers(deployment, layout), start)
+    engine.close()
+
+
+def _radius(body: Body) -> float:
+    """Return how far below its middle a body at rest begins."""
+    return -shape_box(body.links[0].shapes[0])[0][2]
+
+
+def _inside(shape: Shape, mesh: Mesh) -> Vector:
+    """Return the middle of the first triangle, in the world."""
+    x, y, z = mesh.vertices[mesh.triangles[0]].mean(axis=0).tolist()
+    position, _ = place(Shape(mesh, shape.surface, shape.colour, (x, y, z)), shape.position, shape.orientation)
+    return position
+
+
+def _drop(deployment: Deployment, engine: Engine, body: Entity, numbers: list[float], start: Vector) -> None:
+    """Let a free body, which is at rest in a world's numbers, start from somewhere else."""
+    at = body.offsets["position"]
+    numbers[at : at + 3] = start
+    for _ in range(TICKS // 2):
+        engine.load((body,), numbers)
+        engine.step(deployment.substeps)
+        engine.read((body,), numbers)
+        if not all(isfinite(number) for number in numbers):
+            raise ArithmeticError("a body that touches it is nowhere: its position is not finite")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,95 @@
+"""A world of nearly all forms: a football table beside rovers in a hall, with all sensors and modifiers.
+
+Whoever computes which robot on however many nodes, with moves and objects made anew, it is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.component_check import broken_laws
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.assembly.used_forms import forms_of
+from foosim.world.forms import registry
+from foosim.world.forms.registry import FORMS
+
+DEPLOY: Final = Path(__file__).parents[2] / "deploy"
+TICKS: Final = 300
+NAME: Final = "mixed.yaml"
+MODIFIERS: Final[dict[str, Any]] = {
+    "pose": [
+        {"kind": "gaussian_noise", "std": {"position": "1 cm", "heading": "1 deg"}},
+        {"kind": "frame_change", "x": "1 m", "yaw": "10 deg"},
+    ],
+    "odometry": [{"kind": "bias_walk", "initial": "1 mm", "walk": "1 mm"}, {"kind": "delay", "time": "20 ms"}],
+    "battery": [{"kind": "quantise", "step": {"voltage": "100 mV"}}, {"kind": "drop_out", "probability": "20 %"}],
+    "proximity": [{"kind": "clip", "low": "10 cm", "high": "2 m"}],
+}
+UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table")}
+"""Scenes are those of the kits; one engine computes."""
+
+
+def written(data: dict[str, Any]) -> str:
+    """The text of plain data; what it shares is written each time, for deployments have no anchors."""
+    return yaml.safe_dump(json.loads(json.dumps(data)), sort_keys=False)
+
+
+@cache
+def mixed() -> str:
+    """The table's deployment, with a hall around it, two rovers and a station."""
+    data = yaml.safe_load((DEPLOY / "table.yaml").read_text())
+    hall = yaml.safe_load((DEPLOY / "warehouse.yaml").read_text())["hall"]
+    sensors = {name: {"kind": name, "rate": "50 Hz", "modifiers": modifiers} for name, modifiers in MODIFIERS.items()}
+    sensors["proximity"] |= {"rays": 8, "range": "4 m"}
+    data["hall"] = hall
+    data["robots"] |= {
+        "rover-1": {"model": "rover", "x": "1.4 m", "y": "0 m", "heading": "170 deg", "sensors": sensors},
+        "rover-2": {"model": "rover", "x": "-1.6 m", "y": "1 m", "charge": "50 %", "sensors": sensors},
+        "charger": {"model": "station", "x": "-3 m", "y": "1 m"},
+    }
+    data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
+    for player in data["players"].values():
+        player.pop("process", None)
+    data["table"]["rules"]["kickoff_delay"] = "20 ms"
+    return written(data)
+
+
+def test_every_form_is_in_it() -> None:
+    used = {(form.form, form.name) for form in forms_of(load_deployment(mixed(), NAME))}
+    known = {(form, name) for form in FORMS for name in registry.names(form)}
+    models = {("model", "ball")}
+    assert known - used - models == UNUSED
+
+
+def test_nodes_moves_and_new_objects_change_nothing() -> None:
+    assert list(broken_laws(mixed(), NAME, TICKS)) == []
+
+
+def test_a_kit_changes_nothing_of_another() -> None:
+    """The ball rolls, and rods move, beside rovers as without them."""
+    data = yaml.safe_load(mixed())
+    for name in ("rover-1", "rover-2", "charger"):
+        del data["robots"][name]
+    del data["hall"]
+    data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
+    frames: list[list[list[float]]] = []
+    for text in (mixed(), written(data)):
+        seen: list[list[float]] = []
+
+        def keep(frame: Any, seen: list[list[float]] = seen) -> None:
+            names = ("ball", "red.goal", "blue.attack", "world")
+            seen.append(
+                [n for name in names for n in frame.numbers[frame.layout[name].start : frame.layout[name].stop]]
+            )
+
+        result = rehearse(text, NAME, TICKS, 1, settings=Settings(on_commit=keep))
+        assert not result.json["failed"], result.json["reason"]
+        frames.append(seen)
+    assert frames[0] == frames[1]

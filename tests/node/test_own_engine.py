@@ -1,0 +1,235 @@
+"""Engines by their names: foosim's own, without what they need; one of another package, in a whole run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import jsonschema
+import pytest
+
+from foosim.cli.components import as_json, chosen, lines
+from foosim.common.errors import DeploymentError
+from foosim.deployment.json_schema import deployment_schema
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.node.physics.making import make_engine
+from foosim.rehearsal.run import rehearse
+from foosim.world.assembly import world
+from foosim.world.assembly.world import initial_numbers
+from foosim.world.forms import registry
+from foosim.world.layout import build_layout
+from foosim.world.parameters.table import table_of
+from foosim.world.scene import Scene, Sphere, Vector
+from tests.placing import place_ball
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = TABLE.read_text()
+STILL: Final = '''
+from foosim.world.forms.registry import engine
+
+
+class Engine:
+    """All that it has is where bodies were, and one of them moves."""
+
+    def __init__(self, layout):
+        self.layout = layout
+
+    def load(self, entities, state):
+        self.state = list(state)
+
+    def command(self, entities, commands):
+        self.commands = dict(zip([entity.name for entity in entities], commands, strict=True))
+
+    def step(self, substeps):
+        for name, ((speed, force), _) in self.commands.items():
+            self.state[self.layout[name].offsets["joint_efforts"]] = force
+        if "ball" in self.layout:
+            self.state[self.layout["ball"].offsets["position"]] += 0.0001
+
+    def read(self, entities, state):
+        for entity in entities:
+            state[entity.start : entity.split] = self.state[entity.start : entity.split]
+
+    def close(self):
+        """It holds nothing."""
+
+
+@engine("still", meshes=False)
+class Still:
+    """Moves nothing but the ball."""
+
+    spares = []
+
+    def make(self, deployment, layout):
+        return Engine(layout)
+
+    def in_steps(self, deployment, layout):
+        yield
+        return self.make(deployment, layout)
+
+    def prepare_spares(self, count):
+        self.spares.append(count)
+'''
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on the path with somebody's engine, which is forgotten afterwards."""
+    (tmp_path / "own_still.py").write_text(STILL)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    loaded = dict(registry._loaded)
+    yield tmp_path
+    sys.modules.pop("own_still", None)
+    registry._known.pop(("engine", "still"), None)
+    registry._loaded.clear()
+    registry._loaded.update(loaded)
+
+
+def install(folder: Path) -> None:
+    """Leave what pip leaves of a package whose entry point is the module."""
+    about = folder / "still-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: still\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[foosim.world]\nstill = own_still\n")
+
+
+def problem(*sets: str) -> str:
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(TEXT, TABLE.name, sets)
+    return str(error.value)
+
+
+def test_finding_an_engine_imports_nothing_that_it_needs() -> None:
+    code = """
+import json, sys
+from foosim.world.forms import registry
+found = [registry.find("engine", name) for name in registry.names("engine")]
+heavy = ("numpy", "pybullet", "foosim.node.physics.interface", "foosim.deployment.schema")
+print(json.dumps([[one.name, one.meshes] for one in found] + [name for name in heavy if name in sys.modules]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == [["bullet", True], ["pure", False]]
+
+
+@pytest.mark.usefixtures("site")
+def test_an_engine_of_ones_own_computes_a_run() -> None:
+    result = rehearse(TEXT, TABLE.name, 20, 2, ["engine=own_still:Still"])
+    assert result.json["ticks"] == 20 and result.json["failed"] is False
+    assert sys.modules["own_still"].Still.spares, "it was asked to prepare"
+
+
+@pytest.mark.usefixtures("site")
+def test_its_class_is_what_a_node_makes() -> None:
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, ["engine=own_still:Still"]), TABLE.name)
+    assert type(make_engine(deployment, build_layout(deployment))).__module__ == "own_still"
+
+
+def test_an_installed_engine_is_known_by_its_name(site: Path) -> None:
+    assert "unknown engine (there are: bullet, pure), 'still'" in problem("engine=still")
+    install(site)
+    assert registry.names("engine") == ["bullet", "pure", "still"]
+    assert "engine: unknown engine (there are: bullet, pure, still), 'stil', nearest is 'still'" in problem(
+        "engine=stil"
+    )
+    apply_sets(TEXT, TABLE.name, ["engine=still"])
+    (own,), (installed,) = (
+        [one["enum"] for one in deployment_schema(installed=theirs)["properties"]["engine"]["anyOf"] if "enum" in one]
+        for theirs in (False, True)
+    )
+    assert (own, installed) == (["bullet", "pure"], ["bullet", "pure", "still"])
+    (told,) = chosen("engine", "still")
+    assert as_json(told)["meshes"] is False and as_json(told)["class"] == "own_still:Still"
+    assert list(lines(told)) == ["engine still, of own_still:Still", "  Moves nothing but the ball."]
+
+
+@pytest.mark.usefixtures("site")
+def test_an_engine_without_meshes_says_so() -> None:
+    mesh = "scenery={shard: {shape: mesh, file: shard.obj}}"
+    assert "scenery.shard.shape: the engine own_still:Still has no meshes" in problem("engine=own_still:Still", mesh)
+
+
+@pytest.mark.usefixtures("site")
+@pytest.mark.parametrize(
+    ("engine", "reason"),
+    [
+        ("own_absent:Engine", "engine: cannot be imported: ModuleNotFoundError"),
+        ("own_still:Engine", "engine: registered as no engine"),
+        ("own_still:Stil", "engine: own_still registers no such class (there are: Still), 'own_still:Stil'"),
+        ("foosim.world.sensors.pose:PoseTracker", "engine: registered as no engine"),
+        ("3", "engine: not a text, 3"),
+    ],
+)
+def test_what_is_no_engine_is_refused_at_its_place(engine: str, reason: str) -> None:
+    assert reason in problem(f"engine={engine}")
+
+
+@pytest.mark.parametrize(("engine", "is_valid"), [("pure", True), ("a.b:C", True), ("bulet", False), (3, False)])
+def test_the_schema_takes_a_name_or_a_class(engine: object, is_valid: bool) -> None:
+    assert jsonschema.Draft202012Validator(deployment_schema()["properties"]["engine"]).is_valid(engine) is is_valid
+
+
+@pytest.mark.parametrize("engine", registry.names("engine"))
+def test_what_is_not_rigid_is_no_engines(monkeypatch: pytest.MonkeyPatch, engine: str) -> None:
+    """A camera with a body, which the engine neither builds nor minds when it is asked to load it."""
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, [f"engine={engine}"]), TABLE.name)
+    layout = build_layout(deployment)
+    scene = world.build_scene(deployment, layout)
+    strange = Scene({**scene.bodies, "camera": scene.bodies["red.goal"]}, scene.scenery)
+    module = {"bullet": "bullet_engine", "pure": "pure_engine"}[engine]
+    monkeypatch.setattr(f"foosim.node.physics.{module}.build_scene", lambda *_: strange)
+    made = make_engine(deployment, layout)
+    numbers = [0.0] * layout.size
+    made.load([layout["camera"]], numbers)
+    made.step(deployment.substeps)
+    made.read([layout["camera"]], numbers)
+    made.close()
+    assert numbers == [0.0] * layout.size
+
+
+@pytest.mark.parametrize("engine", registry.names("engine"))
+def test_free_bodies_have_sizes_of_their_own(monkeypatch: pytest.MonkeyPatch, engine: str) -> None:
+    """A sphere of twice the radius and four times the mass: both bounce off the wall where they touch it, and meet
+    with the speeds of their masses, (m v + M V -+ e M (v - V)) / (m + M)."""
+    sets = [f"engine={engine}", "table.gravity=0 m/s2", "table.contact_erp=0"]
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
+    layout = build_layout(deployment, [("large", "ball")])
+    scene = world.build_scene(deployment, layout)
+    (link,), radius = scene.bodies["large"].links, 2 * table_of(deployment).ball.radius
+    shape = replace(link.shapes[0], geometry=Sphere(radius))
+    inertia = 0.4 * 4 * link.mass * radius * radius
+    heavy = replace(link, shapes=(shape,), mass=4 * link.mass, inertia=(inertia, inertia, inertia))
+    strange = Scene({**scene.bodies, "large": replace(scene.bodies["large"], links=(heavy,))}, scene.scenery)
+    module = {"bullet": "bullet_engine", "pure": "pure_engine"}[engine]
+    monkeypatch.setattr(f"foosim.node.physics.{module}.build_scene", lambda *_: strange)
+    made = make_engine(deployment, layout)
+    both = [layout["ball"], layout["large"]]
+
+    def after(places: list[Vector], velocities: list[Vector], ticks: int) -> list[float]:
+        """The speeds along x and y of both, one after the other."""
+        numbers = initial_numbers(deployment, layout)
+        for entity, place, velocity in zip(both, places, velocities, strict=True):
+            place_ball(numbers, entity, place, velocity)
+        for _ in range(ticks):
+            made.load(both, numbers)
+            made.step(deployment.substeps)
+            made.read(both, numbers)
+        starts = [entity.offsets["linear_velocity"] for entity in both]
+        return [numbers[start + axis] for start in starts for axis in (0, 1)]
+
+    surfaces, wall = table_of(deployment).surfaces, table_of(deployment).field.width / 2
+    small = table_of(deployment).ball.radius
+    short_of = [(-0.3, wall - small - 0.0201, 0.07), (0.3, wall - radius - 0.0201, 0.07)]
+    assert after(short_of, [(0.0, 1.0, 0.0)] * 2, 10) == [0.0, 1.0, 0.0, 1.0]
+    bounced = after(short_of, [(0.0, 1.0, 0.0)] * 2, 11)
+    assert bounced == pytest.approx([0.0, -surfaces.walls.restitution] * 2, abs=1e-3)
+    apart = small + radius + 0.01
+    met = after([(0.0, 0.0, 0.07), (apart, 0.0, 0.07)], [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], 5)
+    parting = 2.0 * surfaces.balls.restitution
+    mean = (1.0 - 4.0) / 5.0
+    assert met == pytest.approx([mean - 0.8 * parting, 0.0, mean + 0.2 * parting, 0.0], abs=1e-3)
+    made.close()

@@ -1,0 +1,182 @@
+"""The division of a tick's work: islands from the frame alone, solvers from islands, owners and roster.
+
+An island is a set of bodies that could touch each other within the tick: their bounding volumes, grown by *declared*
+speed limit x tick, overlap (not by present speed: a resting ball leaves a kick at 15 m/s). It has one solver, the
+owner of the rod nearest to one of its balls, ties by name. A rover is an island of its own, since it meets the others
+where they were at the tick's start; its owner solves it. The choice never changes a result. Only + - x and
+comparisons, so that all CPUs agree.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+from foosim.world.layout import Layout
+from foosim.world.models.rod import RodRobot, line_x_m
+from foosim.world.parameters.table import TABLE, table_of
+from foosim.world.spec import WorldSpec
+
+MARGIN_M = 0.001
+"""Added to every bounding volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
+    with one half width and one band of z; `balls` are (index, start of the position); `alone` are (index, name) of what
+    touches nobody."""
+
+    ball_m: float
+    rods: tuple[tuple[int, str, float], ...]
+    axes: tuple[float, ...]
+    half_width_m: float
+    z_low_m: float
+    z_high_m: float
+    balls: tuple[tuple[int, int], ...]
+    alone: tuple[tuple[int, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Island:
+    """Indices of its entities, ascending, and the robot (its name) whose owner solves it; empty without one."""
+
+    entities: tuple[int, ...]
+    nearest: str
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one node computes in a tick: its islands and, ascending, every entity index in its part."""
+
+    islands: tuple[tuple[int, ...], ...]
+    solved: tuple[int, ...]
+
+
+def reach_of(spec: WorldSpec, layout: Layout) -> Reach:
+    """Return the bounding volumes of a layout's bodies."""
+    alone = tuple((entity.index, entity.name) for entity in layout.entities if entity.kind.motion)
+    if TABLE not in spec.kits:
+        return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
+    table = table_of(spec)
+    rod = table.rod
+    half = rod.foot.length / 2
+    corner = sqrt(rod.foot_radius * rod.foot_radius + half * half)
+    tick_s = spec.tick_ns / 1e9
+    rods = []
+    for entity in layout.of("rod"):
+        robot = spec.robots[entity.name]
+        assert isinstance(robot, RodRobot)
+        rods.append((entity.index, entity.name, line_x_m(spec, robot)))
+    rods.sort(key=lambda rod: (rod[2], rod[1]))
+    return Reach(
+        ball_m=table.ball.radius + table.ball.speed_limit * tick_s + MARGIN_M,
+        rods=tuple(rods),
+        axes=tuple(axis for _, _, axis in rods),
+        half_width_m=corner + MARGIN_M,
+        z_low_m=rod.axis_height - corner - MARGIN_M,
+        z_high_m=rod.axis_height + corner + MARGIN_M,
+        balls=tuple((entity.index, entity.offsets["position"]) for entity in layout.of("ball")),
+        alone=alone,
+    )
+
+
+Near = tuple[int, int, str]
+"""Of one ball: the range of rods (in order of x) that it could touch within the tick, and the nearest one's name."""
+Touching = tuple[tuple[Near, ...], tuple[tuple[int, int], ...]]
+"""What islands follow from: `Near` of every ball, and the pairs of balls that could touch each other."""
+
+
+def touching_of(numbers: Sequence[float], reach: Reach) -> Touching:
+    """Return the pairs that could touch within the tick that starts from these edited numbers."""
+    near = []
+    limit = reach.ball_m + reach.half_width_m
+    for _, start in reach.balls:
+        x, z = numbers[start], numbers[start + 2]
+        first = last = 0
+        nearest, least = "", limit
+        if z - reach.ball_m <= reach.z_high_m and z + reach.ball_m >= reach.z_low_m:
+            first, last = bisect_left(reach.axes, x - limit), bisect_right(reach.axes, x + limit)
+            for _, name, axis in reach.rods[first:last]:
+                distance = abs(x - axis)
+                if not nearest or distance < least or (distance == least and name < nearest):
+                    nearest, least = name, distance
+        near.append((first, last, nearest))
+    pairs = []
+    for one, (_, start) in enumerate(reach.balls):
+        for other in range(one + 1, len(reach.balls)):
+            there = reach.balls[other][1]
+            if all(abs(numbers[start + axis] - numbers[there + axis]) <= 2 * reach.ball_m for axis in range(3)):
+                pairs.append((one, other))
+    return tuple(near), tuple(pairs)
+
+
+def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tuple[Island, ...]:
+    """Return the islands of an edited frame's bodies, ordered by their first entity.
+
+    An island's nearest rod is the one with the least (distance, name) over its balls.
+    """
+    near, pairs = touching
+    group = list(range(len(near)))
+    links = list(pairs)
+    for one, (first, last, _) in enumerate(near):
+        links += [(one, other) for other in range(one) if max(first, near[other][0]) < min(last, near[other][1])]
+    for one, other in links:
+        low, high = sorted((group[one], group[other]))
+        group = [low if number == high else number for number in group]
+    islands = []
+    taken: set[int] = set()
+    for number in sorted(set(group)):
+        balls = [ball for ball in range(len(near)) if group[ball] == number]
+        rods = {rod for ball in balls for rod in range(near[ball][0], near[ball][1])}
+        members = {reach.balls[ball][0] for ball in balls} | {reach.rods[rod][0] for rod in rods}
+        taken |= members
+        candidates = [
+            (abs(numbers[reach.balls[ball][1]] - reach.rods[rod][2]), reach.rods[rod][1])
+            for ball in balls
+            for rod in range(near[ball][0], near[ball][1])
+        ]
+        islands.append(Island(tuple(sorted(members)), min(candidates)[1] if candidates else ""))
+    islands += [Island((index,), name) for index, name, _ in reach.rods if index not in taken]
+    islands += [Island((index,), name) for index, name in reach.alone]
+    return tuple(sorted(islands, key=lambda island: island.entities))
+
+
+class Assignment:
+    """Shares by node, for one layout, roster and owners; with one ball, equal neighbourhoods give equal shares."""
+
+    def __init__(self, layout: Layout, reach: Reach, roster: Sequence[str], owners: Mapping[str, str]) -> None:
+        assert roster and list(roster) == sorted(roster), roster
+        self.layout = layout
+        self.reach = reach
+        self.roster = tuple(roster)
+        self.owners = dict(owners)
+        self._shares: dict[Touching, dict[str, Share]] = {}
+
+    def solver_of(self, island: Island) -> str:
+        """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
+        return self.owners[island.nearest] if island.nearest else self.roster[0]
+
+    def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
+        """Return every node's share of the tick that starts from these edited numbers."""
+        touching = touching_of(numbers, self.reach)
+        if len(self.reach.balls) > 1:
+            return self._divide(islands_of(numbers, self.reach, touching))
+        shares = self._shares.get(touching)
+        if shares is None:
+            shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
+        return shares
+
+    def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:
+        mine: dict[str, list[tuple[int, ...]]] = {node: [] for node in self.roster}
+        solved: dict[str, list[int]] = {node: [] for node in self.roster}
+        for island in islands:
+            solver = self.solver_of(island)
+            mine[solver].append(island.entities)
+            solved[solver].extend(island.entities)
+        for entity in self.layout.entities:
+            if not entity.is_solved:
+                solved[self.owners.get(entity.name, self.roster[0])].append(entity.index)
+        return {node: Share(tuple(mine[node]), tuple(sorted(solved[node]))) for node in self.roster}

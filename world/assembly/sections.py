@@ -1,0 +1,38 @@
+"""What the kits and the scene of a deployment bring: scenery, and what rigid bodies feel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from foosim.common.finding import Finding
+from foosim.world.forms import registry
+from foosim.world.physics import Physics
+from foosim.world.scene import Shape
+from foosim.world.spec import WorldSpec
+
+
+def kits_of(spec: WorldSpec) -> Iterator[tuple[str, object]]:
+    """Yield the kits of a world, made from their sections, by name in name order."""
+    for name, section in sorted(spec.kits.items()):
+        yield name, registry.find("kit", name).made(section, spec)
+
+
+def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
+    """Return the scenery of kits and scene, which never moves."""
+    shapes = [shape for _, kit in kits_of(spec) for shape in kit.shapes()]  # type: ignore[attr-defined]
+    if spec.scene is not None:
+        shapes += registry.find("scene", spec.scene.kind).made(spec.scene)
+    return tuple(shapes)
+
+
+def physics_of(spec: WorldSpec) -> Physics:
+    """Return what rigid bodies feel: of the one kit that says so, which the check of a deployment makes sure of."""
+    found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]  # type: ignore[attr-defined]
+    assert len(found) == 1, f"{len(found)} kits say what rigid bodies feel"
+    return found[0]  # type: ignore[no-any-return]
+
+
+def findings_of(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield what is wrong with places in the world; meshes count once their files are there."""
+    for _, kit in kits_of(spec):
+        yield from kit.findings()  # type: ignore[attr-defined]

@@ -1,0 +1,85 @@
+"""Which forms a world is made of, and the versions of those that are not foosim's own.
+
+Two nodes with different versions of a form would compute different worlds, and a capture is only repeated by the form
+that it was made with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from hashlib import blake2b
+from importlib.util import find_spec
+from typing import Final
+
+from foosim.world.forms import registry
+from foosim.world.forms.forms import Form
+from foosim.world.forms.settings import ActuatorSettings, SensorSettings
+from foosim.world.layout import find_motion, kits_named, world_rules
+from foosim.world.spec import WorldSpec
+
+OWN: Final = "foosim."
+DIGEST_BYTES: Final = 8
+
+
+def forms_of(spec: WorldSpec) -> list[Form]:
+    """Return the forms that a world is made of, each once, by form and name."""
+    found = {(form.form, form.name): form for form in _forms_of(spec)}
+    return [form for _, form in sorted(found.items())]
+
+
+def _forms_of(spec: WorldSpec) -> Iterator[Form]:
+    yield registry.find("engine", spec.engine)
+    yield from kits_named(spec)
+    for rule in world_rules(spec).values():
+        yield registry.find("rule", rule.kind)
+    if spec.scene is not None:
+        yield registry.find("scene", spec.scene.kind)
+    for robot in spec.robots.values():
+        model = registry.find_model(robot.model)
+        yield model
+        if model.motion:
+            yield find_motion(model)
+        for sensor in robot.sensors.values():
+            yield from _with_modifiers("sensor", sensor)
+        for actuator in robot.actuators.values():
+            yield from _with_modifiers("actuator", actuator)
+        for of_entity in robot.rules.values():
+            yield registry.find("entity_rule", of_entity.kind)
+
+
+def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:
+    yield registry.find(form, settings.kind)
+    for modifier in settings.modifiers:
+        yield registry.find("modifier", modifier.kind)
+
+
+def foreign_versions(spec: WorldSpec) -> dict[str, str]:
+    """Return the versions of the forms of a world that are not foosim's own, by form and class.
+
+    A version is that of the package, if there is one, and a digest of the source of the module.
+    """
+    foreign = [form for form in forms_of(spec) if not form.module.startswith(OWN)]
+    return {f"{form.form} {form.module}:{form.made.__qualname__}": _version(form.module) for form in foreign}
+
+
+@cache
+def _version(module: str) -> str:
+    found = find_spec(module)
+    read = None if found is None else getattr(found.loader, "get_source", None)
+    source = (read(module) or "") if read is not None else ""
+    digest = blake2b(source.encode(), digest_size=DIGEST_BYTES).hexdigest()
+    version = _package_version(module.partition(".")[0])
+    return f"{version} {digest}".lstrip()
+
+
+def _package_version(package: str) -> str:
+    """Return the version of the distribution that a package is of, empty where there is none."""
+    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+
+    for distribution in packages_distributions().get(package, ()):
+        try:
+            return version(distribution)
+        except PackageNotFoundError:
+            continue
+    return ""

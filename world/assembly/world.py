@@ -1,0 +1,257 @@
+"""A deployment's world in the frames of one layout: its models, rules, motions and actuators, made from their forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from foosim.common.keyed_random import draw_key
+from foosim.world.assembly.sections import fixed_shapes, kits_of
+from foosim.world.components.entities import (
+    EntityRule,
+    Marked,
+    MarkKind,
+    Model,
+    Motion,
+    MotionMounting,
+    Motors,
+    Rule,
+    RuleMounting,
+)
+from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.view import ComponentError, Mounting, SolvingView, View, WritableView
+from foosim.world.forms import registry
+from foosim.world.forms.forms import NO_ENTITY
+from foosim.world.frame import Frame
+from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_motion, find_rule, world_rules
+from foosim.world.scene import Body, Scene, Vector
+from foosim.world.spec import WorldSpec
+
+NO_MOTORS: Final[Motors] = ()
+
+
+def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
+    """Return an entity as its model. Raises ComponentError."""
+    at = Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.kind.slots))
+    try:
+        model: Model = entity.kind.made(spec.robots.get(entity.name), at)
+    except Exception as error:
+        raise ComponentError(f"model {entity.model} of {entity.name}", 0, error) from error
+    return model
+
+
+def models_of(spec: WorldSpec, layout: Layout) -> dict[int, Model]:
+    """Return the entities of a layout as their models, by index; the world itself has none. Raises ComponentError."""
+    return {entity.index: model_of(spec, layout, entity) for entity in layout.entities if entity.name != WORLD}
+
+
+def body_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Body:
+    """Return the body of an entity that has one."""
+    body = model_of(spec, layout, entity).body()
+    assert body is not None, entity
+    return body
+
+
+def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
+    """Return the rules of a world by name, in name order. Raises ComponentError."""
+    rules: dict[str, Rule] = {}
+    for label, settings in world_rules(spec).items():
+        found = find_rule(settings)
+        at = RuleMounting(spec, layout, label, draw_key(spec.seed, "rule", label), frozenset(found.writes))
+        try:
+            rules[label] = found.made(settings, at)
+        except Exception as error:
+            raise ComponentError(f"rule {label} of the world", 0, error) from error
+    return rules
+
+
+def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
+    """Return the scene of a layout's bodies in the deployment's world."""
+    bodies: dict[str, Body] = {}
+    for index, model in models_of(spec, layout).items():
+        body = model.body()
+        if body is not None:
+            bodies[layout.entities[index].name] = body
+    return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
+
+
+def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
+    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set."""
+    numbers = [0.0] * layout.size
+    for place in layout.references:
+        numbers[place] = NO_ENTITY
+    view = WritableView(0, numbers)
+    for model in models_of(spec, layout).values():
+        model.place(view)
+    for rule in rules_of(spec, layout).values():
+        if hasattr(rule, "place"):
+            rule.place(view)
+    return numbers
+
+
+def addition(spec: WorldSpec, layout: Layout, name: str, model: str) -> tuple[Vector, Callable[[Vector, Vector], None]]:
+    """Return where another entity of a model is put if nothing is said (m), and what checks a place and a velocity.
+
+    The latter raises BadValue.
+    """
+    after = Layout({**layout.models, name: model}, layout.declared)
+    made: Any = model_of(spec, after, after[name])
+    numbers = [0.0] * after.size
+    made.place(WritableView(0, numbers))
+    start = after[name].offsets["position"]
+    x, y, z = numbers[start : start + 3]
+    return (x, y, z), made.check_place
+
+
+def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
+    """Return what rules and kits show of a frame, for JSON."""
+    view = View(frame.tick, frame.numbers)
+    status: dict[str, Any] = {}
+    for rule in rules_of(spec, frame.layout).values():
+        if hasattr(rule, "status"):
+            status |= rule.status(view)
+    for _, kit in kits_of(spec):
+        if hasattr(kit, "status"):
+            status |= kit.status(frame)
+    return status
+
+
+def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
+    """Return in words what rules and kits show, from what `world_status` returned."""
+    made = [find_rule(settings).made for settings in world_rules(spec).values()]
+    made += [registry.find("kit", name).made for name in sorted(spec.kits)]
+    return [text for one in made if hasattr(one, "text") and (text := one.text(status))]
+
+
+def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
+    """Return the kinds of what rules mark, by name."""
+    made = [find_rule(settings).made for settings in world_rules(spec).values()]
+    made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
+    return {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+
+
+class WorldMarks:
+    """What the rules of a world did between frames, of which the later ones have this layout."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        self.layout = layout
+        self._rules: list[Any] = [rule for rule in rules_of(spec, layout).values() if hasattr(rule, "marks")]
+        self._entity_rules: list[tuple[str, Any]] = [
+            (robot.name, rule)
+            for robot in layout.robots
+            if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
+            for _, rule in _entity_rules_of(spec, layout, robot)
+            if hasattr(rule, "marks")
+        ]
+
+    def between(self, before: Frame, after: Frame) -> list[Marked]:
+        """Return what happened after one frame, up to a later one."""
+        found = [mark for rule in self._rules for mark in rule.marks(before, after)]
+        for robot, rule in self._entity_rules:
+            if robot in before.layout:
+                found += rule.marks(before, after)
+        return found
+
+
+class World:
+    """What computes the ticks of one layout, but for the engine. Raises ComponentError for a form that raises."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        self._spec, self._layout = spec, layout
+        self.models = models_of(spec, layout)
+        self._rules = rules_of(spec, layout)
+        fitted = {robot.index: actuators_of(spec, layout, robot) for robot in layout.robots}
+        self.actuators: Mapping[int, tuple[FittedActuator, ...]] = {
+            index: actuators for index, actuators in fitted.items() if actuators
+        }
+        """What moves each robot that has actuators, by the entity's index."""
+        self._motions = _motions_of(spec, layout)
+        self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
+        self._entity_rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
+
+    def apply_rules(self, numbers: list[float], tick: int) -> None:
+        """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
+        view = WritableView(tick, numbers)
+        for label, rule in self._rules.items():
+            try:
+                rule.apply(view)
+            except Exception as error:
+                raise ComponentError(f"rule {label} of the world", tick, error) from error
+
+    def move(self, entities: Sequence[Entity], before: Sequence[float], numbers: list[float], tick: int) -> None:
+        """Move those of these entities that go on by motions: `before` are the numbers at the tick's start."""
+        groups: dict[str, list[Entity]] = {}
+        for entity in entities:
+            name = self._motion_of.get(entity.index)
+            if name is not None:
+                groups.setdefault(name, []).append(entity)
+        if not groups:
+            return
+        view = SolvingView(tick, before, numbers)
+        for name, moving in sorted(groups.items()):
+            motors = [self.motors(entity, view) for entity in moving]
+            try:
+                self._motions[name].move(moving, motors, view)
+            except Exception as error:
+                raise ComponentError(f"motion {name}", tick, error) from error
+
+    def motors(self, entity: Entity, view: View) -> Motors:
+        """Return what the actuators of an entity ask of its motors, in the order of their channels."""
+        fitted = self.actuators.get(entity.index)
+        if fitted is None:
+            return NO_MOTORS
+        if len(fitted) == 1:
+            return fitted[0].command(view)
+        return tuple([motor for one in fitted for motor in one.command(view)])
+
+    def apply_entity_rules(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
+        """Let the rules of these entities write what follows from their new state."""
+        view = WritableView(tick, numbers)
+        for entity in entities:
+            for label, rule in self._entity_rules.get(entity.index, ()):
+                try:
+                    rule.apply(view)
+                except Exception as error:
+                    raise ComponentError(f"rule {label} of {entity.name}", tick, error) from error
+
+    def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether an entity's new, finite state can be."""
+        return self.models[entity.index].is_plausible(numbers, before)
+
+    def stir(self, numbers: list[float]) -> None:
+        """Set a world at rest in motion, for the fixed small run that tells engines apart."""
+        view = WritableView(0, numbers)
+        for index, model in self.models.items():
+            if hasattr(model, "stir") and self._layout.entities[index].name in self._layout.declared.names:
+                model.stir(view)
+        for fitted in self.actuators.values():
+            for one in fitted:
+                one.actuator.stir(view)
+
+
+def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
+    moving: dict[str, list[Entity]] = {}
+    for entity in layout.entities:
+        if entity.kind.motion:
+            moving.setdefault(entity.kind.motion, []).append(entity)
+    motions: dict[str, Motion] = {}
+    for name, entities in sorted(moving.items()):
+        found = find_motion(entities[0].kind)
+        try:
+            motions[name] = found.made(MotionMounting(spec, layout, name, tuple(entities), frozenset(found.writes)))
+        except Exception as error:
+            raise ComponentError(f"motion {name}", 0, error) from error
+    return motions
+
+
+def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
+    rules = []
+    for label, settings in sorted(spec.robots[robot.name].rules.items()):
+        found = find_entity_rule(settings)
+        key = draw_key(spec.seed, "entity_rule", robot.name, label)
+        try:
+            made = found.made(settings, Mounting(spec, layout, robot, label, key, frozenset(found.writes)))
+        except Exception as error:
+            raise ComponentError(f"rule {label} of {robot.name}", 0, error) from error
+        rules.append((label, made))
+    return tuple(rules)

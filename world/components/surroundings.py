@@ -1,0 +1,77 @@
+"""What forms see of the entities around them: poses of links, who is near, tags, contacts of the last tick.
+
+All of it follows from the frame; entities are in name order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from foosim.world.components.view import Mounting, View
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import WORLD, Entity, Layout
+from foosim.world.scene import Body, Pose, Vector
+from foosim.world.spec import WorldSpec
+
+
+class Contacts(NamedTuple):
+    """The contact log of a rigid body in the last tick: touches that began, impulse (N s), last substep or -1."""
+
+    touches: int
+    impulse: float
+    last_substep: int
+
+
+class Surroundings:
+    """The entities of one layout, as forms see them. What it keeps follows from deployment and layout."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        self._spec, self._layout = spec, layout
+        self._bodies: dict[str, Body | None] = {}
+
+    def tags(self, entity: Entity) -> frozenset[str]:
+        """Return the tags of an entity: those of its model, and those that its settings add."""
+        settings = self._spec.robots.get(entity.name)
+        return frozenset((*entity.kind.tags, *(() if settings is None else settings.tags)))
+
+    def tagged(self, tag: str) -> list[Entity]:
+        """Return the entities that have a tag."""
+        return [entity for entity in self._layout.entities if tag in self.tags(entity)]
+
+    def poses(self, view: View, entity: Entity) -> list[Pose]:
+        """Return name, position (m) and orientation of each link of an entity, in the world frame; none without one."""
+        body = self._body(entity)
+        return [] if body is None else forward_kinematics(body, entity, view.numbers)
+
+    def position(self, view: View, entity: Entity) -> Vector | None:
+        """Return where the first link of an entity is (m, world frame); None of what has none."""
+        poses = self.poses(view, entity)
+        return poses[0][1] if poses else None
+
+    def near(self, view: View, place: Vector, range_m: float, tag: str = "") -> list[Entity]:
+        """Return the entities whose first link is within a range of a place; with a tag, those that have it."""
+        found = []
+        for entity in self._layout.entities if not tag else self.tagged(tag):
+            position = self.position(view, entity)
+            if position is not None:
+                dx, dy, dz = position[0] - place[0], position[1] - place[1], position[2] - place[2]
+                if dx * dx + dy * dy + dz * dz <= range_m * range_m:
+                    found.append(entity)
+        return found
+
+    @staticmethod
+    def contacts(view: View, entity: Entity) -> Contacts:
+        """Return the contact log of a rigid body; nothing of what is none."""
+        at = entity.offsets.get("contacts")
+        if at is None:
+            return Contacts(0, 0.0, -1)
+        touches, impulse, last = view.numbers[at : at + 3]
+        return Contacts(int(touches), impulse, int(last))
+
+    def _body(self, entity: Entity) -> Body | None:
+        if entity.name == WORLD:
+            return None
+        if entity.name not in self._bodies:
+            at = Mounting(self._spec, self._layout, entity, "", b"")
+            self._bodies[entity.name] = entity.kind.made(self._spec.robots.get(entity.name), at).body()
+        return self._bodies[entity.name]

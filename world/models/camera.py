@@ -1,0 +1,31 @@
+"""The camera above the football table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.world.components.view import Mounting, WritableView
+from foosim.world.forms.registry import model
+from foosim.world.forms.settings import RobotSettings
+
+
+class CameraRobot(RobotSettings):
+    """A robot without a body that sees the ball."""
+
+
+@model("camera", CameraRobot, slots={"down": 1, "refused": 1}, has_body=False, kit="table")
+class Camera:
+    """A camera: sensors without a body."""
+
+    def __init__(self, settings: CameraRobot, at: Mounting) -> None:
+        pass
+
+    def body(self) -> None:
+        """Nothing that radio waves or viewers would meet."""
+
+    def place(self, view: WritableView) -> None:
+        """It has no state of its own."""
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Nothing moves it."""
+        return True

@@ -1,0 +1,1 @@
+"""Motions: how entities without rigid-body dynamics go on, one file each."""

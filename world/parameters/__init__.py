@@ -1,0 +1,1 @@
+"""What kits are made from: the settings of their sections, and what follows from these alone."""

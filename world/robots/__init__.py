@@ -1,1 +1,0 @@
-"""Robots as a deployment declares them."""
