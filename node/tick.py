@@ -99,7 +99,7 @@ class Stepper:
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
-        world = self.world if layout is self.layout else World(self.deployment, layout)
+        world = self.world if layout.digest == self.layout.digest else World(self.deployment, layout)
         world.apply_rules(numbers, frame.tick)
         return layout, numbers
 

@@ -59,6 +59,21 @@ def command(slide: float, spin: float) -> bytes:
 # --- what an order does ----------------------------------------------------------------------------------------------
 
 
+def test_a_layout_that_is_equal_has_its_world_already(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each commit that comes by the wire brings a layout of its own; a world is made for one that differs."""
+
+    def made(*_: object) -> None:
+        raise AssertionError("a world is made in a tick")
+
+    monkeypatch.setattr("foosim.node.tick.World", made)
+    equal = build_layout(DEPLOYMENT)
+    frame = Frame(0, equal, np.array(initial_numbers(DEPLOYMENT, equal)))
+    layout, _ = STEPPER.edited(frame, [])
+    assert layout is equal and equal is not STEPPER.layout
+    with pytest.raises(AssertionError, match="a world is made"):
+        STEPPER.edited(frame, [Add("a2", "ball", HERE, REST)])
+
+
 def test_without_edits_and_rules_at_work_the_frame_is_as_it_was() -> None:
     frame = in_play()
     layout, numbers = STEPPER.edited(frame, [])
