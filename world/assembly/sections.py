@@ -33,6 +33,15 @@ def physics_of(spec: WorldSpec) -> Physics:
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong with places in the world; meshes count once their files are there."""
+    """Yield what is wrong with the world as a whole: who says what rigid bodies feel, and places.
+
+    Meshes count once their files are there.
+    """
+    felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]  # type: ignore[attr-defined]
+    for name in felt[1:]:
+        yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
+    for name, robot in spec.robots.items():
+        if not felt and registry.find_model(robot.model).is_rigid:
+            yield Finding(("robots", name, "model"), "a rigid body, in a world without a kit for such", robot.model)
     for _, kit in kits_of(spec):
         yield from kit.findings()  # type: ignore[attr-defined]

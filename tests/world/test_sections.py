@@ -1,0 +1,30 @@
+"""One kit of a world says what rigid bodies feel; who has it otherwise is refused with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.deployment.loader import load_deployment
+from foosim.world.assembly import sections
+from foosim.world.assembly.sections import findings_of, physics_of
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+
+
+def test_the_tables_kit_says_it() -> None:
+    assert list(findings_of(DEPLOYMENT)) == [] and physics_of(DEPLOYMENT).gravity == 9.81
+
+
+def test_two_that_say_it_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    ((_, kit),) = sections.kits_of(DEPLOYMENT)
+    given: list[tuple[str, Any]] = [("table", kit), ("zoo", kit)]
+    monkeypatch.setattr(sections, "kits_of", lambda spec: given)
+    (twice,) = findings_of(DEPLOYMENT)
+    assert (twice.location, twice.what) == (("zoo",), "says what rigid bodies feel, which table says already")
+    given.clear()
+    rigid = [finding.location for finding in findings_of(DEPLOYMENT)]
+    assert rigid == [("robots", name, "model") for name in DEPLOYMENT.robots if name != "camera"]
