@@ -73,11 +73,12 @@ def kits_of(view: PlainData) -> Iterator[tuple[str, Kit]]:
     for key in view.mapping():
         if view.get(key) is not None and key not in DEPLOYMENT_KEYS:
             try:
-                kit = registry.find("kit", key)
+                kit = registry.lookup("kit", key)
             except Refused:
                 continue
-            assert isinstance(kit, Kit), kit
-            yield key, kit
+            if kit is not None:
+                assert isinstance(kit, Kit), kit
+                yield key, kit
 
 
 def _kits(view: View) -> Iterator[Finding]:

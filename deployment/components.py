@@ -97,14 +97,12 @@ class _Reader:
         if not isinstance(key, str):
             return False
         try:
-            registry.find("kit", key)
-        except UnknownName:
-            return False
+            return registry.lookup("kit", key) is not None
+        except UnknownName as error:
+            self.findings.append(Finding((key,), error.problem, key, error.nearest, at="key"))
         except Refused as error:
-            if ":" in key:
-                self.findings.append(Finding((key,), error.what, key, at="key"))
-            return False
-        return True
+            self.findings.append(Finding((key,), error.what, key, at="key"))
+        return False
 
     def kit(self, name: str, section: Any) -> Any:
         """Return the settings of a kit; in place of what is refused, settings without any."""

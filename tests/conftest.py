@@ -21,6 +21,8 @@ from xdist.scheduler import LoadScopeScheduling
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime.roles.loop import GC_THRESHOLDS
+from foosim.world.forms import registry
+from foosim.world.forms.per_field import codec_of
 from tests.meter import Burden, Meter
 
 settings.register_profile(
@@ -66,6 +68,26 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def _own_forms_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What a test registers, imports from its folder and installs there is unknown to the others."""
+    modules, known, loaded = set(sys.modules), set(registry._known), dict(registry._loaded)
+    yield
+    folder = str(tmp_path_factory.getbasetemp())
+    for name in sys.modules.keys() - modules:
+        if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
+            del sys.modules[name]
+    theirs = [key for key in registry._known.keys() - known if not registry._known[key].module.startswith("foosim.")]
+    for key in theirs:
+        del registry._known[key]
+    if theirs:
+        codec_of.cache_clear()
+    if registry._loaded != loaded:
+        registry._loaded.clear()
+        registry._loaded.update(loaded)
+        registry._entry_points.cache_clear()
 
 
 def pytest_report_header(config: pytest.Config) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -78,16 +77,11 @@ class Still:
 
 
 @pytest.fixture
-def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder on the path with somebody's engine, which is forgotten afterwards."""
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path with somebody's engine."""
     (tmp_path / "own_still.py").write_text(STILL)
     monkeypatch.syspath_prepend(str(tmp_path))
-    loaded = dict(registry._loaded)
-    yield tmp_path
-    sys.modules.pop("own_still", None)
-    registry._known.pop(("engine", "still"), None)
-    registry._loaded.clear()
-    registry._loaded.update(loaded)
+    return tmp_path
 
 
 def install(folder: Path) -> None:
@@ -96,6 +90,7 @@ def install(folder: Path) -> None:
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: still\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text("[foosim.world]\nstill = own_still\n")
+    registry._entry_points.cache_clear()
 
 
 def problem(*sets: str) -> str:

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from math import pi
 from pathlib import Path
@@ -180,8 +180,8 @@ MODULES: Final = {
 
 
 @pytest.fixture
-def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder on the path with modules of somebody's own; afterwards nobody knows of what they registered."""
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path with modules of somebody's own."""
     for form in FORMS:
         names(form)
     folder = tmp_path / "site"
@@ -189,16 +189,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for name, source in MODULES.items():
         (folder / f"{name}.py").write_text(source)
     monkeypatch.syspath_prepend(str(folder))
-    loaded = dict(registry._loaded)
-    yield folder
-    ours = {path.stem for path in folder.glob("*.py")}
-    for name in ours:
-        sys.modules.pop(name, None)
-    for key in [key for key, component in registry._known.items() if component.module in ours]:
-        del registry._known[key]
-    registry._loaded.clear()
-    registry._loaded.update(loaded)
-    codec_of.cache_clear()
+    return folder
 
 
 def install(folder: Path, name: str, *modules: str, version: str = "1.2") -> None:
@@ -208,6 +199,7 @@ def install(folder: Path, name: str, *modules: str, version: str = "1.2") -> Non
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
     entries = "\n".join(f"{module.removeprefix('own_')} = {module}" for module in modules)
     (about / "entry_points.txt").write_text(f"[foosim.world]\n{entries}\n")
+    registry._entry_points.cache_clear()
 
 
 BEGIN: Final = """

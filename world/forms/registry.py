@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
@@ -210,14 +211,20 @@ def find(form: str, kind: str) -> Form:
     Raises UnknownName, which says what is nearest, and Refused for a module that cannot be imported, or a class in it
     that is not registered.
     """
+    found = lookup(form, kind)
+    if found is None:
+        raise UnknownName("; ".join([f"unknown {form}", *load_entry_points()]), kind, names(form))
+    return found
+
+
+def lookup(form: str, kind: str) -> Form | None:
+    """Return what `find` does, or None where nothing has that name; raises Refused for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
     found = _known.get((form, kind)) or _own(form, kind)
     if found is None:
-        failures = load_entry_points()
+        load_entry_points()
         found = _known.get((form, kind))
-        if found is None:
-            raise UnknownName("; ".join([f"unknown {form}", *failures]), kind, names(form))
     return found
 
 
@@ -246,12 +253,18 @@ def names(form: str) -> list[str]:
 
 def load_entry_points() -> list[str]:
     """Import the modules that other packages name; return why some could not be."""
-    from importlib.metadata import entry_points  # brings the parser of e-mail
-
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value):
+    for entry in _entry_points():
         if entry.value not in _loaded:
             _loaded[entry.value] = _load(entry)
     return [failure for failure in _loaded.values() if failure]
+
+
+@cache
+def _entry_points() -> Sequence[EntryPoint]:
+    """Return the entry points of all installed packages; their files are read once."""
+    from importlib.metadata import entry_points  # brings the parser of e-mail
+
+    return sorted(entry_points(group=GROUP), key=lambda entry: entry.value)
 
 
 def _load(entry: EntryPoint) -> str:
