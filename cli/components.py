@@ -87,11 +87,34 @@ def lines(component: Form) -> Iterator[str]:
 def _settings(component: Form) -> Iterator[tuple[str, str, str | None]]:
     """Yield key, what is valid, and the default of each setting; None where it is required."""
     schema = component.settings.model_json_schema(by_alias=True)
+    yield from _properties(schema, schema.get("$defs", {}), "")
+
+
+def _properties(
+    schema: Mapping[str, Any], definitions: Mapping[str, Any], path: str
+) -> Iterator[tuple[str, str, str | None]]:
+    """Yield the settings of a schema; of one that has settings of its own these, after its key and a point."""
     required = schema.get("required", ())
     for key, value in schema["properties"].items():
-        if key != "kind":
+        found = _followed(value, definitions)
+        each = _followed(found.get("additionalProperties", {}), definitions)
+        if "properties" in found:
+            yield from _properties(found, definitions, f"{path}{key}.")
+        elif "properties" in each and "kind" not in each["properties"]:
+            yield from _properties(each, definitions, f"{path}{key}.NAME.")
+        elif key != "kind":
             default = None if key in required else str(value.get("default", ""))
-            yield key, _valid(value), default
+            yield f"{path}{key}", _valid(found), default
+
+
+def _followed(value: Any, definitions: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what a schema refers to, and of one or nothing the one."""
+    if not isinstance(value, dict):
+        return {}
+    if "$ref" in value:
+        return _followed(definitions[value["$ref"].rpartition("/")[2]], definitions)
+    choices = [choice for choice in value.get("anyOf", ()) if choice.get("type") != "null"]
+    return _followed(choices[0], definitions) if len(choices) == 1 and "description" not in value else value
 
 
 def _valid(value: Mapping[str, Any]) -> str:

@@ -369,13 +369,14 @@ def check_component(
 ) -> None:
     """Check that a form obeys the laws, in a deployment that uses it.
 
-    Rehearses on one, two and three nodes with moved robots and objects made anew, and in another process; compares
-    sensors alone with many at once. Prints what differs, with tick and slot.
+    Rehearses on one, two and three nodes with moved robots and objects made anew, in another process, with all named
+    in another order, beside a robot that does nothing and beside a second one of each sensor; compares sensors alone
+    with many at once. Prints what differs, with tick and slot.
     """
     from foosim.cli.rehearse import elsewhere
     from foosim.deployment.loader import apply_sets
     from foosim.deployment.text.files import read_source_file
-    from foosim.rehearsal.component_check import broken_laws, used_form
+    from foosim.rehearsal.check.component_check import broken_laws, used_form
 
     text = apply_sets(read_source_file(file), str(file), sets or [])
     form = used_form(text, str(file), name)
@@ -384,16 +385,18 @@ def check_component(
         print(f"{form.form} {form.name}: {line}")
     if broken:
         raise typer.Exit(1)
-    print(f"{form.form} {form.name}: the same world on 1, 2 and 3 nodes, alone and together, in {ticks} ticks")
+    print(f"{form.form} {form.name}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
 
 
 @app.command()
 def components(
-    form: Annotated[str | None, typer.Argument(metavar="FORM", help="sensor, actuator, modifier or engine.")] = None,
+    form: Annotated[
+        str | None, typer.Argument(metavar="FORM", help="model, sensor, rule, kit or another form.")
+    ] = None,
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One of them, or module:Class.")] = None,
     json: Json = False,
 ) -> None:
-    """Show the sensors, actuators, modifiers and engines that a deployment can name on this machine.
+    """Show the models, sensors, rules and other forms that a deployment can name on this machine.
 
     They are foosim's own and those of installed packages (entry points of the group `foosim.world`). With a name:
     settings with their units, limits and defaults, the fields of its readings or commands, and what it remembers.

@@ -26,6 +26,7 @@ class CommandEncoder:
         self._deployment = deployment
         self._layout: Layout | None = None
         self._fitted: dict[str, tuple[FittedActuator, ...]] = {}
+        self._limits: dict[FittedActuator, Mapping[str, tuple[float, float]]] = {}
 
     def encode(self, robot: str, command: Struct) -> tuple[str, bytes]:
         """Return the channel and the payload of a command.
@@ -35,7 +36,7 @@ class CommandEncoder:
         """
         for one in self.actuators(robot):
             if isinstance(command, one.codec.kind):
-                return one.channel, _checked(robot, one, command)
+                return one.channel, self._checked(robot, one, command)
         fitting = [name for name in self._deployment.robots if self._takes(name, command)]
         raise UnknownName(f"no robot that takes a {type(command).__name__}", robot, fitting)
 
@@ -50,7 +51,7 @@ class CommandEncoder:
             said = ", ".join([*map(str, numbers), *named]) or "nothing"
             raise BadValue(f"{robot}'s {channel} takes {', '.join(names)}, each once", said)
         plain = {name: value if isinstance(value, PLAIN) else float(value) for name, value in given.items()}
-        return _checked(robot, one, one.codec.kind(**plain))
+        return self._checked(robot, one, one.codec.kind(**plain))
 
     def codec(self, robot: str, channel: str) -> PayloadCodec:
         """Return the codec of the commands on a robot's channel, which is an actuator's."""
@@ -72,12 +73,14 @@ class CommandEncoder:
     def _takes(self, robot: str, command: Struct) -> bool:
         return any(isinstance(command, one.codec.kind) for one in self.actuators(robot))
 
-
-def _checked(robot: str, one: FittedActuator, command: Struct) -> bytes:
-    payload = one.codec.encode(command)
-    units = {field.name: field.unit for field in one.codec.fields}
-    for name, (least, most) in one.actuator.limits().items():
-        value = getattr(command, name)
-        if not least <= value <= most:
-            raise BadValue(f"{name} of {robot} is not within {least} to {most} {units[name]}", value)
-    return payload
+    def _checked(self, robot: str, one: FittedActuator, command: Struct) -> bytes:
+        payload = one.codec.encode(command)
+        limits = self._limits.get(one)
+        if limits is None:
+            limits = self._limits[one] = one.actuator.limits()
+        for name, (least, most) in limits.items():
+            value = getattr(command, name)
+            if not least <= value <= most:
+                (unit,) = [field.unit for field in one.codec.fields if field.name == name]
+                raise BadValue(f"{name} of {robot} is not within {least} to {most} {unit}", value)
+        return payload

@@ -52,6 +52,7 @@ class Stepper:
         self.layout = layout
         self.world = World(deployment, layout)
         self.substeps = deployment.substeps
+        self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
         self._waiting = [
@@ -153,18 +154,18 @@ class Stepper:
         if not bodies:
             return
         world, before = self.world, numbers.copy()
-        rigid = [entity for entity in bodies if entity.is_rigid]
+        rigid = [entity for entity in bodies if entity.index in self._rigid]
         if rigid:
             view = View(work.tick, numbers)
             driven = [entity for entity in rigid if entity.index in world.actuators]
             engine.load(rigid, numbers)
-            engine.command(driven, [world.motors(entity, view) for entity in driven])
+            engine.command(driven, world.motors(driven, view))
             engine.step(self.substeps)
             engine.read(rigid, numbers)
         if len(rigid) < len(bodies):
             world.move(bodies, before, numbers, work.tick)
         world.apply_entity_rules(bodies, numbers, work.tick)
-        if not (isfinite(sum(numbers)) and all(self.world.plausible(entity, numbers, before) for entity in bodies)):
+        if not (isfinite(sum(numbers)) and world.plausible(bodies, numbers, before, work.tick)):
             self._quarantine(work, before)
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
@@ -180,7 +181,7 @@ class Stepper:
                 if before[entity.offsets["quarantined"]] == 0.0
                 and not (
                     all(map(isfinite, numbers[entity.start : entity.split]))
-                    and self.world.plausible(entity, numbers, before)
+                    and self.world.plausible((entity,), numbers, before, work.tick)
                 )
             ]
             if not bad:

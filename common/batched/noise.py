@@ -34,6 +34,8 @@ from foosim.common.batched.normal import normal_of_word, normal_of_words
 from foosim.common.batched.philox import Lanes, Words, block, round_keys
 from foosim.common.keyed_random import HALF_WORD, unit_interval
 
+AHEAD: Final = 64
+"""Draws of one stream that are made at once."""
 _KEY: Final = struct.Struct("<Q")
 _LOWER_BITS: Final = np.array(11, np.uint64)
 
@@ -121,3 +123,33 @@ class NoiseKey:
     def normal(self, counter: int, width: int, slot: int = 0) -> list[float]:
         """Return `width` standard normal numbers."""
         return [normal_of_word(word) for word in self.words(counter, width, slot)]
+
+
+class NoiseAhead:
+    """One stream at regular counters: with a draw those at the next ones are made, in a batch.
+
+    Draws are those of `NoiseKey`, bit for bit, and functions of the counter alone: what is kept only saves time. Of a
+    pair of numbers it saves five sixths.
+    """
+
+    def __init__(self, key: bytes, width: int, step: int, slot: int = 0) -> None:
+        """Take the draw key; how many numbers a draw has; the step from counter to counter; the slot."""
+        assert step > 0, step
+        self._key, self._width, self._step, self._slot = key, width, step, slot
+        self._alone = NoiseKey(key)
+        self._lanes: NoiseKeys | None = None
+        self._first = 0
+        self._rows: list[list[float]] = []
+
+    def normal(self, counter: int) -> list[float]:
+        """Return standard normal numbers."""
+        place, rest = divmod(counter - self._first, self._step)
+        if not rest and 0 <= place < len(self._rows):
+            return self._rows[place]
+        if self._rows and (rest or counter < self._first):
+            return self._alone.normal(counter, self._width, self._slot)
+        if self._lanes is None:
+            self._lanes = NoiseKeys([self._key] * AHEAD)
+        counters = np.uint64(counter) + np.arange(AHEAD, dtype=np.uint64) * np.uint64(self._step)
+        self._first, self._rows = counter, self._lanes.normal(counters, self._width, self._slot).tolist()
+        return self._rows[0]

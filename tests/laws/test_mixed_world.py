@@ -13,12 +13,12 @@ from typing import Any, Final
 import yaml
 
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.component_check import broken_laws
+from foosim.rehearsal.check.component_check import broken_laws
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.world.assembly.used_forms import OWN, forms_of
+from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
-from foosim.world.forms.registry import FORMS
+from foosim.world.forms.registry import FOLDERS, FORMS
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 TICKS: Final = 300
@@ -64,7 +64,7 @@ def mixed() -> str:
 def test_every_form_is_in_it() -> None:
     used = {(form.form, form.name) for form in forms_of(load_deployment(mixed(), NAME))}
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    known = {(form.form, form.name) for form in found if form.module.startswith(OWN)}  # not those of other tests
+    known = {(form.form, form.name) for form in found if form.module == f"{FOLDERS[form.form]}.{form.name}"}
     models = {("model", "ball")}
     assert known - used - models == UNUSED
 

@@ -12,7 +12,8 @@ import pytest
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.component_check import Frames, broken_laws, used_form
+from foosim.rehearsal.check.component_check import broken_laws, used_form
+from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 
@@ -21,8 +22,10 @@ TICKS: Final = 120
 HEAD: Final = """
 import random, time
 from msgspec import Struct
+from foosim.common.keyed_random import draw_key, draw_words
 from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import Mounting
+from foosim.world.forms.forms import ENTITY
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import rule, sensor
 from foosim.world.forms.settings import RuleSettings, SensorSettings
@@ -61,6 +64,7 @@ class Own:
         self.sum = at.slot("sum")
         self.joints = [at.of(rod, "joint_positions") for rod in at.layout.of("rod")]
         self.ball = at.of(at.layout["ball"], "position")
+        self.index, self.robots = at.layout["ball"].index, list(at.spec.robots)
 
     def apply(self, view):
         APPLY
@@ -71,6 +75,7 @@ BAD: Final = {
     "a running generator": ("self.random.random()", "red.goal own.kept"),
     "a clock": ("time.perf_counter()", "red.goal own.kept"),
 }
+BESIDE: Final = "beside a robot that does nothing and comes first the world is another one"
 SETS: Final = ("engine=pure", "substeps=1", "players={}", "table.rules.kickoff_delay=20 ms")
 OF_ROD: Final = "robots.red.goal.sensors.own={kind: 'own_form:Own', rate: 100 Hz}"
 OF_WORLD: Final = "rules={own: {kind: 'own_form:Own'}}"
@@ -109,6 +114,41 @@ def test_a_sum_in_the_order_of_hashes_is_found_by_another_process(planted: Path)
     apply = f"view.write(self.sum, *({one} for n in range(16)))"
     found = broken(planted, RULE.replace("APPLY", apply), OF_WORLD, processes=True)
     assert found == ["another process computes another world"]
+
+
+def test_a_draw_by_the_place_among_others_is_found_beside_one_more(planted: Path) -> None:
+    value = "draw_words(draw_key(1, str(self.at.robot.index)), view.tick)[0] / 2.0 ** 32"
+    found = broken(planted, SENSOR.format(value=value), OF_ROD)
+    assert found == [f"{BESIDE}: tick 1, red.goal own.kept"]
+
+
+def test_a_reading_by_the_place_among_others_is_found_beside_one_more(planted: Path) -> None:
+    """Nothing of it is in the frame."""
+    source = SENSOR.format(value="float(self.at.robot.index)").replace("view.write(self.kept", "(self.kept")
+    found = broken(planted, source, OF_ROD)
+    assert found == [f"{BESIDE}: tick 5, the reading of own of red.goal"]
+
+
+def test_an_entity_that_is_kept_as_a_number_is_found_beside_one_more(planted: Path) -> None:
+    """A slot that refers to entities is compared by names."""
+    found = broken(planted, RULE.replace("APPLY", "view.write(self.sum, *[float(self.index)] * 16)"), OF_WORLD)
+    (line,) = found
+    assert line.startswith(BESIDE) and line.endswith("world own.sum")
+    declared = RULE.replace('slots={"sum": 16}', 'slots={"sum": ENTITY}')
+    assert broken(planted, declared.replace("APPLY", "view.write(self.sum, float(self.index))"), OF_WORLD) == []
+
+
+def test_a_sum_in_the_order_of_the_file_is_found_by_another_order(planted: Path) -> None:
+    one = "sum(10.0 ** (ord(name[-1]) % 17) / 3.0 * (-1) ** len(name) for name in self.robots)"
+    line, *_ = broken(planted, RULE.replace("APPLY", f"view.write(self.sum, *[{one}] * 16)"), OF_WORLD)
+    assert line.startswith("named in another order, the world is another one") and line.endswith("world own.sum")
+
+
+def test_a_sensor_that_counts_its_like_is_found_beside_a_second_one(planted: Path) -> None:
+    value = "float(len([slot for slot in self.at.robot.offsets if slot.endswith('.samples')]))"
+    (line,) = broken(planted, SENSOR.format(value=value), OF_ROD)
+    assert line.startswith("beside a second one of each sensor the world is another one")
+    assert "red.goal own.kept" in line
 
 
 def test_a_write_to_anothers_slot_ends_the_run_with_both_names(planted: Path) -> None:

@@ -49,6 +49,7 @@ class PositionActuator:
         drive = table_of(at.spec).drive
         self._slide_m_max = table_of(at.spec).lines[robot.line].half_stroke
         self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
+        self._set_point_at, self._joints_at = self._set_point.at, self._joints.at
         self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
         self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)
 
@@ -73,9 +74,13 @@ class PositionActuator:
 
     def command(self, view: View) -> tuple[tuple[float, float], ...]:
         """Return (target speed, greatest force) of slide and spin, in SI units."""
-        numbers, set_point, joints = view.numbers, self._set_point.at, self._joints.at
+        numbers, set_point, joints = view.numbers, self._set_point_at, self._joints_at
         gain, speed, force = self._slide
         slide = gain * (numbers[set_point] - numbers[joints])
-        spin_gain, spin_speed, torque = self._spin
-        spin = spin_gain * (numbers[set_point + 1] - numbers[joints + 1])
-        return (min(max(slide, -speed), speed), force), (min(max(spin, -spin_speed), spin_speed), torque)
+        if not -speed <= slide <= speed:
+            slide = speed if slide > speed else -speed
+        gain, speed, torque = self._spin
+        spin = gain * (numbers[set_point + 1] - numbers[joints + 1])
+        if not -speed <= spin <= speed:
+            spin = speed if spin > speed else -speed
+        return (slide, force), (spin, torque)

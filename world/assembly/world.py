@@ -167,7 +167,8 @@ class World:
         """What moves each robot that has actuators, by the entity's index."""
         self._motions = _motions_of(spec, layout)
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
-        self._entity_rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
+        rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
+        self._entity_rules = {index: its for index, its in rules.items() if its}
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
@@ -189,23 +190,30 @@ class World:
             return
         view = SolvingView(tick, before, numbers)
         for name, moving in sorted(groups.items()):
-            motors = [self.motors(entity, view) for entity in moving]
             try:
-                self._motions[name].move(moving, motors, view)
+                self._motions[name].move(moving, self.motors(moving, view), view)
+            except ComponentError:
+                raise
             except Exception as error:
                 raise ComponentError(f"motion {name}", tick, error) from error
 
-    def motors(self, entity: Entity, view: View) -> Motors:
-        """Return what the actuators of an entity ask of its motors, in the order of their channels."""
-        fitted = self.actuators.get(entity.index)
-        if fitted is None:
-            return NO_MOTORS
-        if len(fitted) == 1:
-            return fitted[0].command(view)
-        return tuple([motor for one in fitted for motor in one.command(view)])
+    def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
+        """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""
+        found: list[Motors] = []
+        for entity in entities:
+            asked = NO_MOTORS
+            for one in self.actuators.get(entity.index, ()):
+                try:
+                    asked += one.actuator.command(view)
+                except Exception as error:
+                    raise one.failed(view.tick, error) from error
+            found.append(asked)
+        return found
 
     def apply_entity_rules(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
         """Let the rules of these entities write what follows from their new state."""
+        if not self._entity_rules:
+            return
         view = WritableView(tick, numbers)
         for entity in entities:
             for label, rule in self._entity_rules.get(entity.index, ()):
@@ -214,9 +222,18 @@ class World:
                 except Exception as error:
                     raise ComponentError(f"rule {label} of {entity.name}", tick, error) from error
 
-    def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether an entity's new, finite state can be."""
-        return self.models[entity.index].is_plausible(numbers, before)
+    def plausible(
+        self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
+    ) -> bool:
+        """Whether the new, finite state of each of these entities can be."""
+        models = self.models
+        for entity in entities:
+            try:
+                if not models[entity.index].is_plausible(numbers, before):
+                    return False
+            except Exception as error:
+                raise ComponentError(f"model {entity.model} of {entity.name}", tick, error) from error
+        return True
 
     def stir(self, numbers: list[float]) -> None:
         """Set a world at rest in motion, for the fixed small run that tells engines apart."""

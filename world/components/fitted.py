@@ -16,7 +16,6 @@ from foosim.world.components.view import (
     ModifierMounting,
     Mounting,
     Sensor,
-    View,
     WritableView,
 )
 from foosim.world.forms import registry
@@ -135,16 +134,10 @@ class FittedActuator:
         try:
             return self.actuator.accept(command, view)
         except Exception as error:
-            raise self._failed(view.tick, error) from error
+            raise self.failed(view.tick, error) from error
 
-    def command(self, view: View) -> tuple[tuple[float, float], ...]:
-        """Return what it asks of each motor. Raises ComponentError."""
-        try:
-            return self.actuator.command(view)
-        except Exception as error:
-            raise self._failed(view.tick, error) from error
-
-    def _failed(self, tick: int, error: Exception) -> ComponentError:
+    def failed(self, tick: int, error: Exception) -> ComponentError:
+        """Return the error of an actuator that has raised."""
         return ComponentError(f"actuator {self.channel} of {self.robot}", tick, error)
 
 

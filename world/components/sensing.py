@@ -17,6 +17,9 @@ from foosim.world.components.fitted import FittedSensor
 from foosim.world.components.view import ComponentError, SensingView
 
 Numbers: TypeAlias = NDArray[np.float64]
+MODIFIED_TOGETHER_MIN: Final = 64
+"""Numbers from which on modifiers are computed together. Amid a tick little of numpy is in a cache of the processor:
+arrays of fewer numbers cost more than one number after the other."""
 PLANS_MAX: Final = 64
 """Sets of sensors whose plan is kept: those of ticks, and of robots that are out of service."""
 
@@ -57,19 +60,23 @@ class Plan:
     def __init__(self, fitted: Sequence[FittedSensor]) -> None:
         self._fitted = tuple(fitted)
         everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
-        self._together, self._alone = self._divided(everyone, "sensor")
+        self._together, self._alone = self._divided(everyone, "sensor", 0)
         depth = max((len(one.modifiers) for one in fitted), default=0)
         self._steps = [self._step(place) for place in range(depth)]
 
     def _step(self, depth: int) -> tuple[list[_Group], list[int]]:
         """Return the modifiers at a depth: groups, and the places of the sensors whose modifier works alone."""
         having = [(place, one) for place, one in enumerate(self._fitted) if len(one.modifiers) > depth]
-        return self._divided([(place, one.modifiers[depth].modifier, one.size) for place, one in having], "modifier")
+        members = [(place, one.modifiers[depth].modifier, one.size) for place, one in having]
+        return self._divided(members, "modifier", MODIFIED_TOGETHER_MIN)
 
-    def _divided(self, members: Sequence[tuple[int, Any, int]], form: str) -> tuple[list[_Group], list[int]]:
+    def _divided(
+        self, members: Sequence[tuple[int, Any, int]], form: str, least: int
+    ) -> tuple[list[_Group], list[int]]:
         """Divide (place, object, numbers) into groups of a class and a length, and the places of those without one.
 
-        One that would be a group of its own is computed alone: that takes a third of the time, with the same bits.
+        One that would be a group of its own, and those that have less than `least` numbers together, are computed
+        alone, with the same bits.
         """
         kinds: dict[tuple[type[Any], int], list[tuple[int, Any]]] = {}
         alone = []
@@ -78,10 +85,10 @@ class Plan:
                 kinds.setdefault((type(one), size), []).append((place, one))
             else:
                 alone.append(place)
-        alone += [its[0][0] for its in kinds.values() if len(its) == 1]
         groups = []
-        for (kind, _), its in kinds.items():
-            if len(its) == 1:
+        for (kind, size), its in kinds.items():
+            if len(its) == 1 or len(its) * size < least:
+                alone += [place for place, _ in its]
                 continue
             names = ", ".join(f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its)
             groups.append(
@@ -104,10 +111,14 @@ class Plan:
         for depth, (groups, alone) in enumerate(self._steps):
             for place in alone:
                 if readings[place] is not None:
-                    readings[place] = fitted[place].modifiers[depth].apply(list(readings[place]), view)
+                    readings[place] = fitted[place].modifiers[depth].apply(_listed(readings[place]), view)
             for group in groups:
                 _apply_together(group, readings, view)
         return [_payload(one, reading, view) for one, reading in zip(fitted, readings, strict=True)]
+
+
+def _listed(reading: Any) -> list[float]:
+    return reading.tolist() if isinstance(reading, np.ndarray) else list(reading)
 
 
 def _apply_together(group: _Group, readings: list[Any], view: SensingView) -> None:

@@ -179,12 +179,19 @@ class ModifierMounting:
     period_s: float
     key: bytes
 
+    @property
+    def period_ticks(self) -> int:
+        """The ticks between two readings; 1 for commands."""
+        return round(self.period_s * 1e9 / self.tick_ns)
+
     def slot(self, field: str) -> Slot:
         """Return a slot of the modifier."""
         return self.mounting.slot(field)
 
     def per_field(self, written: Any, other: float) -> list[float]:
-        """Return a setting's number for each number, and `other` for those of which it says nothing."""
+        """Return a setting's number for each number, and `other` for those of which it says nothing, as None does."""
+        if written is None:
+            return [other] * self.numbers.size
         return [other if number is None else number for number in read_per_field(written, self.numbers)]
 
 

@@ -20,6 +20,7 @@ from msgspec import Struct, inspect
 from foosim.common.errors import BadValue, Malformed
 
 FLOAT_MAX: Final = sys.float_info.max
+FLOAT: Final = frozenset((float,))
 MANY_MAX: Final = 1 << 16
 """Numbers in a tuple whose type has no bound of its own."""
 
@@ -95,6 +96,8 @@ class PayloadCodec:
         if not self._is_packed:
             return msgspec.msgpack.encode(value)
         numbers = self.numbers(value)
+        if not self._many and FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers)):
+            return self._packed.pack(*numbers)
         names = [field.name for field in self.fields]
         more = len(numbers) - len(names) + 1
         if self._many and not self._least <= more <= self._most:

@@ -243,12 +243,17 @@ def find_model(kind: str) -> Model:
 
 
 def names(form: str) -> list[str]:
-    """Return the names of all that are installed here, in name order."""
+    """Return the names of all that are installed here, in name order: foosim's own, and those of other packages."""
     folder = import_module(FOLDERS[form])
     for module in iter_modules(folder.__path__):
         _own(form, module.name)
     load_entry_points()
-    return sorted(name for known, name in _known if known == form)
+    packages = {entry.module.partition(".")[0] for entry in _entry_points()}
+    return sorted(
+        name
+        for (known, name), found in _known.items()
+        if known == form and (found.module == f"{FOLDERS[form]}.{name}" or found.module.partition(".")[0] in packages)
+    )
 
 
 def load_entry_points() -> list[str]:

@@ -18,10 +18,13 @@ STEP, START = 0, 1
 
 
 class BiasWalkSettings(ModifierSettings):
-    """Adds an offset that walks: `initial` is its standard deviation at the start, `walk` that of a second's change."""
+    """Adds an offset that walks: `initial` is its standard deviation at the start, `walk` that of a second's change.
 
-    initial: PerField = 0.0
-    walk: PerField = 0.0
+    Where nothing is said, it is 0.
+    """
+
+    initial: PerField | None = None
+    walk: PerField | None = None
 
 
 @modifier(
@@ -34,18 +37,17 @@ class BiasWalk:
     """Adds an offset that walks to each number; what it has walked is in the frame."""
 
     def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:
-        from foosim.common.batched.noise import NoiseKey  # brings numpy, which those who only read settings need not
+        from foosim.common.batched.noise import NoiseAhead, NoiseKey  # brings numpy, which readers of settings need not
 
-        stream = NoiseKey(at.key)
-        initial = at.per_field(settings.initial, 0.0)
-        self._start = [std * one for std, one in zip(initial, stream.normal(0, at.numbers.size, START), strict=True)]
+        initial, draws = at.per_field(settings.initial, 0.0), NoiseKey(at.key).normal(0, at.numbers.size, START)
+        self._start = [std * one for std, one in zip(initial, draws, strict=True)]
         self._step = [std * sqrt(at.period_s) for std in at.per_field(settings.walk, 0.0)]
         self._offset = at.slot("offset")
-        self._stream = stream
+        self._steps = NoiseAhead(at.key, at.numbers.size, at.period_ticks, STEP)
 
     def apply(self, values: list[float], view: WritableView) -> list[float]:
         """Return the values with the present offsets, and let these walk on."""
         walked = view.read(self._offset)
-        draws = self._stream.normal(view.tick, len(values), STEP)
+        draws = self._steps.normal(view.tick)
         view.write(self._offset, *(way + std * one for way, std, one in zip(walked, self._step, draws, strict=True)))
         return [value + start + way for value, start, way in zip(values, self._start, walked, strict=True)]

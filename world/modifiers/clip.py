@@ -23,8 +23,8 @@ class Clip:
     """Holds each number within a range."""
 
     def __init__(self, settings: ClipSettings, at: ModifierMounting) -> None:
-        self._low = [-inf] * at.numbers.size if settings.low is None else at.per_field(settings.low, -inf)
-        self._high = [inf] * at.numbers.size if settings.high is None else at.per_field(settings.high, inf)
+        self._low = at.per_field(settings.low, -inf)
+        self._high = at.per_field(settings.high, inf)
 
     @staticmethod
     def check(settings: ClipSettings, numbers: Numbers) -> None:

@@ -29,16 +29,20 @@ class GaussianNoise:
     """Adds a normal draw to each number."""
 
     def __init__(self, settings: GaussianNoiseSettings, at: ModifierMounting) -> None:
-        from foosim.common.batched.noise import NoiseKey  # brings numpy, which those who only read settings need not
+        from foosim.common.batched.noise import (  # brings numpy, which those who only read settings need not
+            NoiseAhead,
+            NoiseKey,
+        )
 
         self.std = at.per_field(settings.std, 0.0)
         self.low, self.high = at.low, at.high
         self.key = at.key
-        self._stream = NoiseKey(at.key)
+        self._stream, self._ahead = NoiseKey(at.key), NoiseAhead(at.key, at.numbers.size, at.period_ticks)
 
     def apply(self, values: list[float], view: View) -> list[float]:
         """Return the values with noise."""
-        noise = self._stream.normal(view.tick, len(values), view.count)
+        count = view.count
+        noise = self._stream.normal(view.tick, len(values), count) if count else self._ahead.normal(view.tick)
         return [
             value if not low < value < high else min(max(value + std * one, low), high)
             for value, std, one, low, high in zip(values, self.std, noise, self.low, self.high, strict=True)

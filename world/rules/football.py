@@ -106,9 +106,10 @@ class Football:
         numbers = view.numbers
         inside = abs(x) <= self._end_x_m and abs(y) <= self._side_y_m and z > 0.0
         out = 0.0 if inside and numbers[ball.quarantined] == 0.0 else numbers[ball.out.at] + 1.0
-        view.write(ball.out, out)
-        if out >= self._out_ticks:
-            self._to_the_spot(ball, view)
+        if out != numbers[ball.out.at]:
+            view.write(ball.out, out)
+            if out >= self._out_ticks:
+                self._to_the_spot(ball, view)
 
     def _count_still(self, ball: _Ball, view: WritableView) -> None:
         """A ball at rest for long enough is dead and returns to the spot."""
@@ -116,9 +117,10 @@ class Football:
         vx, vy, vz = numbers[start : start + 3]
         slow = vx * vx + vy * vy + vz * vz < self._dead_speed * self._dead_speed
         still = numbers[ball.still.at] + 1.0 if slow else 0.0
-        view.write(ball.still, still)
-        if still >= self._dead_ticks:
-            self._to_the_spot(ball, view)
+        if still != numbers[ball.still.at]:
+            view.write(ball.still, still)
+            if still >= self._dead_ticks:
+                self._to_the_spot(ball, view)
 
     def _to_the_spot(self, ball: _Ball, view: WritableView) -> None:
         ball.place(view, self._spot)

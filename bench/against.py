@@ -1,0 +1,183 @@
+"""`python -m bench.against REVISION [--pairs N] [--install]`: this tree against an earlier one, by interleaved pairs.
+
+Both trees are used as they are checked out, with the packages of this Python. A pair measures one after the other, in
+an order that changes from pair to pair, so that what else the machine does is the same for both; the figures are the
+ratios of the pairs' processor times. Ticks are those of a rehearsal without its start; the start is that of a command
+that rehearses one tick; an install is that of `pip install` into an empty folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from typing import Final
+
+from bench.bare_tick import bare_tick_us
+from bench.runs import ROOT, BenchError
+
+TICKS: Final = {"table": 1500, "warehouse": 600}
+"""Of each deployment in deploy/, as many as take about a second."""
+OF_TICKS: Final = """
+import json, sys, time
+from pathlib import Path
+from foosim.rehearsal.run import rehearse
+file, ticks = Path(sys.argv[1]), int(sys.argv[2])
+took = []
+for span in (60, 60, ticks + 60):
+    begun_s = time.process_time()
+    rehearse(file.read_text(), file.name, span, 1)
+    took.append(time.process_time() - begun_s)
+print((took[2] - took[1]) / ticks)
+"""
+COMMAND: Final = "import sys; from foosim.cli.rehearse import main; main()"
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """What this tree takes, as a multiple of what the other does: quartiles and extremes of the pairs; its seconds."""
+
+    name: str
+    pairs: int
+    least: float
+    quarter: float
+    median: float
+    three_quarters: float
+    most: float
+    seconds: float
+
+    def line(self) -> str:
+        """Return it for people."""
+        spread = f"half of the pairs {self.quarter:.3f} to {self.three_quarters:.3f}"
+        extremes = f"all {self.least:.3f} to {self.most:.3f}"
+        return f"{self.name:26} {self.median:.3f}  ({spread}, {extremes}) of {self.seconds:.3g} s"
+
+
+Measure = Callable[[Path], float]
+"""Measures a tree: seconds of processor time."""
+
+
+def _environment(tree: Path) -> dict[str, str]:
+    """Return the environment in which `foosim` is that of a tree: a folder with a link for each of its packages."""
+    folder = tree.parent / f"{tree.name}-path"
+    packages = folder / "foosim"
+    if not packages.exists():
+        packages.mkdir(parents=True)
+        for package in tree.glob("*/__init__.py"):
+            if package.parent.name not in ("tests", "bench"):
+                (packages / package.parent.name).symlink_to(package.parent)
+    return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
+
+
+def _run(command: Sequence[str], tree: Path) -> str:
+    done = subprocess.run(command, cwd=tree, env=_environment(tree), capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BenchError(f"{tree.name}: {' '.join(command[-4:])} failed: {done.stderr.strip()[-600:]}")
+    return done.stdout
+
+
+def tick_s(tree: Path, world: str) -> float:
+    """Return the processor time of a tick of a world's rehearsal, in seconds."""
+    file = tree / "deploy" / f"{world}.yaml"
+    return float(_run([sys.executable, "-c", OF_TICKS, str(file), str(TICKS[world])], tree))
+
+
+def _children_s() -> float:
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+def start_s(tree: Path, world: str) -> float:
+    """Return the processor time of a command that rehearses one tick, in seconds."""
+    before_s = _children_s()
+    _run([sys.executable, "-c", COMMAND, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json"], tree)
+    return _children_s() - before_s
+
+
+def install_s(tree: Path) -> float:
+    """Return the processor time of an install into an empty folder, in seconds; what is compiled is part of it."""
+    before_s = _children_s()
+    with tempfile.TemporaryDirectory() as folder:
+        pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", folder]
+        _run([*pip, str(tree)], tree)
+    return _children_s() - before_s
+
+
+def ratio(name: str, measure: Measure, trees: tuple[Path, Path], pairs: int) -> Ratio:
+    """Measure so many pairs of (this tree, the other one), after one that warms both."""
+    for tree in trees:
+        measure(tree)
+    found: list[float] = []
+    seconds: list[float] = []
+    for pair in range(pairs):
+        here, there = trees
+        took = {tree: measure(tree) for tree in ((here, there) if pair % 2 else (there, here))}
+        found.append(took[here] / took[there])
+        seconds.append(took[here])
+    found.sort()
+    at = [found[round((pairs - 1) * share)] for share in (0.0, 0.25, 0.75, 1.0)]
+    return Ratio(name, pairs, at[0], at[1], median(found), at[2], at[3], median(seconds))
+
+
+@contextmanager
+def checked_out(revision: str) -> Iterator[tuple[Path, Path]]:
+    """Give this tree and a checkout of the revision, both in folders of their own."""
+    with tempfile.TemporaryDirectory() as name:
+        here, there = Path(name) / "here", Path(name) / "there"
+        here.symlink_to(ROOT)
+        _git("worktree", "add", "--detach", str(there), revision)
+        try:
+            yield here, there
+        finally:
+            _git("worktree", "remove", "--force", str(there))
+
+
+def _git(*arguments: str) -> None:
+    done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BenchError(done.stderr.strip())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m bench.against", description="This tree against an earlier one.")
+    parser.add_argument("revision", help="a commit, as git names it")
+    parser.add_argument("--pairs", type=int, default=15, help="of each figure (default 15)")
+    parser.add_argument("--install", action="store_true", help="installs, too: three pairs, which take minutes")
+    chosen = parser.parse_args(arguments)
+    if chosen.pairs < 1:
+        parser.error(f"--pairs: at least 1, not {chosen.pairs}")
+    figures: list[Ratio] = []
+    b_us = bare_tick_us()
+    print(f"b (a bare tick of the table in Bullet) {b_us:.0f} us; processor time, this tree to {chosen.revision}")
+    try:
+        with checked_out(chosen.revision) as trees:
+            for name, measure, pairs in _measures(chosen.pairs, with_install=chosen.install):
+                figures.append(ratio(name, measure, trees, pairs))
+                print(figures[-1].line(), flush=True)
+    except BenchError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(json.dumps({"bare_tick_us": b_us, "ratios": [asdict(figure) for figure in figures]}))
+    return 0
+
+
+def _measures(pairs: int, *, with_install: bool) -> Iterator[tuple[str, Measure, int]]:
+    for world in TICKS:
+        yield f"a tick of the {world}", lambda tree, world=world: tick_s(tree, world), pairs  # type: ignore[misc]
+    for world in TICKS:
+        yield f"the start of the {world}", lambda tree, world=world: start_s(tree, world), pairs  # type: ignore[misc]
+    if with_install:
+        yield "an install", install_s, 3
+
+
+if __name__ == "__main__":
+    sys.exit(main())

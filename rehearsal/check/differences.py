@@ -1,0 +1,101 @@
+"""Where two runs of a world differ: the first tick, and there the slots, or the reading."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from foosim.deployment.loader import load_deployment
+from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.sensing import Sensing
+from foosim.world.components.view import SensingView
+from foosim.world.frame import Frame
+from foosim.world.layout import Entity
+
+
+@dataclass
+class Frames:
+    """The frames of a rehearsal, in their order."""
+
+    frames: list[Frame] = field(default_factory=list)
+
+    def __call__(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+
+def first_difference(one: Sequence[Frame], other: Sequence[Frame]) -> str:
+    """Return at which tick, and in which slots that both have, two runs differ first; empty where they do not."""
+    for here, there in zip(one, other, strict=False):
+        if here.digest != there.digest:
+            slots = [
+                f"{entity.name} {slot}"
+                for entity in here.layout.entities
+                for slot in entity.offsets
+                if slot in there.layout[entity.name].offsets
+                and _content(here, entity, slot) != _content(there, there.layout[entity.name], slot)
+            ]
+            if slots or here.layout.digest == there.layout.digest:
+                return f"tick {here.tick}, {', '.join(slots[:4]) or 'outboxes'}"
+    return ""
+
+
+def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
+    """Return the numbers of a slot, and the names of the entities to which it refers."""
+    at = entity.offsets[slot]
+    entities, references = frame.layout.entities, frame.layout.references
+    return [
+        entities[int(frame.numbers[place])].name
+        if place in references and frame.numbers[place] >= 0.0
+        else frame.numbers[place]
+        for place in range(at, at + entity.counts[slot])
+    ]
+
+
+class Senses:
+    """The sensors of a deployment, fitted to the layouts of its frames."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self._deployment = load_deployment(text, name)
+        self._sensors: dict[bytes, list[FittedSensor]] = {}
+
+    def due(self, frame: Frame) -> list[FittedSensor]:
+        """Return those that measure a frame."""
+        layout = frame.layout
+        if layout.digest not in self._sensors:
+            sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
+            self._sensors[layout.digest] = sensors
+        return [one for one in self._sensors[layout.digest] if one.is_due(frame.tick, frame.numbers)]
+
+
+def alone_and_together(senses: Senses, frames: Sequence[Frame]) -> Iterator[str]:
+    """Yield the sensors whose readings are others beside their like than alone."""
+    told: set[str] = set()
+    for frame in frames:
+        due = senses.due(frame)
+        view = SensingView(frame.tick, frame.numbers, frame.values)
+        together = Sensing().sample(due, view)
+        for one, payload in zip(due, together, strict=True):
+            its = SensingView(frame.tick, frame.numbers, frame.values)
+            (alone,) = Sensing().sample([one], its)
+            written = {at: number for at, number in its.written.items() if view.written.get(at) != number}
+            label = f"sensor {one.channel} of {one.robot}"
+            if (alone != payload or written) and label not in told:
+                told.add(label)
+                yield f"{label} gives another reading alone than with others, at tick {frame.tick}"
+
+
+def first_other_reading(one: Senses, frames: Sequence[Frame], other: Senses, others: Sequence[Frame]) -> str:
+    """Return at which tick which sensor that both have gives another reading; empty where none does."""
+    for here, there in zip(frames, others, strict=False):
+        found = _readings(other, there)
+        for key, payload in _readings(one, here).items():
+            if found[key] != payload:
+                return f"tick {here.tick}, the reading of {key[1]} of {key[0]}"
+    return ""
+
+
+def _readings(senses: Senses, frame: Frame) -> dict[tuple[str, str], object]:
+    """Return what is measured at a frame, by robot and channel."""
+    due = senses.due(frame)
+    payloads = Sensing().sample(due, SensingView(frame.tick, frame.numbers, frame.values))
+    return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}

@@ -1,0 +1,103 @@
+"""Each of foosim's forms in a world of its own: the laws, its settings at their limits and beyond.
+
+`make forms` has the long part: thousands of ticks by several seeds, and runs with settings at their limits.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Final
+
+import pytest
+
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.check.component_check import broken_laws
+from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.assembly.used_forms import forms_of
+from foosim.world.forms import registry
+from foosim.world.forms.registry import FOLDERS, FORMS
+from tests.forms.limits import Edge, edges
+from tests.forms.worlds import WORLDS
+
+Key = tuple[str, str]
+TICKS: Final = 100
+NAME: Final = "world.yaml"
+EACH: Final = pytest.mark.parametrize("key", WORLDS, ids="-".join)
+
+
+@cache
+def own() -> list[Key]:
+    found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
+    return sorted((form.form, form.name) for form in found if form.module == f"{FOLDERS[form.form]}.{form.name}")
+
+
+def test_every_form_has_a_world_of_its_own() -> None:
+    assert sorted(WORLDS) == own()
+    for (form, name), world in WORLDS.items():
+        used = {(found.form, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
+        assert (form, name) in used or (form, name) == ("model", "ball")
+
+
+@EACH
+def test_it_obeys_the_laws(key: Key) -> None:
+    assert list(broken_laws(WORLDS[key].text(), NAME, TICKS)) == []
+
+
+@EACH
+def test_its_world_moves(key: Key) -> None:
+    """A world in which nothing happens would prove nothing: robots go where they are told, sensors measure."""
+    frames = Frames()
+    rehearse(WORLDS[key].text(), NAME, TICKS, 1, settings=Settings(on_commit=frames))
+    first, last = frames.frames[0], frames.frames[-1]
+    changed = {
+        f"{entity.name} {slot}"
+        for entity in first.layout.entities
+        for slot, at in entity.offsets.items()
+        if first.numbers[at : at + entity.counts[slot]] != last.numbers[at : at + entity.counts[slot]]
+    }
+    assert any(slot.endswith(("joint_positions", "wheel_travel")) for slot in changed)
+    if key[0] == "sensor" or key[0] == "modifier":
+        assert any(slot.endswith("own.samples") for slot in changed)
+
+
+@EACH
+def test_settings_beyond_their_limits_are_refused_at_their_place(key: Key) -> None:
+    world = WORLDS[key]
+    for edge in edges(registry.find(*key), world):
+        problem = problem_of(key, edge)
+        place = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, (*world.place, *edge.place))))
+        if not edge.is_within:
+            assert f" {place}: " in problem or f" {place.rpartition('.')[0]}: " in problem, (edge.label, problem)
+
+
+def problem_of(key: Key, edge: Edge) -> str:
+    """Return why a deployment with the setting is refused; nothing where it is not."""
+    try:
+        load_deployment(WORLDS[key].text((edge.place, edge.value)), NAME)
+    except DeploymentError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(1, 4))
+@EACH
+def test_it_obeys_the_laws_for_long(key: Key, seed: int) -> None:
+    text = WORLDS[key].text().replace("seed: 1\n", f"seed: {seed}\n")
+    assert list(broken_laws(text, NAME, 2_000, seed)) == []
+
+
+@pytest.mark.campaign
+@EACH
+def test_settings_at_their_limits_run_or_are_refused(key: Key) -> None:
+    """On two nodes as on one."""
+    for edge in edges(registry.find(*key), WORLDS[key]):
+        if edge.is_within and not problem_of(key, edge):
+            text = WORLDS[key].text((edge.place, edge.value))
+            one, two = (rehearse(text, NAME, 200, nodes) for nodes in (1, 2))
+            assert not one.json["failed"], (edge.label, one.json["reason"])
+            assert one.digests == two.digests, edge.label

@@ -1,0 +1,171 @@
+"""For each of foosim's own forms a small world that uses it, and where in the deployment its settings stand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import yaml
+from msgspec import Struct
+
+from foosim.client.commands import CommandEncoder
+from foosim.client.player import Samples, Turn
+from foosim.common.keyed_random import draw_key, draw_words
+from foosim.deployment.schema import Deployment
+from foosim.world.forms import registry
+
+DEPLOY: Final = Path(__file__).parents[2] / "deploy"
+Place = tuple[str | int, ...]
+RODS: Final = ("red.goal", "red.attack", "blue.goal", "blue.attack")
+ROVERS: Final = ("rover-1", "rover-2", "rover-3")
+SCENE: Final = ("field", "floor", "walls", "goal", "ramps")
+LINK: Final = {"id": "all", "from": "*", "to": "*", "delay": "2 ms", "loss": "10 %", "order": "fifo"}
+
+
+class Driver:
+    """Gives each of its robots another command in each of its turns, drawn within a range and its actuator's limits."""
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        kind = registry.find_component("actuator", parameters["kind"])
+        assert kind.value is not None
+        self._value: type[Struct] = kind.value
+        self._robots = parameters["robots"]
+        (limits,) = {
+            tuple(sorted(one.actuator.limits().items()))
+            for robot in self._robots[:1]
+            for one in CommandEncoder(deployment).actuators(robot)
+        }
+        least = [min(-low, high) for _, (low, high) in limits]
+        self._bounds = [min(bound, most) for bound, most in zip(parameters["bounds"], least, strict=True)]
+
+    def act(self, tick: int, samples: Samples) -> Turn:
+        """Return commands for all, whatever was heard."""
+        return Turn({robot: self._command(robot, tick) for robot in self._robots})
+
+    def _command(self, robot: str, tick: int) -> Struct:
+        words = draw_words(draw_key(3, "driver", robot), tick)
+        numbers = [bound * (word / 2.0**63 - 1.0) for bound, word in zip(self._bounds, words, strict=False)]
+        return self._value(*numbers)
+
+
+def driver(robots: Sequence[str], kind: str, bounds: Sequence[float], rate: str) -> dict[str, Any]:
+    """Return the deployment's section of players with a driver of these robots."""
+    parameters = {"robots": list(robots), "kind": kind, "bounds": list(bounds)}
+    path = f"{Driver.__module__}:{Driver.__qualname__}"
+    about = {"class": path, "rate": rate, "lockstep": True, "parameters": parameters}
+    return {"driver": about | {"robots": {robot: [] for robot in robots}}}
+
+
+@cache
+def _table() -> dict[str, Any]:
+    data: dict[str, Any] = yaml.safe_load((DEPLOY / "table.yaml").read_text())
+    data["robots"] = {rod: {**data["robots"][rod], "sensors": {}} for rod in RODS} | {"camera": {"model": "camera"}}
+    data["players"] = driver(RODS, "joint_position", (0.1, 20.0), "50 Hz")
+    data["table"]["rules"] |= {"kickoff_delay": "20 ms", "kickoff_speed": "4 m/s"}
+    return data | {"engine": "pure", "substeps": 1, "nodes": {"n": {"robots": ["*"]}}, "network": {"links": [LINK]}}
+
+
+@cache
+def _hall() -> dict[str, Any]:
+    data = yaml.safe_load((DEPLOY / "warehouse.yaml").read_text())
+    shelf = {"shape": "box", "x": "2 m", "y": "1 m", "z": "1 m", "length": "1 m", "width": "1 m", "height": "2 m"}
+    places = {"rover-1": ("0 m", "0 m"), "rover-2": ("1.5 m", "-1 m"), "rover-3": ("-1 m", "1 m")}
+    robots: dict[str, Any] = {
+        rover: {"model": "rover", "x": x, "y": y, "heading": "30 deg", "charge": "50 %", "sensors": {}}
+        for rover, (x, y) in places.items()
+    }
+    robots["station"] = {"model": "station", "x": "1 m", "y": "2 m", "sensors": {}}
+    return {
+        **{key: value for key, value in data.items() if key not in ("templates", "scenery", "network", "players")},
+        "hall": data["hall"] | {"length": "8 m", "width": "6 m"},
+        "robots": robots,
+        "scenery": {"shelf": shelf},
+        "players": driver(ROVERS, "wheel_speeds", (1.2, 1.2), "10 Hz"),
+        "nodes": {"n": {"robots": ["*"]}},
+        "network": {"links": [LINK]},
+    }
+
+
+class World(NamedTuple):
+    """The plain data of a deployment, and the place of the form's settings in it; no place: it has none."""
+
+    data: dict[str, Any]
+    place: Place = ()
+
+    def text(self, *changes: tuple[Place, Any]) -> str:
+        """Return the deployment's text, with settings changed below the place of the form's."""
+        data = json.loads(json.dumps(self.data))
+        for path, value in changes:
+            *way, last = (*self.place, *path)
+            section = data
+            for key in way:
+                section = section.setdefault(key, {}) if isinstance(section, dict) else section[key]
+            section[last] = value
+        return yaml.safe_dump(data, sort_keys=False)
+
+    def with_(self, path: Place, value: Any, place: Place | None = None) -> World:
+        """Return the world with a value at a path from its root, which is where the form's settings are."""
+        text = World(self.data).text((path, value))
+        return World(yaml.safe_load(text), path if place is None else place)
+
+
+TABLE: Final = World(_table())
+HALL: Final = World(_hall())
+
+
+def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
+    """Return a world in which each of these robots has a sensor."""
+    for robot in reversed(robots):
+        world = world.with_(("robots", robot, "sensors", "own"), {"kind": kind, "rate": "50 Hz", **settings})
+    return world
+
+
+def modifier(kind: str, of_readings: Mapping[str, Any], of_commands: Mapping[str, Any] | None = None) -> World:
+    """Return a world in which a modifier is on readings, which have the settings' place, and on commands."""
+    world = sensor(HALL, ROVERS, "pose", modifiers=[{"kind": kind, **of_readings}])
+    if of_commands is not None:
+        drive = {"kind": "wheel_speeds", "modifiers": [{"kind": kind, **of_commands}]}
+        for rover in ROVERS:
+            world = world.with_(("robots", rover, "actuators"), {"drive": drive})
+    return World(world.data, ("robots", ROVERS[0], "sensors", "own", "modifiers", 0))
+
+
+def scene(world: World, kind: str, settings: Mapping[str, Any]) -> World:
+    """Return a world with a scene."""
+    return world.with_(("scene",), {"kind": kind, **settings})
+
+
+WORLDS: Final[Mapping[tuple[str, str], World]] = {
+    ("model", "ball"): TABLE,
+    ("model", "camera"): World(TABLE.data, ("robots", "camera")),
+    ("model", "rod"): World(TABLE.data, ("robots", "red.goal")),
+    ("model", "rover"): World(HALL.data, ("robots", "rover-1")),
+    ("model", "station"): World(HALL.data, ("robots", "station")),
+    ("motion", "two_wheels"): HALL,
+    ("sensor", "ball"): sensor(TABLE, ["camera"], "ball"),
+    ("sensor", "battery"): sensor(HALL, ROVERS, "battery"),
+    ("sensor", "encoder"): sensor(TABLE, RODS, "encoder"),
+    ("sensor", "odometry"): sensor(HALL, ROVERS, "odometry"),
+    ("sensor", "pose"): sensor(HALL, ROVERS, "pose"),
+    ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
+    ("actuator", "joint_position"): TABLE,
+    ("actuator", "wheel_speeds"): HALL,
+    ("modifier", "bias_walk"): modifier("bias_walk", {"walk": {"position": "1 mm"}}, {"initial": "10 mm/s"}),
+    ("modifier", "clip"): modifier("clip", {"high": {"position": "1 m"}}, {"low": "-1 m/s", "high": "500 mm/s"}),
+    ("modifier", "delay"): modifier("delay", {"time": "60 ms"}, {"time": "130 ms"}),
+    ("modifier", "drop_out"): modifier("drop_out", {"probability": "30 %"}, {"probability": "30 %"}),
+    ("modifier", "frame_change"): modifier("frame_change", {"x": "1 m", "yaw": "30 deg"}),
+    ("modifier", "gaussian_noise"): modifier("gaussian_noise", {"std": {"heading": "1 deg"}}, {"std": "10 mm/s"}),
+    ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
+    ("rule", "football"): TABLE,
+    ("entity_rule", "battery"): HALL,
+    ("scene", "football_table"): scene(HALL, "football_table", {key: TABLE.data["table"][key] for key in SCENE}),
+    ("scene", "hall"): scene(TABLE, "hall", {key: HALL.data["hall"][key] for key in ("length", "width", "walls")}),
+    ("kit", "hall"): World(HALL.data, ("hall",)),
+    ("kit", "table"): World(TABLE.data, ("table",)),
+    ("engine", "bullet"): TABLE.with_(("engine",), "bullet", ()),
+    ("engine", "pure"): TABLE,
+}
