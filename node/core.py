@@ -48,6 +48,7 @@ from foosim.protocol.retry import Patience
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
+from foosim.world.edits import removed
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.robot_packets import Outbox
@@ -177,6 +178,9 @@ class NodeCore:
         self.work = None
         if work.islands:
             self._solved_ticks += 1
+        quarantined = self.stepper(work.layout).quarantined
+        while quarantined:
+            self.actions.append(Log("warning", quarantined.pop(0)))
         for place, number in self._remembered.items():
             work.numbers[place] = number
         values = np.array(work.numbers)
@@ -292,17 +296,20 @@ class NodeCore:
             return False
         raw, deliveries = delivered
         layout, numbers = self._term.stepper.edited(frame, edits)
+        gone = removed(frame.layout, edits)
+        if layout is not frame.layout or gone:
+            self._remembered = moved_slots(self._remembered, frame.layout, layout, gone)
         if layout is not frame.layout:
-            self._remembered = moved_slots(self._remembered, frame.layout, layout)
             self._term = self._make_term(layout)
         term = self._term
         share: Share = term.assignment.shares(numbers)[self.name]
-        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick)
+        start = numbers.copy()
+        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         entities = layout.entities
         islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
-        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes)
+        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start)
         return True
 
     def _collect(self, now_ns: int) -> bool:

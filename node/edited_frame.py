@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 from foosim.world.assembly.world import body_of, model_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView
-from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after
+from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after, removed
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
@@ -16,8 +16,8 @@ from foosim.world.spec import WorldSpec
 
 def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, list[float]]:
     """Return layout and numbers of the edited frame; the order's edits apply in their order."""
-    layout = layout_after(frame.layout, edits)
-    numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
+    layout, gone = layout_after(frame.layout, edits), removed(frame.layout, edits)
+    numbers = frame.numbers.copy() if layout is frame.layout and not gone else _moved(frame, layout, gone)
     view = WritableView(frame.tick, numbers)
     for change in fitting_edits(frame.layout, edits) if edits else ():
         if isinstance(change, Add) and change.name in layout:
@@ -29,14 +29,14 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, 
     return layout, numbers
 
 
-def _moved(frame: Frame, layout: Layout) -> list[float]:
-    """Return a frame's numbers in another layout; entities that are new there are zero.
+def _moved(frame: Frame, layout: Layout, gone: Set[str]) -> list[float]:
+    """Return a frame's numbers in another layout; entities that are new there are zero, as under a name of one gone.
 
     References follow their entities; those to entities that are gone become -1.
     """
     numbers = [0.0] * layout.size
     for entity in layout.entities:
-        if entity.name in frame.layout:
+        if entity.name in frame.layout and entity.name not in gone:
             old = frame.layout[entity.name]
             numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
         else:
@@ -44,16 +44,16 @@ def _moved(frame: Frame, layout: Layout) -> list[float]:
                 if entity.start <= place < entity.stop:
                     numbers[place] = NO_ENTITY
     for place in layout.references:
-        numbers[place] = moved_reference(numbers[place], frame.layout, layout)
+        numbers[place] = moved_reference(numbers[place], frame.layout, layout, gone)
     return numbers
 
 
-def moved_reference(reference: float, old: Layout, new: Layout) -> float:
+def moved_reference(reference: float, old: Layout, new: Layout, gone: Set[str]) -> float:
     """Return a reference to an entity in another layout, -1 where the entity is gone."""
     if not 0.0 <= reference < len(old.entities):
         return NO_ENTITY
     name = old.entities[int(reference)].name
-    return float(new[name].index) if name in new else NO_ENTITY
+    return float(new[name].index) if name in new and name not in gone else NO_ENTITY
 
 
 def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> None:
@@ -69,7 +69,10 @@ def _take_out(view: WritableView, numbers: list[float], spec: WorldSpec, layout:
     robot = layout[change.name]
     numbers[robot.offsets["down"]] = float(isinstance(change, Freeze))
     for one in actuators_of(spec, layout, robot):
-        one.actuator.hold(view)
+        try:
+            one.actuator.hold(view)
+        except Exception as error:
+            raise one.failed(view.tick, error) from error
         for field, at in robot.offsets.items():
             if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
                 numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass, field
 from math import isfinite
 
 import msgspec
@@ -34,7 +34,10 @@ _outbox_encoder = msgspec.msgpack.Encoder()
 
 @dataclass
 class Work:
-    """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`."""
+    """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`.
+
+    `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were.
+    """
 
     tick: int
     layout: Layout
@@ -42,6 +45,7 @@ class Work:
     solved: tuple[int, ...]
     numbers: list[float]
     outboxes: dict[int, bytes]
+    start: list[float] = field(default_factory=list)
 
 
 class Stepper:
@@ -65,6 +69,8 @@ class Stepper:
         self.sampling = Sampling(deployment)
         self.not_finite: Counter[str] = Counter()
         """Readings with a number that is not finite, which are not sent, by robot and channel."""
+        self.quarantined: list[str] = []
+        """Who came into quarantine, and why, in words; whoever reads it empties it."""
 
     def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         """Return what these robots send at the frame's tick, and what their sensors remember.
@@ -105,11 +111,19 @@ class Stepper:
         return layout, numbers
 
     def deliver(
-        self, packets: Sequence[Delivered], solved: Sequence[int], numbers: list[float], tick: int
+        self,
+        packets: Sequence[Delivered],
+        solved: Sequence[int],
+        numbers: list[float],
+        tick: int,
+        start: Sequence[float] | None = None,
     ) -> dict[int, bytes]:
-        """Apply what reached these robots, in order; return the outboxes that it filled."""
+        """Apply what reached these robots, in order; return the outboxes that it filled.
+
+        `start` is a copy of the numbers as they are before; None: it is made here.
+        """
         outboxes: dict[int, list[OutboxPacket]] = {}
-        view = WritableView(tick, numbers)
+        view = WritableView(tick, numbers, numbers.copy() if start is None else start)
         for entity, one in self._waiting:
             if entity.index in solved and numbers[entity.offsets["down"]] == 0.0:
                 one.take_due(view)
@@ -154,17 +168,18 @@ class Stepper:
         if not bodies:
             return
         world, before = self.world, numbers.copy()
+        start = work.start or before
         rigid = [entity for entity in bodies if entity.index in self._rigid]
         if rigid:
-            view = View(work.tick, numbers)
+            view = View(work.tick, numbers, start=start)
             driven = [entity for entity in rigid if entity.index in world.actuators]
             engine.load(rigid, numbers)
             engine.command(driven, world.motors(driven, view))
             engine.step(self.substeps)
             engine.read(rigid, numbers)
         if len(rigid) < len(bodies):
-            world.move(bodies, before, numbers, work.tick)
-        world.apply_entity_rules(bodies, numbers, work.tick)
+            world.move(bodies, start, numbers, work.tick)
+        world.apply_entity_rules(bodies, start, numbers, work.tick)
         if not (isfinite(sum(numbers)) and world.plausible(bodies, numbers, before, work.tick)):
             self._quarantine(work, before)
 
@@ -176,21 +191,34 @@ class Stepper:
         numbers = work.numbers
         for island in work.islands:
             bad = [
-                entity
+                (entity, why)
                 for entity in island
-                if before[entity.offsets["quarantined"]] == 0.0
-                and not (
-                    all(map(isfinite, numbers[entity.start : entity.split]))
-                    and self.world.plausible((entity,), numbers, before, work.tick)
-                )
+                if before[entity.offsets["quarantined"]] == 0.0 and (why := self._what_is_bad(entity, before, work))
             ]
             if not bad:
                 continue
             for entity in island:
                 numbers[entity.start : entity.split] = before[entity.start : entity.split]
                 _clear_results(entity, numbers)
-            for entity in bad:
+            for entity, why in bad:
                 numbers[entity.offsets["quarantined"]] = 1.0
+                self.quarantined.append(f"tick {work.tick}: {entity.name} stands in quarantine from here on: {why}")
+
+    def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
+        """Return in words why an entity's new state cannot be; empty where it can."""
+        why = _not_finite(entity, work.numbers)
+        if not why and not self.world.plausible((entity,), work.numbers, before, work.tick):
+            why = "its new state is not within its bounds, speed limits and reach"
+        return why
+
+
+def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:
+    """Return in words the first field of an entity's state with a number that is not finite; empty without one."""
+    for field_name, at in entity.offsets.items():
+        values = numbers[at : at + entity.counts[field_name]]
+        if at < entity.split and not all(map(isfinite, values)):
+            return f"its new {field_name} is {', '.join(map(str, values))}"
+    return ""
 
 
 def _clear_results(entity: Entity, numbers: list[float]) -> None:
@@ -204,7 +232,7 @@ def _clear_results(entity: Entity, numbers: list[float]) -> None:
         numbers[start : start + count] = [0.0] * count
 
 
-def moved_slots(written: dict[int, float], old: Layout, new: Layout) -> dict[int, float]:
+def moved_slots(written: dict[int, float], old: Layout, new: Layout, gone: Set[str]) -> dict[int, float]:
     """Return numbers of owners' slots, by place, at their places in another layout."""
     moved: dict[int, float] = {}
     references = frozenset(old.references)
@@ -213,5 +241,5 @@ def moved_slots(written: dict[int, float], old: Layout, new: Layout) -> dict[int
             shift = new[entity.name].split - entity.split
             for at, number in written.items():
                 if entity.split <= at < entity.stop:
-                    moved[at + shift] = moved_reference(number, old, new) if at in references else number
+                    moved[at + shift] = moved_reference(number, old, new, gone) if at in references else number
     return moved

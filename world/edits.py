@@ -103,6 +103,13 @@ def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
     return layout if models == layout.models else Layout(models, layout.declared)
 
 
+def removed(layout: Layout, edits: Sequence[Edit]) -> frozenset[str]:
+    """Return the names of what an order removes. What it adds under one of them is another entity."""
+    if not edits:
+        return frozenset()
+    return frozenset(edit.name for edit in fitting_edits(layout, edits) if isinstance(edit, Remove))
+
+
 def check_edits(edits: Sequence[Edit]) -> None:
     """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
     for change in edits:

@@ -118,10 +118,10 @@ def _no_quarantine(planting: Planting) -> None:
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)
 def _twice_delivered(planting: Planting) -> None:
-    def deliver(self: Any, packets: Any, solved: Any, numbers: Any, tick: int) -> Any:
+    def deliver(self: Any, packets: Any, *work: Any) -> Any:
         kept = getattr(self, "kept_packets", [])
         self.kept_packets = list(packets)
-        return before(self, kept if kept and not packets else packets, solved, numbers, tick)
+        return before(self, kept if kept and not packets else packets, *work)
 
     before: Any = planting.swap(Stepper, "deliver", deliver)
 
@@ -138,8 +138,8 @@ def _knowing_step(planting: Planting) -> None:
 
 @register("outboxes are not emptied", "an outbox holds what is sent at the next tick, once", 1)
 def _full_outbox(planting: Planting) -> None:
-    def deliver(self: Any, packets: Any, solved: Any, numbers: Any, tick: int) -> Any:
-        outboxes = before(self, packets, solved, numbers, tick)
+    def deliver(self: Any, packets: Any, *work: Any) -> Any:
+        outboxes = before(self, packets, *work)
         kept = getattr(self, "kept_outboxes", {})
         self.kept_outboxes = outboxes
         return outboxes or kept

@@ -85,4 +85,4 @@ def test_a_reference_follows_its_entity_and_is_none_when_that_is_gone() -> None:
 
 @pytest.mark.parametrize("reference", [-1.0, -5.0, 1e6])
 def test_what_refers_to_nobody_stays_so(reference: float) -> None:
-    assert moved_reference(reference, LAYOUT, LAYOUT) == NO_ENTITY
+    assert moved_reference(reference, LAYOUT, LAYOUT, set()) == NO_ENTITY

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from foosim.common.errors import told
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.sections import fixed_shapes, kits_of
 from foosim.world.components.entities import (
@@ -28,6 +29,7 @@ from foosim.world.scene import Body, Scene, Vector
 from foosim.world.spec import WorldSpec
 
 NO_MOTORS: Final[Motors] = ()
+NO_TEXT: Final = "no text of"
 
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
@@ -81,12 +83,20 @@ def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
     for place in layout.references:
         numbers[place] = NO_ENTITY
     view = WritableView(0, numbers)
-    for model in models_of(spec, layout).values():
-        model.place(view)
-    for rule in rules_of(spec, layout).values():
+    for index, model in models_of(spec, layout).items():
+        entity = layout.entities[index]
+        _calling(f"model {entity.model} of {entity.name}", model.place, view)
+    for label, rule in rules_of(spec, layout).items():
         if hasattr(rule, "place"):
-            rule.place(view)
+            _calling(f"rule {label} of the world", rule.place, view)
     return numbers
+
+
+def _calling(what: str, call: Callable[[WritableView], None], view: WritableView) -> None:
+    try:
+        call(view)
+    except Exception as error:
+        raise ComponentError(what, view.tick, error) from error
 
 
 def addition(spec: WorldSpec, layout: Layout, name: str, model: str) -> tuple[Vector, Callable[[Vector, Vector], None]]:
@@ -107,12 +117,16 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
     """Return what rules and kits show of a frame, for JSON."""
     view = View(frame.tick, frame.numbers)
     status: dict[str, Any] = {}
-    for rule in rules_of(spec, frame.layout).values():
-        if hasattr(rule, "status"):
-            status |= rule.status(view)
-    for _, kit in kits_of(spec):
-        if hasattr(kit, "status"):
-            status |= kit.status(frame)
+    shown: list[tuple[str, Any, Any]] = [
+        (f"rule {name}", rule, view) for name, rule in rules_of(spec, frame.layout).items()
+    ]
+    shown += [(f"kit {name}", kit, frame) for name, kit in kits_of(spec)]
+    for what, one, seen in shown:
+        if hasattr(one, "status"):
+            try:
+                status |= one.status(seen)
+            except Exception as error:  # noqa: BLE001  # a run goes on without it
+                status |= {"failed": f"status of {what}: {told(error)}"}
     return status
 
 
@@ -120,7 +134,14 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     """Return in words what rules and kits show, from what `world_status` returned."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [registry.find("kit", name).made for name in sorted(spec.kits)]
-    return [text for one in made if hasattr(one, "text") and (text := one.text(status))]
+    found = [f"no {failed}" for failed in [status.get("failed")] if failed]
+    for one in made:
+        if hasattr(one, "text"):
+            try:
+                found.append(one.text(status))
+            except Exception as error:  # noqa: BLE001  # without its part of the status, for one
+                found.append(f"{NO_TEXT} {one.__qualname__}: {told(error)}")
+    return [text for text in found if text]
 
 
 def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
@@ -179,8 +200,8 @@ class World:
             except Exception as error:
                 raise ComponentError(f"rule {label} of the world", tick, error) from error
 
-    def move(self, entities: Sequence[Entity], before: Sequence[float], numbers: list[float], tick: int) -> None:
-        """Move those of these entities that go on by motions: `before` are the numbers at the tick's start."""
+    def move(self, entities: Sequence[Entity], start: Sequence[float], numbers: list[float], tick: int) -> None:
+        """Move those of these entities that go on by motions: `start` are the numbers at the tick's start."""
         groups: dict[str, list[Entity]] = {}
         for entity in entities:
             name = self._motion_of.get(entity.index)
@@ -188,10 +209,10 @@ class World:
                 groups.setdefault(name, []).append(entity)
         if not groups:
             return
-        view = SolvingView(tick, before, numbers)
+        view, asking = SolvingView(tick, start, numbers), View(tick, numbers, start=start)
         for name, moving in sorted(groups.items()):
             try:
-                self._motions[name].move(moving, self.motors(moving, view), view)
+                self._motions[name].move(moving, self.motors(moving, asking), view)
             except ComponentError:
                 raise
             except Exception as error:
@@ -210,11 +231,13 @@ class World:
             found.append(asked)
         return found
 
-    def apply_entity_rules(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
+    def apply_entity_rules(
+        self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int
+    ) -> None:
         """Let the rules of these entities write what follows from their new state."""
         if not self._entity_rules:
             return
-        view = WritableView(tick, numbers)
+        view = WritableView(tick, numbers, start)
         for entity in entities:
             for label, rule in self._entity_rules.get(entity.index, ()):
                 try:

@@ -6,12 +6,11 @@ deployment and the layout.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
-from foosim.world.components.view import Slot, SolvingView, View, WritableView
-from foosim.world.forms.settings import RobotSettings
+from foosim.world.components.view import Slot, SolvingView, WritableView
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.physics import Physics
 from foosim.world.scene import Body, Shape
@@ -64,8 +63,9 @@ class Motion(Protocol):
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Write the state after a tick of these entities, whose motors are asked for this much.
 
-        `view.numbers` are those at the start of the tick, of all entities; what is written is seen by nobody before
-        the next tick, so that the order in which entities are moved, and who else is, changes nothing.
+        `view.numbers` are those at the start of the tick, of all entities, before commands reached them: what these ask
+        for is in `motors`. What is written is seen by nobody before the next tick, so that the order in which entities
+        are moved, and who else is, changes nothing.
         """
 
 
@@ -89,7 +89,7 @@ class EntityRule(Protocol):
     """
 
     def apply(self, view: WritableView) -> None:
-        """Write what follows from the entity's state after the tick."""
+        """Write what follows from the entity's state after the tick; others are seen as they were at its start."""
 
 
 class Kit(Protocol):
@@ -119,10 +119,6 @@ class MotionMounting:
     name: str
     entities: tuple[Entity, ...]
     writes: frozenset[str]
-
-    def settings(self, entity: Entity) -> RobotSettings:
-        """Return the settings of an entity."""
-        return self.spec.robots[entity.name]
 
     def slot(self, entity: Entity, field: str) -> Slot:
         """Return a slot of the motion itself on an entity, else a field of the entity."""
@@ -162,8 +158,3 @@ class RuleMounting:
 
     def _slot(self, entity: Entity, name: str, *, is_own: bool) -> Slot:
         return Slot(entity.offsets[name], entity.counts[name], f"{entity.name} {name}", is_own)
-
-
-def status_of(rule: Any, view: View) -> Mapping[str, Any]:
-    """Return what a rule or model shows of itself; nothing where it shows nothing."""
-    return rule.status(view) if hasattr(rule, "status") else {}

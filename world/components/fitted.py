@@ -98,9 +98,9 @@ class FittedActuator:
             command = self.codec.decode(payload)
         except Malformed:
             return False
+        view.count_command(self)
         if not self.modifiers:
             return self._take(command, view)
-        view.count_command(f"{self.robot} {self.channel}")
         return self._go_on(0, self.codec.numbers(command), view)
 
     def take_due(self, view: WritableView) -> None:

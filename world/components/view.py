@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
+from foosim.common.errors import told
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import Entity, Layout
 from foosim.world.spec import WorldSpec
@@ -24,32 +26,45 @@ class ComponentError(Exception):
     """A component has raised: whichever node computes its tick, it would raise again. `cause` has its traceback."""
 
     def __init__(self, what: str, tick: int, cause: Exception) -> None:
-        super().__init__(f"{what} failed at tick {tick}: {type(cause).__name__}: {cause}")
+        super().__init__(f"{what} failed at tick {tick}: {told(cause)}")
         self.cause = cause
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A field of an entity in the frame: the place of its first number, how many there are, and whether the component
-    that asked for it declared it, so that it may write it."""
+    """A field of an entity in the frame: the place of its first number, and how many there are.
+
+    `is_own`: the component that asked for it declared it, and may write it. `is_others`: it is a field of another
+    entity than the component's, which reads what it was at the start of the tick, whichever node computes that one.
+    """
 
     at: int
     size: int
     name: str
     is_own: bool
+    is_others: bool = False
 
 
 class View:
     """What a component sees of the world in one tick: the numbers of the frame, by slots.
 
     `numbers` are those of all entities, SI units, in the world frame of reference; they are not written to directly.
+    Those of other entities than the component's may be of the tick's start or of its end, as nodes share the work: they
+    are read by `read`, which gives what they were at the start.
     """
 
-    __slots__ = ("_values", "count", "numbers", "tick")
+    __slots__ = ("_start", "_values", "count", "numbers", "tick")
 
-    def __init__(self, tick: int, numbers: Sequence[float], values: NDArray[np.float64] | None = None) -> None:
+    def __init__(
+        self,
+        tick: int,
+        numbers: Sequence[float],
+        values: NDArray[np.float64] | None = None,
+        start: Sequence[float] | None = None,
+    ) -> None:
         self.tick = tick
         self.numbers = numbers
+        self._start = numbers if start is None else start
         self.count = 0
         """How many commands an actuator has had in the tick before this one; 0 for readings."""
         self._values = values
@@ -64,8 +79,9 @@ class View:
         return self._values
 
     def read(self, slot: Slot) -> Sequence[float]:
-        """Return the numbers of a slot."""
-        return self.numbers[slot.at : slot.at + slot.size]
+        """Return the numbers of a slot: of another entity than the component's, those of the start of the tick."""
+        numbers = self._start if slot.is_others else self.numbers
+        return numbers[slot.at : slot.at + slot.size]
 
 
 class SlotReadings:
@@ -87,12 +103,12 @@ class WritableView(View):
 
     __slots__ = ("_commands", "_written")
 
-    def __init__(self, tick: int, numbers: list[float]) -> None:
-        super().__init__(tick, numbers)
+    def __init__(self, tick: int, numbers: list[float], start: Sequence[float] | None = None) -> None:
+        super().__init__(tick, numbers, None, start)
         self._written = numbers
-        self._commands: dict[str, int] = {}
+        self._commands: dict[object, int] = {}
 
-    def count_command(self, actuator: str) -> None:
+    def count_command(self, actuator: object) -> None:
         """Say in `count` how many commands of the tick an actuator has had before this one."""
         self.count = self._commands.get(actuator, 0)
         self._commands[actuator] = self.count + 1
@@ -104,13 +120,13 @@ class WritableView(View):
 
 
 class SolvingView(WritableView):
-    """A view in which entities go on: `numbers` are those before the tick, what is written is after it."""
+    """A view in which entities go on: `numbers` are those at the start of the tick, what is written is at its end."""
 
     __slots__ = ()
 
-    def __init__(self, tick: int, numbers: Sequence[float], written: list[float]) -> None:
-        super().__init__(tick, written)
-        self.numbers = numbers
+    def __init__(self, tick: int, start: Sequence[float], written: list[float]) -> None:
+        super().__init__(tick, written, start)
+        self.numbers = start
 
 
 class SensingView(WritableView):
@@ -134,8 +150,9 @@ class SensingView(WritableView):
 
 def check_write(slot: Slot, values: Sequence[float]) -> None:
     """Assert that a component may write these numbers to a slot."""
-    assert slot.is_own, f"a component writes {slot.name}, which is not its own"
+    assert slot.is_own, f"it writes {slot.name}, which is not its own and not declared in its writes"
     assert len(values) == slot.size, f"{len(values)} numbers for {slot.name}, which has {slot.size}"
+    assert all(map(isfinite, values)), f"{', '.join(map(str, values))} for {slot.name}: numbers of a frame are finite"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,8 +177,9 @@ class Mounting:
         return Slot(self.robot.offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", is_own)
 
     def of(self, entity: Entity, field: str) -> Slot:
-        """Return a field of any entity, to be read."""
-        return Slot(entity.offsets[field], entity.counts[field], f"{entity.name} {field}", False)
+        """Return a field of any entity, to be read: of another one as it was at the start of the tick."""
+        is_others = entity.index != self.robot.index
+        return Slot(entity.offsets[field], entity.counts[field], f"{entity.name} {field}", False, is_others)
 
 
 @dataclass(frozen=True, slots=True)

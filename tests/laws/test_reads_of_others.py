@@ -1,0 +1,138 @@
+"""What a form reads of another entity is that of the start of the tick, whichever nodes compute the two.
+
+Law 1 for forms that read others in every part of a tick, and that a name that is free again is another entity's.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import invalidate_caches
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from foosim.deployment.loader import load_deployment
+from foosim.node.edited_frame import edit
+from foosim.rehearsal.check.component_check import broken_laws
+from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.swarm.faults import PUSH_MAX
+from foosim.rehearsal.system import Settings, System
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.edits import Add, Remove, removed
+from foosim.world.frame import Frame
+from tests.forms.worlds import HALL, TABLE, World, driver
+
+NAME: Final = "others.yaml"
+READERS: Final = """
+from foosim.world.actuators.wheel_speeds import Drive, DriveActuator
+from foosim.world.forms.registry import actuator, entity_rule, rule
+from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, RuleSettings
+
+
+@entity_rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2})
+class Follows:
+    def __init__(self, settings, at):
+        rovers = at.layout.of("rover")
+        other = rovers[(rovers.index(at.robot) + 1) % len(rovers)]
+        self.others = [at.of(other, field) for field in ("position", "drive.set_point", "drive.asked")]
+        self.own, self.seen, self.set_point = at.slot("position"), at.slot("seen"), at.slot("set_point")
+
+    def apply(self, view):
+        position, set_point, asked = map(view.read, self.others)
+        view.write(self.seen, position[0] - view.read(self.own)[0] + asked[0])
+        view.write(self.set_point, *set_point)
+
+
+@actuator("asks", ActuatorSettings, Drive, slots={"set_point": 2, "asked": 1}, needs=("wheel_speeds",), kit="hall")
+class Asks(DriveActuator):
+    def __init__(self, settings, at):
+        super().__init__(settings, at)
+        rovers = at.layout.of("rover")
+        other = rovers[(rovers.index(at.robot) + 1) % len(rovers)]
+        self.asked, self.others = at.slot("asked"), at.of(other, "drive.set_point")
+
+    def accept(self, command, view):
+        view.write(self.asked, view.read(self.others)[0] + view.count)
+        return super().accept(command, view)
+
+    def command(self, view):
+        return tuple((speed, force / (2.0 + view.read(self.others)[0])) for speed, force in super().command(view))
+"""
+
+
+@pytest.fixture
+def readers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "own_readers.py").write_text(READERS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    sys.modules.pop("own_readers", None)
+    invalidate_caches()
+    world: World = HALL
+    rovers = [name for name, robot in HALL.data["robots"].items() if robot["model"] == "rover"]
+    for rover in rovers:
+        world = world.with_(("robots", rover, "actuators"), {"drive": {"kind": "own_readers:Asks"}}, ())
+        rules = {"battery": {"kind": "battery"}, "follows": {"kind": "own_readers:Follows"}}
+        world = world.with_(("robots", rover, "rules"), rules, ())
+    return World(world.data | {"players": driver(rovers, "own_readers:Asks", (1.2, 1.2), "10 Hz")}).text()
+
+
+def test_entity_rules_and_actuators_see_others_as_they_were(readers: str) -> None:
+    """On any number of nodes, with moved robots; and all that they see changes."""
+    assert list(broken_laws(readers, NAME, 150)) == []
+    frames = Frames()
+    rehearse(readers, NAME, 150, 1, settings=Settings(on_commit=frames))
+    for field in ("follows.seen", "follows.set_point", "drive.asked"):
+        assert len({frame.at("rover-1", field) for frame in frames.frames}) > 5, field
+
+
+def test_a_number_that_is_not_finite_ends_the_run_with_its_writer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = "view.write(self.set_point, 1.0, float('nan') if view.tick == 7 else 0.0)"
+    source = READERS.replace("view.write(self.set_point, *set_point)", written)
+    (tmp_path / "own_nan.py").write_text(source)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    invalidate_caches()
+    rules = {"battery": {"kind": "battery"}, "follows": {"kind": "own_nan:Follows"}}
+    world = HALL.with_(("robots", "rover-2", "rules"), rules, ())
+    for rover in ("rover-1", "rover-2", "rover-3"):
+        world = world.with_(("robots", rover, "actuators"), {"drive": {"kind": "own_nan:Asks"}}, ())
+    text = World(world.data | {"players": driver(("rover-1",), "own_nan:Asks", (1.0, 1.0), "10 Hz")}).text()
+    done = rehearse(text, NAME, 50, 2)
+    assert done.json["failed"]
+    assert "rule follows of rover-2 failed at tick 7" in done.json["reason"]
+    assert "1.0, nan for rover-2 follows.set_point: numbers of a frame are finite (own_nan.py:" in done.json["reason"]
+
+
+def test_what_comes_under_the_name_of_what_went_in_one_order_is_new() -> None:
+    """Its memory, that of rules about it, and references to the old one are gone."""
+    deployment = load_deployment(TABLE.text(), NAME)
+    start = initial_frame(deployment)
+    edits: list[Any] = [Add("second", "ball", (0.2, 0.0, 0.02), (0.0, 0.0, 0.0))]
+    layout, numbers = edit(start, edits, deployment)
+    waits = layout["second"].offsets["football.still_ticks"]
+    numbers[waits] = 17.0
+    frame = Frame(1, layout, np.array(numbers))
+    again: list[Any] = [Remove("second"), Add("second", "ball", (0.1, 0.1, 0.02), (0.0, 0.0, 0.0))]
+    assert removed(layout, again) == {"second"}
+    same, after = edit(frame, again, deployment)
+    assert same is layout and after[waits] == 0.0
+    assert after[layout["second"].offsets["position"]] == 0.1
+    assert after[: layout["second"].start] == numbers[: layout["second"].start]
+
+
+def test_a_state_that_cannot_be_is_said_once_with_what_it_is() -> None:
+    """A ball faster than its limit stands in quarantine from then on."""
+    lines: list[str] = []
+
+    def prepare(system: System) -> None:
+        for _ in range(2):
+            system.at_tick(30, lambda: system.request("push", name="ball", impulse=[PUSH_MAX, 0.0, 0.0]))
+
+    rehearse(
+        TABLE.text(), NAME, 60, 2, settings=Settings(on_log=lambda *said: lines.append(str(said))), prepare=prepare
+    )
+    said = [line for line in lines if "quarantine" in line]
+    assert len(said) == 1 and "ball stands in quarantine from here on: its new state is not within" in said[0]

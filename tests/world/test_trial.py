@@ -1,0 +1,298 @@
+"""What cannot work of other packages' forms is a problem of the deployment that names them, at its place, in a line."""
+
+from __future__ import annotations
+
+import sys
+from importlib import invalidate_caches
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import read_deployment
+from foosim.rehearsal.run import rehearse
+from tests.forms.worlds import HALL, ROVERS, World
+
+NAME: Final = "own.yaml"
+GOOD: Final = """
+from msgspec import Struct
+from foosim.world.components.entities import RuleMounting
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import actuator, entity_rule, kit, model, modifier, motion, rule, scene, sensor
+from foosim.world.forms.settings import (
+    ActuatorSettings, EntityRuleSettings, ModifierSettings, RobotSettings, RuleSettings, SceneSettings, SensorSettings)
+from foosim.world.scene import Body, Box, Link, Shape
+
+GREY = (0.5, 0.5, 0.5, 1.0)
+
+
+class Mover(RobotSettings):
+    pass
+
+
+@motion("slides", needs=("position", "velocity"), writes=("position", "velocity"))
+class Slides:
+    def __init__(self, at):
+        self.slots = {e.index: (at.slot(e, "position"), at.slot(e, "velocity")) for e in at.entities}
+
+    def move(self, entities, motors, view):
+        for entity, asked in zip(entities, motors):
+            position, velocity = self.slots[entity.index]
+            (x, y, z), dt = view.read(position), 0.02
+            speed = asked[0][0] if asked else 0.0
+            view.write(position, x + speed * dt, y, z)
+            view.write(velocity, speed, 0.0, 0.0)
+
+
+@model("mover", Mover, motion="own_forms:Slides", actuators={"speed": {"kind": "own_forms:Speed"}}, slots={
+    "position": 3, "orientation": 4, "velocity": 3, "quarantined": 1, "down": 1, "refused": 1})
+class Moves:
+    def __init__(self, settings, at):
+        self.at = at
+
+    def body(self):
+        shape = Shape(Box((0.1, 0.1, 0.1)), "", GREY)
+        return Body(self.at.robot.name, "mover", (0.0, 0.0, 0.0), (Link("hull", "free", (shape,), 0.0, (0.0,) * 3),))
+
+    def place(self, view):
+        view.write(self.at.slot("position"), 3.0, 2.0, 0.1)
+        view.write(self.at.slot("orientation"), 0.0, 0.0, 0.0, 1.0)
+
+    def is_plausible(self, numbers, before):
+        return True
+
+
+class Wanted(Struct, frozen=True):
+    speed: Metres
+
+
+@actuator("speed", ActuatorSettings, Wanted, slots={"wanted": 1})
+class Speed:
+    def __init__(self, settings, at):
+        self.wanted = at.slot("wanted")
+
+    def accept(self, command, view):
+        view.write(self.wanted, command.speed)
+        return True
+
+    def limits(self):
+        return {"speed": (-1.0, 1.0)}
+
+    def hold(self, view):
+        view.write(self.wanted, 0.0)
+
+    def stir(self, view):
+        view.write(self.wanted, 1.0)
+
+    def command(self, view):
+        return ((view.read(self.wanted)[0], 1.0),)
+
+
+class Reading(Struct, frozen=True):
+    x: Metres
+    y: Metres
+
+
+@sensor("places", SensorSettings, Reading, needs=("position",), slots={"count": 1})
+class Places:
+    def __init__(self, settings, at):
+        self.position, self.count = at.slot("position"), at.slot("count")
+
+    def sample(self, view):
+        view.write(self.count, view.read(self.count)[0] + 1.0)
+        return Reading(*view.read(self.position)[:2])
+
+
+@modifier("halves", ModifierSettings)
+class Halves:
+    def __init__(self, settings, at):
+        pass
+
+    def apply(self, values, view):
+        return [value / 2.0 for value in values]
+
+
+@entity_rule("wears", EntityRuleSettings, slots={"way": 1}, needs=("velocity",))
+class Wears:
+    def __init__(self, settings, at):
+        self.way, self.velocity = at.slot("way"), at.slot("velocity")
+
+    def apply(self, view):
+        view.write(self.way, view.read(self.way)[0] + abs(view.read(self.velocity)[0]))
+
+
+@rule("counts", RuleSettings, slots={"ticks": 1})
+class Counts:
+    def __init__(self, settings, at):
+        self.ticks = at.slot("ticks")
+
+    def place(self, view):
+        view.write(self.ticks, 5.0)
+
+    def apply(self, view):
+        view.write(self.ticks, view.read(self.ticks)[0] + 1.0)
+
+    def status(self, view):
+        return {"ticks": view.read(self.ticks)[0]}
+
+    @staticmethod
+    def text(status):
+        return f"{status['ticks']:.0f} ticks"
+
+
+@scene("pillar", SceneSettings)
+def pillar(settings):
+    return (Shape(Box((0.1, 0.1, 1.0)), "", GREY, (3.0, -2.0, 1.0), name="pillar"),)
+"""
+SENSOR: Final = {"kind": "own_forms:Places", "rate": "50 Hz", "modifiers": [{"kind": "own_forms:Halves"}]}
+
+
+def own_world() -> World:
+    """A hall with rovers, and all of somebody's own forms."""
+    world = HALL.with_(("robots", "mover"), {"model": "own_forms:Moves"}, ())
+    world = world.with_(("robots", "mover", "sensors"), {"places": SENSOR}, ())
+    world = world.with_(("robots", "mover", "rules"), {"wears": {"kind": "own_forms:Wears"}}, ())
+    world = world.with_(("robots", ROVERS[0], "sensors", "places"), SENSOR, ())
+    world = world.with_(("scene",), {"kind": "own_forms:pillar"}, ())
+    return world.with_(("rules",), {"counts": {"kind": "own_forms:Counts"}}, ())
+
+
+def planted(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
+    (folder / "own_forms.py").write_text(source)
+    monkeypatch.syspath_prepend(str(folder))
+    sys.modules.pop("own_forms", None)
+    invalidate_caches()
+
+
+def test_what_works_is_valid_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    planted(tmp_path, monkeypatch, GOOD)
+    done = rehearse(own_world().text(), NAME, 50, 2)
+    assert not done.json["failed"] and done.json["ticks"] == 55 - 5
+
+
+BROKEN: Final = {
+    "a model that raises": (
+        "self.at = at",
+        "raise ValueError('no such day')",
+        "robots:",
+        "no such day (own_forms.py:",
+    ),
+    "a model without a body": ("def body(self)", "def no_body(self)", "robots:", "has no attribute 'body'"),
+    "a body without links": ("(Link(", "() and (Link(", "robots:", "a body with links is needed"),
+    "a body that is none": (
+        "return Body(",
+        "return 3 and (lambda *a: 3)(",
+        "robots:",
+        "a Body, or None is needed, not 3",
+    ),
+    "a colour of three": (
+        'Shape(Box((0.1, 0.1, 0.1)), "", GREY)',
+        'Shape(Box((0.1, 0.1, 0.1)), "", GREY[:3])',
+        "robots:",
+        "a colour of four numbers is needed",
+    ),
+    "a place of two": ("3.0, 2.0, 0.1)", "3.0, 2.0)", "robots:", "2 numbers for mover position, which has 3"),
+    "a place that is not finite": ("3.0, 2.0, 0.1)", "3.0, float('nan'), 0.1)", "robots:", "nan"),
+    "no answer": (
+        "return True\n\n\nclass Wanted",
+        "pass\n\n\nclass Wanted",
+        "robots:",
+        "True or False is needed, not None",
+    ),
+    "a motion that raises": (
+        "speed = asked",
+        "speed = nowhere",
+        "",
+        "motion own_forms:Slides failed at tick 1: NameError",
+    ),
+    "a motion into nowhere": (
+        "x + speed * dt",
+        "float('inf')",
+        "",
+        "inf, 2.0, 0.1 for mover position: numbers of a frame are",
+    ),
+    "a slot that is none": ('at.slot("count")', 'at.slot("cuont")', "robots.rover-1:", "cuont"),
+    "a reading of another type": ("return Reading(", "return tuple(", "robots.rover-1.sensors:", "tuple"),
+    "too few numbers": (
+        "for value in values]",
+        "for value in values[1:]]",
+        "robots.rover-1.sensors:",
+        "8 bytes, places has 16",
+    ),
+    "numbers that are texts": (
+        "value / 2.0",
+        "'half'",
+        "robots.rover-1.sensors:",
+        "required argument is not a float",
+    ),
+    "limits of no field": (
+        '{"speed": (',
+        '{"sped": (',
+        "robots.mover.actuators",
+        "limits of fields of the command (speed)",
+    ),
+    "no limits": ("def limits", "def no_limits", "robots.mover.actuators", "has no attribute 'limits'"),
+    "a hold that raises": (
+        "def hold(self, view):",
+        "def hold(self, view):\n        1 / 0",
+        "robots.mover.actuators",
+        "division by",
+    ),
+    "motors that are none": ("return ((view", "return [(view", "robots.mover.actuators:", "own_forms"),
+    "one motor, flat": (
+        "[0], 1.0),)",
+        "[0], 1.0))",
+        "robots.mover.actuators",
+        "a target speed and a greatest force",
+    ),
+    "a rule that raises": ("self.ticks = at.slot", "self.ticks = at.clot", "", "clot"),
+    "a rule's place that is none": (
+        "def place(self, view):\n        view.write(self.ticks, 5.0)",
+        "place = 3",
+        "",
+        "not callable",
+    ),
+    "a rule that writes nothing": (
+        "[0] + 1.0)\n\n    def status",
+        "[0] + None)\n\n    def status",
+        "",
+        "rule counts of the world failed",
+    ),
+    "a status that is none": ('return {"ticks"', 'return 3 and {"tocks"', "", "a text is needed"),
+    "a status with an object": (
+        '{"ticks": view.read(self.ticks)[0]}',
+        '{"ticks": 5, "self": self}',
+        "",
+        "the status fails",
+    ),
+    "an entity rule of texts": (
+        "abs(view.read(self.velocity)[0])",
+        "'x'",
+        "",
+        "rule wears of mover failed at tick 1: TypeError",
+    ),
+    "a scene of nothing": (
+        "return (Shape(Box((0.1, 0.1, 1.0))",
+        "return None and (Shape(Box((0.1, 0.1, 1.0))",
+        "",
+        "a tuple of shapes is needed, not None",
+    ),
+    "a scene of size 0": ("Box((0.1, 0.1, 1.0))", "Box((0.1, 0.0, 1.0))", "", "a size above 0 is needed"),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_what_cannot_work_is_refused_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    good, bad, place, said = BROKEN[what]
+    assert good in GOOD
+    source = GOOD.replace(good, bad, 1)
+    if what == "motors that are none":
+        source = source.replace("[0], 1.0),)", "[0], 1.0)]")
+        said = "a tuple with what is asked of each motor is needed"
+    planted(tmp_path, monkeypatch, source)
+    with pytest.raises(DeploymentError) as refused:
+        read_deployment(own_world().text(), NAME)
+    lines = str(refused.value).splitlines()
+    assert any(said in line and f": {place}" in line for line in lines), lines
+    assert all(line.startswith(f"{NAME}:") and "Traceback" not in line for line in lines)
