@@ -28,13 +28,17 @@ from tests.forms.worlds import HALL, TABLE, World, driver
 NAME: Final = "others.yaml"
 READERS: Final = """
 from foosim.world.actuators.wheel_speeds import Drive, DriveActuator
-from foosim.world.forms.registry import actuator, entity_rule, rule
-from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, RuleSettings
+from msgspec import Struct
+from foosim.world.components.surroundings import Surroundings
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import actuator, entity_rule, sensor
+from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, SensorSettings
 
 
-@entity_rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2})
+@entity_rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2, "near": 1})
 class Follows:
     def __init__(self, settings, at):
+        self.near, self.around = at.slot("near"), Surroundings(at.spec, at.layout)
         rovers = at.layout.of("rover")
         other = rovers[(rovers.index(at.robot) + 1) % len(rovers)]
         self.others = [at.of(other, field) for field in ("position", "drive.set_point", "drive.asked")]
@@ -44,6 +48,22 @@ class Follows:
         position, set_point, asked = map(view.read, self.others)
         view.write(self.seen, position[0] - view.read(self.own)[0] + asked[0])
         view.write(self.set_point, *set_point)
+        near = self.around.near(view, tuple(view.read(self.own)), 1.8, "vehicle")
+        view.write(self.near, sum(self.around.position(view, entity)[1] for entity in near))
+
+
+class Near(Struct, frozen=True):
+    x: Metres
+
+
+@sensor("neighbours", SensorSettings, Near, needs=("position",))
+class Neighbours:
+    def __init__(self, settings, at):
+        self.own, self.around = at.slot("position"), Surroundings(at.spec, at.layout)
+
+    def sample(self, view):
+        near = self.around.near(view, tuple(view.read(self.own)), 1.8, "vehicle")
+        return Near(sum(self.around.position(view, entity)[0] for entity in near))
 
 
 @actuator("asks", ActuatorSettings, Drive, slots={"set_point": 2, "asked": 1}, needs=("wheel_speeds",), kit="hall")
@@ -75,6 +95,8 @@ def readers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
         world = world.with_(("robots", rover, "actuators"), {"drive": {"kind": "own_readers:Asks"}}, ())
         rules = {"battery": {"kind": "battery"}, "follows": {"kind": "own_readers:Follows"}}
         world = world.with_(("robots", rover, "rules"), rules, ())
+        sensors = {"neighbours": {"kind": "own_readers:Neighbours", "rate": "50 Hz"}}
+        world = world.with_(("robots", rover, "sensors"), sensors, ())
     return World(world.data | {"players": driver(rovers, "own_readers:Asks", (1.2, 1.2), "10 Hz")}).text()
 
 
@@ -83,7 +105,7 @@ def test_entity_rules_and_actuators_see_others_as_they_were(readers: str) -> Non
     assert list(broken_laws(readers, NAME, 150)) == []
     frames = Frames()
     rehearse(readers, NAME, 150, 1, settings=Settings(on_commit=frames))
-    for field in ("follows.seen", "follows.set_point", "drive.asked"):
+    for field in ("follows.seen", "follows.set_point", "follows.near", "drive.asked"):
         assert len({frame.at("rover-1", field) for frame in frames.frames}) > 5, field
 
 

@@ -420,6 +420,43 @@ def test_a_run_waits_for_a_node_that_is_started_by_hand_and_ends_in_order_when_a
     assert house.processes_with(str(house.folder)) == {}
 
 
+DOZES: Final = """
+import time
+from msgspec import Struct
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+
+
+class Nothing(Struct, frozen=True):
+    x: Metres
+
+
+@sensor("dozes", SensorSettings, Nothing)
+class Dozes:
+    def __init__(self, settings, at):
+        pass
+
+    def sample(self, view):
+        if view.tick == 10:
+            time.sleep(1.0)
+        return Nothing(0.0)
+"""
+
+
+def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow the machine is otherwise: nobody else is waited for at that tick."""
+    (house.folder / "dozes.py").write_text(DOZES)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
+    up = house.up(
+        "--set", own, "--set", "engine=pure", "--for", "60 ms", "--pace", "realtime", "--no-capture", each=True
+    )
+    code, out, err = house.end(up)
+    assert code == 0, err
+    assert "waited for red" in out + err, (out, err)
+
+
 def free_port() -> int:
     """A port that was free a moment ago, and whose next one was."""
     with socket.socket() as one, socket.socket() as other:

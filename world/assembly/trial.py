@@ -20,6 +20,7 @@ from foosim.world.components.fitted import FittedActuator, FittedSensor, actuato
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, WritableView
 from foosim.world.forms import registry
+from foosim.world.forms.forms import Kit, Model
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, build_layout
 from foosim.world.scene import Body, Shape
@@ -74,7 +75,11 @@ class _Trial:
         """Make kits and scene, and ask for all that they have."""
         spec = self._spec
         for name, section in sorted(spec.kits.items()):
-            kit: Any = self._attempt((name,), f"kit {name}", registry.find("kit", name).made, section, spec)
+            form = registry.find("kit", name)
+            assert isinstance(form, Kit), form
+            for model in form.addable:
+                self._attempt((name,), f"kit {name}: {model}", _check_addable, registry.find_model(model))
+            kit: Any = self._attempt((name,), f"kit {name}", form.made, section, spec)
             if kit is not None:
                 self._attempt((name,), f"kit {name}: shapes", lambda kit=kit: _check_shapes(kit.shapes()))
                 self._attempt((name,), f"kit {name}: physics", lambda kit=kit: kit.physics())
@@ -179,6 +184,11 @@ def _check_shape(shape: Any) -> None:
     sizes = [getattr(shape.geometry, name, None) for name in ("radius", "length")]
     sizes += getattr(shape.geometry, "half", ())
     _need(all(size is None or (isfinite(size) and size > 0) for size in sizes), "a size above 0", shape.geometry)
+
+
+def _check_addable(model: Model) -> None:
+    lacking = [method for method in ("check_place", "place_at") if not hasattr(model.made, method)]
+    _need(not lacking and "position" in model.slots, "a model with position, check_place and place_at", model.name)
 
 
 def _check_findings(findings: Iterable[Any]) -> None:

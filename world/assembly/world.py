@@ -18,6 +18,7 @@ from foosim.world.components.entities import (
     Motors,
     Rule,
     RuleMounting,
+    mounting_of,
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import ComponentError, Mounting, SolvingView, View, WritableView
@@ -34,9 +35,8 @@ NO_TEXT: Final = "no text of"
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
     """Return an entity as its model. Raises ComponentError."""
-    at = Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.kind.slots))
     try:
-        model: Model = entity.kind.made(spec.robots.get(entity.name), at)
+        model: Model = entity.kind.made(spec.robots.get(entity.name), mounting_of(spec, layout, entity))
     except Exception as error:
         raise ComponentError(f"model {entity.model} of {entity.name}", 0, error) from error
     return model

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
-from foosim.world.components.view import Slot, SolvingView, WritableView
+from foosim.common.keyed_random import draw_key
+from foosim.world.components.view import Mounting, Slot, SolvingView, WritableView
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.physics import Physics
 from foosim.world.scene import Body, Shape
@@ -108,6 +109,11 @@ class Kit(Protocol):
 
     def findings(self) -> Iterator[Finding]:
         """Yield what is wrong with places: what needs all single settings to be right."""
+
+
+def mounting_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Mounting:
+    """Return what the model of an entity is made with."""
+    return Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.kind.slots))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.entities import mounting_of
+from foosim.world.components.view import View
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.scene import Body, Pose, Vector
@@ -23,7 +24,10 @@ class Contacts(NamedTuple):
 
 
 class Surroundings:
-    """The entities of one layout, as forms see them. What it keeps follows from deployment and layout."""
+    """The entities of one layout, as forms see them: a form makes one of what its mounting has.
+
+    Where they are is of the start of the tick, the same in all nodes. What it keeps follows from deployment and layout.
+    """
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self._spec, self._layout = spec, layout
@@ -41,7 +45,7 @@ class Surroundings:
     def poses(self, view: View, entity: Entity) -> list[Pose]:
         """Return name, position (m) and orientation of each link of an entity, in the world frame; none without one."""
         body = self._body(entity)
-        return [] if body is None else forward_kinematics(body, entity, view.numbers)
+        return [] if body is None else forward_kinematics(body, entity, view.start)
 
     def position(self, view: View, entity: Entity) -> Vector | None:
         """Return where the first link of an entity is (m, world frame); None of what has none."""
@@ -65,13 +69,13 @@ class Surroundings:
         at = entity.offsets.get("contacts")
         if at is None:
             return Contacts(0, 0.0, -1)
-        touches, impulse, last = view.numbers[at : at + 3]
+        touches, impulse, last = view.start[at : at + 3]
         return Contacts(int(touches), impulse, int(last))
 
     def _body(self, entity: Entity) -> Body | None:
         if entity.name == WORLD:
             return None
         if entity.name not in self._bodies:
-            at = Mounting(self._spec, self._layout, entity, "", b"")
+            at = mounting_of(self._spec, self._layout, entity)
             self._bodies[entity.name] = entity.kind.made(self._spec.robots.get(entity.name), at).body()
         return self._bodies[entity.name]

@@ -50,10 +50,10 @@ class View:
 
     `numbers` are those of all entities, SI units, in the world frame of reference; they are not written to directly.
     Those of other entities than the component's may be of the tick's start or of its end, as nodes share the work: they
-    are read by `read`, which gives what they were at the start.
+    are read by `read`, which gives what they were at the start, or from `start`, all numbers as they were then.
     """
 
-    __slots__ = ("_start", "_values", "count", "numbers", "tick")
+    __slots__ = ("_values", "count", "numbers", "start", "tick")
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class View:
     ) -> None:
         self.tick = tick
         self.numbers = numbers
-        self._start = numbers if start is None else start
+        self.start = numbers if start is None else start
         self.count = 0
         """How many commands an actuator has had in the tick before this one; 0 for readings."""
         self._values = values
@@ -80,7 +80,7 @@ class View:
 
     def read(self, slot: Slot) -> Sequence[float]:
         """Return the numbers of a slot: of another entity than the component's, those of the start of the tick."""
-        numbers = self._start if slot.is_others else self.numbers
+        numbers = self.start if slot.is_others else self.numbers
         return numbers[slot.at : slot.at + slot.size]
 
 

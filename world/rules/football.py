@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
-from foosim.world.components.entities import Marked, MarkKind, RuleMounting
-from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.components.entities import Marked, MarkKind, RuleMounting, mounting_of
+from foosim.world.components.view import View, WritableView
 from foosim.world.forms.registry import rule
 from foosim.world.forms.settings import RuleSettings
 from foosim.world.layout import WORLD, Entity
@@ -196,7 +196,7 @@ class _Ball:
         self.still, self.out, self.wait = (at.of(entity, field) for field in OF_BALL)
         self.position, self.velocity = entity.offsets["position"], entity.offsets["linear_velocity"]
         self.quarantined = entity.offsets["quarantined"]
-        self._model = Ball(None, Mounting(at.spec, at.layout, entity, "", b"", frozenset(entity.kind.slots)))
+        self._model = Ball(None, mounting_of(at.spec, at.layout, entity))
 
     def place(self, view: WritableView, position: Vector, velocity: Vector = ORIGIN) -> None:
         """Set it to a place (m) with a velocity (m/s), and forget what was counted."""
