@@ -452,9 +452,9 @@ class BulletEngine:
                 else:
                     speeds, forces = zip(*motors, strict=True)
                 drive(chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
-                self._idle.discard(name)
                 if 0.0 in forces:
                     self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
+        self._idle.difference_update([entity.name for entity in entities])
 
     def step(self, substeps: int) -> None:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""

@@ -186,6 +186,7 @@ class World:
             index: actuators for index, actuators in fitted.items() if actuators
         }
         """What moves each robot that has actuators, by the entity's index."""
+        self._only = {index: its[0] for index, its in fitted.items() if len(its) == 1}
         self._motions = _motions_of(spec, layout)
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
@@ -222,14 +223,24 @@ class World:
         """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""
         found: list[Motors] = []
         for entity in entities:
-            asked = NO_MOTORS
-            for one in self.actuators.get(entity.index, ()):
-                try:
-                    asked += one.actuator.command(view)
-                except Exception as error:
-                    raise one.failed(view.tick, error) from error
-            found.append(asked)
+            one = self._only.get(entity.index)
+            if one is None:
+                found.append(self._motors_of_several(entity, view))
+                continue
+            try:
+                found.append(one.actuator.command(view))
+            except Exception as error:
+                raise one.failed(view.tick, error) from error
         return found
+
+    def _motors_of_several(self, entity: Entity, view: View) -> Motors:
+        asked = NO_MOTORS
+        for one in self.actuators.get(entity.index, ()):
+            try:
+                asked += one.actuator.command(view)
+            except Exception as error:
+                raise one.failed(view.tick, error) from error
+        return asked
 
     def apply_entity_rules(
         self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int

@@ -104,7 +104,9 @@ class WritableView(View):
     __slots__ = ("_commands", "_written")
 
     def __init__(self, tick: int, numbers: list[float], start: Sequence[float] | None = None) -> None:
-        super().__init__(tick, numbers, None, start)
+        self.tick, self.numbers, self.count = tick, numbers, 0  # as a View has them: there are several in each tick
+        self.start = numbers if start is None else start
+        self._values: NDArray[np.float64] | None = None
         self._written = numbers
         self._commands: dict[object, int] = {}
 
@@ -115,8 +117,10 @@ class WritableView(View):
 
     def write(self, slot: Slot, *values: float) -> None:
         """Write all numbers of a slot, which the component must have declared."""
-        check_write(slot, values)
-        self._written[slot.at : slot.at + slot.size] = values
+        size = slot.size
+        if not (slot.is_own and len(values) == size and all(map(isfinite, values))):
+            check_write(slot, values)
+        self._written[slot.at : slot.at + size] = values
 
 
 class SolvingView(WritableView):
