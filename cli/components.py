@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.runtime.command import DONE, FAILED
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Component, Form
 from foosim.world.forms.payloads import PayloadCodec
@@ -28,6 +31,42 @@ def chosen(form: str | None, name: str | None) -> list[Form]:
         raise
     except Refused as error:
         raise BadValue(error.what, name) from None
+
+
+def checked(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
+    """Check a form in a deployment that uses it, and print what was found; return the exit code."""
+    from foosim.cli.rehearse import elsewhere
+    from foosim.rehearsal.check.component_check import ComponentCheck, used_form
+
+    form = used_form(text, str(file), name)
+    label, folder = f"{form.form} {form.name}", file.parent
+    check = ComponentCheck(text, str(file), ticks, seed, folder)
+    if sys.stderr.isatty():
+        check.on_step = _note
+    is_broken = False
+    try:
+        for line in check.broken():
+            is_broken = True
+            print(f"{label}: {line}", flush=True)
+        if not check.has_failed:
+            check.begin("in another process")
+            for line in elsewhere(text, str(file), ticks, folder):
+                is_broken = True
+                print(f"{label}: {line}", flush=True)
+    except KeyboardInterrupt:
+        _note(f"{label}: interrupted, {check.now}")
+        raise
+    if not is_broken:
+        print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    if not check.has_failed:
+        print(f"{label}: {check.compared} of {check.sensors} sensors measured, and were compared alone and with others")
+    return FAILED if is_broken else DONE
+
+
+def _note(line: str) -> None:
+    """Write a line beside the result, in one piece."""
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def as_json(component: Form) -> dict[str, Any]:

@@ -20,7 +20,8 @@ from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
 from foosim.common.json_text import decode_json, encode_json
-from foosim.deployment.loader import apply_sets
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
@@ -199,20 +200,33 @@ HASH_SEED: Final = "4711"
 """Of the other process: sets of texts have another order there."""
 
 
-def elsewhere(text: str, name: str, ticks: int) -> Iterator[str]:
-    """Yield that a process with another seed of Python's hashes computes another world than this one."""
-    here: dict[str, Any] = rehearse(text, name, ticks, 1).json
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / Path(name).name
+LAST_LINES: Final = 10
+"""Of what another process said before it failed."""
+
+
+def elsewhere(text: str, name: str, ticks: int, folder: Path | None = None) -> Iterator[str]:
+    """Yield that a process with another seed of Python's hashes computes another world than this one.
+
+    `folder` is the base of the relative paths of the deployment's files (None: the current folder).
+    """
+    here: dict[str, Any] = rehearse(text, name, ticks, 1, folder=folder).json
+    with TemporaryDirectory() as temporary:
+        file = Path(temporary) / Path(name).name
         file.write_text(text)
+        assets = load_deployment(text, name).assets
+        for path, content in pin_assets(text, name, folder or Path())[1].items():
+            asset = Path(temporary, assets, path)
+            asset.parent.mkdir(parents=True, exist_ok=True)
+            asset.write_bytes(content)
         span = f"{ticks * here['tick_ns']}ns"
         command = [sys.executable, "-c", REHEARSE, str(file), "--for", span, "--nodes", "1", "--json"]
         environment = {**os.environ, "PYTHONHASHSEED": HASH_SEED}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        yield f"in another process it fails: {done.stderr.strip()[-400:]}"
+        said = [line for line in done.stderr.splitlines() if line.strip()][-LAST_LINES:]
+        yield "\n  ".join([f"in another process it fails, with exit code {done.returncode}:", *said])
         return
-    there = decode_json(done.stdout.encode())
+    there = decode_json(done.stdout.splitlines()[-1].encode())  # before it is what modules print
     assert isinstance(there, dict), there
     if there["digest"] != here["digest"]:
         yield "another process computes another world"

@@ -371,21 +371,16 @@ def check_component(
 
     Rehearses on one, two and three nodes with moved robots and objects made anew, in another process, with all named
     in another order, beside a robot that does nothing and beside a second one of each sensor; compares sensors alone
-    with many at once. Prints what differs, with tick and slot.
+    with many at once. Prints what differs, with tick and slot. On a terminal, standard error has the rehearsal that it
+    is in.
+
+    Exit codes: 0 nothing differs, 1 something does, 2 bad input, 130 Ctrl-C.
     """
-    from foosim.cli.rehearse import elsewhere
+    from foosim.cli.components import checked
     from foosim.deployment.loader import apply_sets
     from foosim.deployment.text.files import read_source_file
-    from foosim.rehearsal.check.component_check import broken_laws, used_form
 
-    text = apply_sets(read_source_file(file), str(file), sets or [])
-    form = used_form(text, str(file), name)
-    broken = [*broken_laws(text, str(file), ticks, seed), *elsewhere(text, str(file), ticks)]
-    for line in broken:
-        print(f"{form.form} {form.name}: {line}")
-    if broken:
-        raise typer.Exit(1)
-    print(f"{form.form} {form.name}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    raise typer.Exit(checked(apply_sets(read_source_file(file), str(file), sets or []), file, name, ticks, seed))
 
 
 @app.command()
