@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, redirect_stdout
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Final
@@ -26,6 +27,7 @@ from foosim.deployment.text.files import read_source_file
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
@@ -202,6 +204,42 @@ HASH_SEED: Final = "4711"
 
 LAST_LINES: Final = 10
 """Of what another process said before it failed."""
+
+
+def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
+    """Check a form in a deployment that uses it, and print what was found; return the exit code."""
+    form = used_form(text, str(file), name)
+    label, folder = f"{form.form} {form.name}", file.parent
+    text, files = pin_assets(text, str(file), folder)
+    check = ComponentCheck(text, str(file), ticks, seed, files, partial(rehearse, folder=folder))
+    if sys.stderr.isatty():
+        check.on_step = _told_of_step
+    is_broken = False
+    try:
+        for line in _all_broken(check, folder):
+            is_broken = True
+            print(f"{label}: {line}", flush=True)
+    except KeyboardInterrupt:
+        _told_of_step(f"{label}: interrupted, {check.now}")
+        raise
+    if not is_broken:
+        print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    if not check.has_failed:
+        print(f"{label}: {check.compared} of {check.sensors} sensors measured, and were compared alone and with others")
+    return FAILED if is_broken else DONE
+
+
+def _all_broken(check: ComponentCheck, folder: Path) -> Iterator[str]:
+    yield from check.broken()
+    if not check.has_failed:
+        check.begin("in another process")
+        yield from elsewhere(check.text, check.name, check.ticks, folder)
+
+
+def _told_of_step(line: str) -> None:
+    """Write a line beside the result, in one piece: an interrupt may come at any time."""
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def elsewhere(text: str, name: str, ticks: int, folder: Path | None = None) -> Iterator[str]:

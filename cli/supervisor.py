@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -376,11 +377,12 @@ def check_component(
 
     Exit codes: 0 nothing differs, 1 something does, 2 bad input, 130 Ctrl-C.
     """
-    from foosim.cli.components import checked
+    from foosim.cli import rehearse
     from foosim.deployment.loader import apply_sets
     from foosim.deployment.text.files import read_source_file
 
-    raise typer.Exit(checked(apply_sets(read_source_file(file), str(file), sets or []), file, name, ticks, seed))
+    text = apply_sets(read_source_file(file), str(file), sets or [])
+    raise typer.Exit(rehearse.check_component(text, file, name, ticks, seed))
 
 
 @app.command()
@@ -394,12 +396,14 @@ def components(
     """Show the models, sensors, rules and other forms that a deployment can name on this machine.
 
     They are foosim's own and those of installed packages (entry points of the group `foosim.world`). With a name:
-    settings with their units, limits and defaults, the fields of its readings or commands, and what it remembers.
+    settings with their units, limits and defaults, the fields of its readings or commands, what it remembers and
+    writes, and what a model or kit brings.
     """
     from foosim.cli.components import as_json, chosen, line, lines
     from foosim.common.json_text import encode_json
 
-    found = chosen(form, name)
+    with redirect_stdout(sys.stderr):  # what modules print is no result
+        found = chosen(form, name)
     if json:
         print(encode_json([as_json(component) for component in found]).decode())
         return
@@ -418,7 +422,9 @@ def schema(
     """
     from foosim.deployment.json_schema import deployment_schema_text
 
-    print(deployment_schema_text(installed=not own), end="")
+    with redirect_stdout(sys.stderr):  # what modules print is no result
+        text = deployment_schema_text(installed=not own)
+    print(text, end="")
 
 
 @app.command("install")

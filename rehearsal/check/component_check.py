@@ -7,11 +7,10 @@ the file or keeps an entity as a number is found by that, whatever it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, UnknownName
@@ -78,14 +77,16 @@ def _silent(line: str) -> None:
 class ComponentCheck:
     """One check of a deployment: what it found is yielded by `broken`, where it is goes to `on_step`.
 
-    `folder` is the base of the relative paths of the deployment's files (None: the current folder).
+    `files` are the contents of the files that the text names, by path; their digests are in it (`pin_assets`). `run`
+    rehearses, from the folder that these files are in.
     """
 
     text: str
     name: str
     ticks: int
     seed: int = 1
-    folder: Path | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    run: Callable[..., Rehearsed] = rehearse
     on_step: Callable[[str], None] = _silent
     now: str = "before its first rehearsal"
     sensors: int = 0
@@ -121,7 +122,7 @@ class ComponentCheck:
             if many.json["failed"] or many.digests != first.digests:
                 where = first_difference(alone, frames) or str(many.json["reason"])
                 yield f"{shared} the world is another one: {where}"
-        senses = Senses(self.text, self.name, self.folder)
+        senses = Senses(self.text, self.name, self.files)
         readings = Readings()
         yield from alone_and_together(senses, alone, readings)
         self.sensors, self.compared = senses.count, len(readings.sampled)
@@ -129,7 +130,7 @@ class ComponentCheck:
             self.begin(what.removesuffix(","))
             beside, frames = self._rehearsed(other, 1)
             where = first_difference(alone, frames)
-            where = where or first_other_reading(senses, alone, Senses(other, self.name, self.folder), frames)
+            where = where or first_other_reading(senses, alone, Senses(other, self.name, self.files), frames)
             if beside.json["failed"] or where:
                 yield f"{what} the world is another one: {where or beside.json['reason']}"
 
@@ -138,9 +139,7 @@ class ComponentCheck:
     ) -> tuple[Rehearsed, list[Frame]]:
         frames = Frames()
         settings = Settings(on_commit=frames)
-        return rehearse(
-            text, self.name, self.ticks, nodes, settings=settings, prepare=prepare, folder=self.folder
-        ), frames.frames
+        return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames.frames
 
 
 def broken_laws(text: str, name: str, ticks: int, seed: int = 1) -> Iterator[str]:

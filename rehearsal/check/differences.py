@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
@@ -57,8 +55,7 @@ def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
 class Senses:
     """The sensors of a deployment, fitted to the layouts of its frames; `count` is how many there are."""
 
-    def __init__(self, text: str, name: str, folder: Path | None = None) -> None:
-        text, files = pin_assets(text, name, folder or Path())
+    def __init__(self, text: str, name: str, files: Mapping[str, bytes]) -> None:
         self._deployment = load_deployment(text, name).with_assets(files)
         self._sensors: dict[bytes, list[FittedSensor]] = {}
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
