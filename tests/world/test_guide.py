@@ -12,9 +12,11 @@ from collections.abc import Mapping
 from itertools import combinations
 from math import hypot
 from pathlib import Path
+from textwrap import dedent
 from typing import Any, Final, NamedTuple
 
 import pytest
+from yaml import safe_load
 
 ROOT: Final = Path(__file__).parents[2]
 GUIDE: Final = ROOT / "docs" / "how-to" / "extending.md"
@@ -236,6 +238,25 @@ def test_a_kit_of_ones_own_is_a_section_that_checks_places(tmp_path: Path) -> No
     assert "robots.alpha.model: starts outside of the yard's 3.0 m" in refused.stderr
     named = run(tmp_path, SUPERVISOR, "components", "model", "omni")
     assert named.returncode == 0 and "model omni, of omni:Omni" in named.stdout
+
+
+def test_the_reference_has_rules_and_a_scene_that_are_valid(tmp_path: Path) -> None:
+    """Those that it shows, in the guide's yard and in the warehouse."""
+    page = (ROOT / "docs" / "reference" / "deployment.md").read_text()
+    section = page[page.index("## Kits, rules, scene") : page.index("## Components of robots")]
+    of_world, of_robot = re.findall(r"(?:^    .*\n)+", section, re.MULTILINE)
+    yard, _ = planted(tmp_path, "omni.py")
+    files = examples()
+    for name in ("laps.py", "service.py"):
+        (tmp_path / name).write_text(files[name])
+    text = re.sub(r"scene: .*\n", dedent(of_world), files["yard.yaml"])
+    Path(yard).write_text(text)
+    sets = [f"robots.rover01.rules={json.dumps(safe_load(of_robot)['robots']['rover01']['rules'])}"]
+    for deployment, more in ((yard, []), (str(ROOT / "deploy" / "warehouse.yaml"), sets)):
+        arguments = [word for setting in more for word in ("--set", setting)]
+        done = run(tmp_path, REHEARSE, deployment, *arguments, "--for", "100ms", "--json")
+        assert done.returncode == 0, done.stderr
+        assert ("laps" in json.loads(done.stdout)) == (deployment == yard)
 
 
 def test_versions_of_what_is_not_foosims_follow_its_source(tmp_path: Path) -> None:
