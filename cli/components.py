@@ -7,12 +7,34 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Component, Form
+from foosim.world.forms.forms import ROBOTS, Component, Form
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.registry import FORMS
+from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
 
 CARRIES: Final = {"sensor": "reading", "actuator": "command"}
 """What the values of a form are called."""
+OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
+    "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
+    "motion": ("writes",),
+    "rule": ("each", "writes"),
+    "entity_rule": ("writes",),
+    "kit": ("entities", "addable", "rules"),
+}
+"""What is told of a form beside what all have: its fields."""
+SETTINGS_OF: Final[Mapping[str, str]] = {
+    SensorSettings.__name__: "sensor",
+    ActuatorSettings.__name__: "actuator",
+    ModifierSettings.__name__: "modifier",
+    EntityRuleSettings.__name__: "entity_rule",
+}
+"""Settings that are those of any component of a form."""
+BOUNDS: Final[Mapping[str, str]] = {
+    "minimum": "at least",
+    "exclusiveMinimum": "more than",
+    "maximum": "at most",
+    "exclusiveMaximum": "less than",
+}
 
 
 def chosen(form: str | None, name: str | None) -> list[Form]:
@@ -43,6 +65,7 @@ def as_json(component: Form) -> dict[str, Any]:
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
         "meshes": getattr(component, "meshes", False),
+        **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.form, ())},
     }
     if isinstance(component, Component) and component.value is not None:
         fields = PayloadCodec(component.value, component.name).fields
@@ -72,16 +95,53 @@ def lines(component: Form) -> Iterator[str]:
         units = [f"{field['field']}{'[]' if field['several'] else ''} {field['unit']}".rstrip() for field in fields]
         yield f"  {CARRIES[component.form]}: {', '.join(units)}"
     if about["slots"]:
-        counted = (field if size == 1 else f"{field}[{size}]" for field, size in about["slots"].items())
-        yield f"  slots: {', '.join(counted)}"
+        yield f"  slots: {_counted(about['slots'])}"
     elif about["slots"] is None:
         yield "  slots: by its settings"
     if about["needs"]:
         yield f"  needs a model with: {', '.join(about['needs'])}"
+    yield from _lines_of_form(about)
     if about["meshes"]:
         yield "  has scenery of triangles (shape: mesh)"
     if component.kit:
         yield f"  needs a deployment with: {component.kit}"
+
+
+def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is told of a form beside what all have; nothing of what is empty."""
+    for whose, slots in about.get("each", {}).items():
+        yield f"  slots of each {'robot' if whose == ROBOTS else whose}: {_counted(slots)}"
+    if about.get("writes"):
+        yield f"  writes: {', '.join(about['writes'])}"
+    if about["form"] == "model":
+        yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
+        yield f"  moved by: {'an engine' if about['is_rigid'] else about['motion'] or 'nothing'}"
+    usual = "usual " if about["form"] == "model" else ""
+    for key in ("actuators", "rules"):
+        if about.get(key):
+            kinds = {name: settings["kind"] for name, settings in about[key].items()}
+            yield f"  {usual}{key}: {_paired(kinds)}"
+    if about.get("tags"):
+        yield f"  tags: {', '.join(about['tags'])}"
+    if about.get("entities"):
+        yield f"  beside the robots: {_paired(about['entities'])}"
+    if about.get("addable"):
+        yield f"  can be added: {', '.join(about['addable'])}"
+
+
+def _paired(kinds: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} ({kind})" for name, kind in kinds.items())
+
+
+def _counted(slots: Mapping[str, int]) -> str:
+    return ", ".join(field if size == 1 else f"{field}[{size}]" for field, size in slots.items())
+
+
+def _plain(value: Any) -> Any:
+    """Return mappings and sequences as JSON has them."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _settings(component: Form) -> Iterator[tuple[str, str, str | None]]:
@@ -97,7 +157,7 @@ def _properties(
     required = schema.get("required", ())
     for key, value in schema["properties"].items():
         found = _followed(value, definitions)
-        each = _followed(found.get("additionalProperties", {}), definitions)
+        each = _followed(_inner(found), definitions)
         if "properties" in found:
             yield from _properties(found, definitions, f"{path}{key}.")
         elif "properties" in each and "kind" not in each["properties"]:
@@ -105,6 +165,11 @@ def _properties(
         elif key != "kind":
             default = None if key in required else str(value.get("default", ""))
             yield f"{path}{key}", _valid(found), default
+
+
+def _inner(value: Mapping[str, Any]) -> Any:
+    """Return the schema of what a mapping has by any name; nothing of what is none."""
+    return next(iter(value.get("patternProperties", {}).values()), value.get("additionalProperties", {}))
 
 
 def _followed(value: Any, definitions: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -123,5 +188,9 @@ def _valid(value: Mapping[str, Any]) -> str:
         return str(value["description"])
     if "enum" in value:
         return " or ".join(map(str, value["enum"]))
-    bounds = [f"{word} {value[key]}" for key, word in (("minimum", "at least"), ("maximum", "at most")) if key in value]
+    for inner, how in ((_inner(value), "by name"), (value.get("items"), "a list")):
+        if isinstance(inner, dict) and inner:
+            form = SETTINGS_OF.get(inner.get("$ref", "").rpartition("/")[2])
+            return f"{how}: of {form}s, see components {form}" if form else f"{how}, each: {_valid(inner)}"
+    bounds = [f"{word} {value[key]}" for key, word in BOUNDS.items() if key in value]
     return ", ".join([str(value.get("type", "any")), *bounds])

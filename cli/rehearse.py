@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, redirect_stdout
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Final
@@ -20,11 +21,13 @@ from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
 from foosim.common.json_text import decode_json, encode_json
-from foosim.deployment.loader import apply_sets
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
@@ -199,20 +202,69 @@ HASH_SEED: Final = "4711"
 """Of the other process: sets of texts have another order there."""
 
 
-def elsewhere(text: str, name: str, ticks: int) -> Iterator[str]:
-    """Yield that a process with another seed of Python's hashes computes another world than this one."""
-    here: dict[str, Any] = rehearse(text, name, ticks, 1).json
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / Path(name).name
+LAST_LINES: Final = 10
+"""Of what another process said before it failed."""
+
+
+def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
+    """Check a form in a deployment that uses it, and print what was found; return the exit code."""
+    form = used_form(text, str(file), name)
+    label, folder = f"{form.form} {form.name}", file.parent
+    text, files = pin_assets(text, str(file), folder)
+    check = ComponentCheck(text, str(file), ticks, seed, files, partial(rehearse, folder=folder))
+    if sys.stderr.isatty():
+        check.on_step = _told_of_step
+    is_broken = False
+    try:
+        for line in _all_broken(check, folder):
+            is_broken = True
+            print(f"{label}: {line}", flush=True)
+    except KeyboardInterrupt:
+        _told_of_step(f"{label}: interrupted, {check.now}")
+        raise
+    if not is_broken:
+        print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    if not check.has_failed:
+        print(f"{label}: {check.compared} of {check.sensors} sensors measured, and were compared alone and with others")
+    return FAILED if is_broken else DONE
+
+
+def _all_broken(check: ComponentCheck, folder: Path) -> Iterator[str]:
+    yield from check.broken()
+    if not check.has_failed:
+        check.begin("in another process")
+        yield from elsewhere(check.text, check.name, check.ticks, folder)
+
+
+def _told_of_step(line: str) -> None:
+    """Write a line beside the result, in one piece: an interrupt may come at any time."""
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+def elsewhere(text: str, name: str, ticks: int, folder: Path | None = None) -> Iterator[str]:
+    """Yield that a process with another seed of Python's hashes computes another world than this one.
+
+    `folder` is the base of the relative paths of the deployment's files (None: the current folder).
+    """
+    here: dict[str, Any] = rehearse(text, name, ticks, 1, folder=folder).json
+    with TemporaryDirectory() as temporary:
+        file = Path(temporary) / Path(name).name
         file.write_text(text)
+        assets = load_deployment(text, name).assets
+        for path, content in pin_assets(text, name, folder or Path())[1].items():
+            asset = Path(temporary, assets, path)
+            asset.parent.mkdir(parents=True, exist_ok=True)
+            asset.write_bytes(content)
         span = f"{ticks * here['tick_ns']}ns"
         command = [sys.executable, "-c", REHEARSE, str(file), "--for", span, "--nodes", "1", "--json"]
         environment = {**os.environ, "PYTHONHASHSEED": HASH_SEED}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        yield f"in another process it fails: {done.stderr.strip()[-400:]}"
+        said = [line for line in done.stderr.splitlines() if line.strip()][-LAST_LINES:]
+        yield "\n  ".join([f"in another process it fails, with exit code {done.returncode}:", *said])
         return
-    there = decode_json(done.stdout.encode())
+    there = decode_json(done.stdout.splitlines()[-1].encode())  # before it is what modules print
     assert isinstance(there, dict), there
     if there["digest"] != here["digest"]:
         yield "another process computes another world"

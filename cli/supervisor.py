@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -371,21 +372,17 @@ def check_component(
 
     Rehearses on one, two and three nodes with moved robots and objects made anew, in another process, with all named
     in another order, beside a robot that does nothing and beside a second one of each sensor; compares sensors alone
-    with many at once. Prints what differs, with tick and slot.
+    with many at once. Prints what differs, with tick and slot. On a terminal, standard error has the rehearsal that it
+    is in.
+
+    Exit codes: 0 nothing differs, 1 something does, 2 bad input, 130 Ctrl-C.
     """
-    from foosim.cli.rehearse import elsewhere
+    from foosim.cli import rehearse
     from foosim.deployment.loader import apply_sets
     from foosim.deployment.text.files import read_source_file
-    from foosim.rehearsal.check.component_check import broken_laws, used_form
 
     text = apply_sets(read_source_file(file), str(file), sets or [])
-    form = used_form(text, str(file), name)
-    broken = [*broken_laws(text, str(file), ticks, seed), *elsewhere(text, str(file), ticks)]
-    for line in broken:
-        print(f"{form.form} {form.name}: {line}")
-    if broken:
-        raise typer.Exit(1)
-    print(f"{form.form} {form.name}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    raise typer.Exit(rehearse.check_component(text, file, name, ticks, seed))
 
 
 @app.command()
@@ -399,12 +396,14 @@ def components(
     """Show the models, sensors, rules and other forms that a deployment can name on this machine.
 
     They are foosim's own and those of installed packages (entry points of the group `foosim.world`). With a name:
-    settings with their units, limits and defaults, the fields of its readings or commands, and what it remembers.
+    settings with their units, limits and defaults, the fields of its readings or commands, what it remembers and
+    writes, and what a model or kit brings.
     """
     from foosim.cli.components import as_json, chosen, line, lines
     from foosim.common.json_text import encode_json
 
-    found = chosen(form, name)
+    with redirect_stdout(sys.stderr):  # what modules print is no result
+        found = chosen(form, name)
     if json:
         print(encode_json([as_json(component) for component in found]).decode())
         return
@@ -423,7 +422,9 @@ def schema(
     """
     from foosim.deployment.json_schema import deployment_schema_text
 
-    print(deployment_schema_text(installed=not own), end="")
+    with redirect_stdout(sys.stderr):  # what modules print is no result
+        text = deployment_schema_text(installed=not own)
+    print(text, end="")
 
 
 @app.command("install")

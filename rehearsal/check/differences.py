@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foosim.deployment.loader import load_deployment
@@ -52,11 +53,12 @@ def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
 
 
 class Senses:
-    """The sensors of a deployment, fitted to the layouts of its frames."""
+    """The sensors of a deployment, fitted to the layouts of its frames; `count` is how many there are."""
 
-    def __init__(self, text: str, name: str) -> None:
-        self._deployment = load_deployment(text, name)
+    def __init__(self, text: str, name: str, files: Mapping[str, bytes]) -> None:
+        self._deployment = load_deployment(text, name).with_assets(files)
         self._sensors: dict[bytes, list[FittedSensor]] = {}
+        self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
 
     def due(self, frame: Frame) -> list[FittedSensor]:
         """Return those that measure a frame."""
@@ -67,21 +69,42 @@ class Senses:
         return [one for one in self._sensors[layout.digest] if one.is_due(frame.tick, frame.numbers)]
 
 
-def alone_and_together(senses: Senses, frames: Sequence[Frame]) -> Iterator[str]:
-    """Yield the sensors whose readings are others beside their like than alone."""
+@dataclass
+class Readings:
+    """How often each sensor was sampled, and how often a number of that was not finite, by what it is called."""
+
+    sampled: Counter[str] = field(default_factory=Counter)
+    not_finite: Counter[str] = field(default_factory=Counter)
+
+    def bad(self) -> Iterator[str]:
+        """Yield the sensors of which no reading is one."""
+        for label, count in self.sampled.items():
+            if self.not_finite[label] == count:
+                yield f"{label} has a number that is not finite in each of its {count} readings"
+
+
+def alone_and_together(senses: Senses, frames: Sequence[Frame], readings: Readings) -> Iterator[str]:
+    """Yield the sensors whose readings are others beside their like than alone, and those that never give any."""
     told: set[str] = set()
     for frame in frames:
         due = senses.due(frame)
         view = SensingView(frame.tick, frame.numbers, frame.values)
         together = Sensing().sample(due, view)
+        readings.sampled.update(map(_label, due))
+        readings.not_finite.update(map(_label, view.not_finite))
         for one, payload in zip(due, together, strict=True):
             its = SensingView(frame.tick, frame.numbers, frame.values)
             (alone,) = Sensing().sample([one], its)
             written = {at: number for at, number in its.written.items() if view.written.get(at) != number}
-            label = f"sensor {one.channel} of {one.robot}"
+            label = _label(one)
             if (alone != payload or written) and label not in told:
                 told.add(label)
                 yield f"{label} gives another reading alone than with others, at tick {frame.tick}"
+    yield from readings.bad()
+
+
+def _label(one: FittedSensor) -> str:
+    return f"sensor {one.channel} of {one.robot}"
 
 
 def first_other_reading(one: Senses, frames: Sequence[Frame], other: Senses, others: Sequence[Frame]) -> str:

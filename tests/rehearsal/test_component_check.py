@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import signal
+import subprocess
 import sys
+from contextlib import suppress
 from importlib import invalidate_caches
 from pathlib import Path
 from typing import Final
@@ -10,7 +15,7 @@ from typing import Final
 import pytest
 
 from foosim.cli.rehearse import elsewhere
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.check.component_check import broken_laws, used_form
 from foosim.rehearsal.check.differences import Frames
@@ -77,6 +82,7 @@ BAD: Final = {
 }
 BESIDE: Final = "beside a robot that does nothing and comes first the world is another one"
 SETS: Final = ("engine=pure", "substeps=1", "players={}", "table.rules.kickoff_delay=20 ms")
+TETRAHEDRON: Final = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 OF_ROD: Final = "robots.red.goal.sensors.own={kind: 'own_form:Own', rate: 100 Hz}"
 OF_WORLD: Final = "rules={own: {kind: 'own_form:Own'}}"
 
@@ -185,8 +191,43 @@ def test_a_form_is_named_as_deployments_do() -> None:
     assert used_form(text, TABLE.name, "encoder").form == "sensor"
     assert used_form(text, TABLE.name, "rule football").name == "football"
     assert used_form(text, TABLE.name, "foosim.world.models.rod:Rod").form == "model"
-    with pytest.raises(Refused, match="uses no form called 'proximity'; there are actuator joint_position, engine"):
-        used_form(text, TABLE.name, "proximity")
+    assert used_form(text, TABLE.name, "model foosim.world.models.rod:Rod").form == "model"
+
+
+WRONG: Final = {
+    "encodr": "table.yaml uses no form called this (there are: ball, camera, encoder, football, gaussian_noise, "
+    "joint_position, pure, rod, table), 'encodr', nearest is 'encoder'",
+    "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
+    "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
+    "foosim.world.models.rod:Rot": "uses no form called this (there are: actuator joint_position, ",
+    "own_gone:Own": "cannot be imported: ModuleNotFoundError: No module named 'own_gone', 'own_gone:Own'",
+}
+
+
+@pytest.mark.parametrize("wanted", WRONG)
+def test_a_wrong_name_says_what_there_is_and_the_nearest(wanted: str) -> None:
+    text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure"])
+    with pytest.raises(BadValue) as error:
+        used_form(text, TABLE.name, wanted)
+    assert WRONG[wanted] in str(error.value) and error.value.exit_code == 2
+
+
+def test_a_name_of_several_forms_says_which(planted: Path) -> None:
+    (planted / "own_form.py").write_text(
+        HEAD + SENSOR.format(value=GOOD) + "\n\nFirst = Own\n" + RULE.replace("APPLY", "pass")
+    )
+    text = apply_sets(TABLE.read_text(), TABLE.name, [OF_ROD.replace(":Own", ":First"), OF_WORLD])
+    with pytest.raises(BadValue, match=r"several forms of table\.yaml are called this: rule own or sensor own, 'own'"):
+        used_form(text, TABLE.name, "own")
+    assert used_form(text, TABLE.name, "rule own").form == "rule"
+
+
+def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
+    """Wherever it was imported from, in the deployment and in the question."""
+    (planted / "mine.py").write_text("from foosim.world.sensors.encoder import Encoder as Mine\n")
+    text = apply_sets(TABLE.read_text(), TABLE.name, ["robots.red.goal.sensors.encoder.kind=mine:Mine"])
+    assert used_form(text, TABLE.name, "mine:Mine").name == "encoder"
+    assert used_form(TABLE.read_text(), TABLE.name, "sensor mine:Mine").name == "encoder"
 
 
 SPEAKS: Final = """
@@ -215,3 +256,94 @@ def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) 
     assert sum(touched.values()) > 0, "the ball meets a rod"
     last = frames.frames[-1]
     assert {rod: last.at(rod, "own.samples") for rod in rods} == {rod: 1.0 + touched[rod] for rod in rods}
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+
+
+def checking(*sets: str) -> list[str]:
+    words = [word for setting in (*SETS, *sets) for word in ("--set", setting)]
+    return [sys.executable, "-P", "-c", COMMAND, "check-component", "own", "--in", str(TABLE), *words, "--ticks", "60"]
+
+
+NEVER: Final = ["sensor own of red.goal has a number that is not finite in each of its 24 readings"]
+
+
+@pytest.mark.parametrize(("value", "said"), [("float('inf')", NEVER), ("1.0 if view.tick else float('inf')", [])])
+def test_a_sensor_without_one_finite_reading_is_found(planted: Path, value: str, said: list[str]) -> None:
+    """One that has none at times is as it should be."""
+    source = SENSOR.format(value=value).replace("view.write(self.kept", "(self.kept")
+    assert broken(planted, source, OF_ROD) == said
+
+
+def test_the_end_says_how_many_sensors_were_compared(planted: Path) -> None:
+    """One at 1 Hz measures once in a second, and not at tick 0 where it has an offset."""
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    rare = OF_ROD.replace("100 Hz", "1 Hz, offset: 500 ms")
+    done = subprocess.run(checking(rare), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    there = sum(len(robot.sensors) for robot in load_deployment(TABLE.read_text(), TABLE.name).robots.values())
+    *_, last = done.stdout.splitlines()
+    assert last == f"sensor own: {there} of {there + 1} sensors measured, and were compared alone and with others"
+
+
+FAILS_ELSEWHERE: Final = """
+import os, sys
+print("said at import")
+if os.environ.get("PYTHONHASHSEED") == "4711":
+    for number in range(30):
+        print(f"line {number} of what it says, none of which is cut in the middle", file=sys.stderr)
+    sys.exit("that was it")
+"""
+
+
+def test_the_last_words_of_another_process_are_whole_lines(planted: Path) -> None:
+    found = broken(planted, FAILS_ELSEWHERE + SENSOR.format(value=GOOD), OF_ROD, processes=True)
+    (line,) = found
+    first, *said = line.splitlines()
+    assert first.startswith("in another process it fails, with exit code ") and len(said) == 10
+    assert said[0].strip() == "line 21 of what it says, none of which is cut in the middle"
+    assert "that was it" in said[-1] or "SystemExit" in said[-1]
+
+
+def test_what_modules_print_is_not_the_result_of_another_process(planted: Path) -> None:
+    source = 'print("said at import")\n' + SENSOR.format(value=GOOD)
+    assert broken(planted, source, OF_ROD, processes=True) == []
+
+
+def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) -> None:
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(checking(OF_ROD), stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+        os.close(theirs)
+        with os.fdopen(ours, "rb", buffering=0) as terminal:
+            shown = b""
+            while b"rehearsal 3 of 8: on 2 nodes, with robots moved and objects made anew\r\n" not in shown:
+                shown += terminal.read(4096)
+            process.send_signal(signal.SIGINT)
+            with suppress(OSError):  # the other end is closed
+                while more := terminal.read(4096):
+                    shown += more
+        assert process.wait() == 130
+    lines = shown.decode().splitlines()
+    assert lines[:2] == [
+        "rehearsal 1 of 8: on one node",
+        "rehearsal 2 of 8: on one node, with robots moved and objects made anew",
+    ]
+    assert lines[-1].startswith("sensor own: interrupted, rehearsal ")
+
+
+def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path) -> None:
+    """Meshes are relative to the folder of the deployment."""
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    folder = planted / "elsewhere"
+    folder.mkdir()
+    (folder / "thing.obj").write_text(TETRAHEDRON)
+    thing = "scenery={thing: {shape: mesh, file: thing.obj, x: 3 m, z: 1 m, radio: wood}}"
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "engine=bullet", thing])
+    (folder / "table.yaml").write_text(text)
+    command = ["check-component", "own", "--in", str(folder / "table.yaml"), "--ticks", "40"]
+    done = subprocess.run([sys.executable, "-P", "-c", COMMAND, *command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

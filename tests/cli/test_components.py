@@ -1,0 +1,141 @@
+"""The commands `components` and `schema`: what they tell of each form, and that nothing else is in their output."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from foosim.world.forms.registry import FORMS, names
+
+COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+BOUNDED: Final = '''
+from typing import Annotated
+
+from msgspec import Struct
+from pydantic import Field
+
+from foosim.common.spec_base import SpecBase
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+
+print("said at import")
+
+
+class Part(SpecBase):
+    size: Annotated[float, Field(gt=1)]
+
+
+class Settings(SensorSettings):
+    least: Annotated[float, Field(gt=0, le=2)]
+    most: Annotated[int, Field(ge=1, lt=7)] = 3
+    times: list[Annotated[float, Field(lt=0)]] = []
+    shares: dict[str, float] = {}
+    parts: dict[str, Part] = {}
+
+
+class Number(Struct, frozen=True):
+    value: Metres
+
+
+@sensor("bounded", Settings, Number)
+class Bounded:
+    """Has bounds."""
+'''
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    """A folder with an installed package that prints when it is imported."""
+    (tmp_path / "bounded.py").write_text(BOUNDED)
+    about = tmp_path / "bounded-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: bounded\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[foosim.world]\nbounded = bounded\n")
+    return tmp_path
+
+
+def told(*words: str, folder: Path | None = None) -> tuple[str, str]:
+    """Return what the command writes to standard output and to standard error."""
+    path = {} if folder is None else {"PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", COMMAND, *words],
+        env={**os.environ, **path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
+
+
+TOLD: Final = {
+    ("rule", "football"): ["slots of each ball: still_ticks, out_ticks, wait_ticks", "writes: ball"],
+    ("motion", "two_wheels"): [
+        "needs a model with: position, orientation, heading, wheel_speeds, wheel_travel, blocked, charge",
+        "writes: position, orientation, heading, wheel_speeds, wheel_travel, blocked",
+    ],
+    ("model", "rover"): [
+        "sensors: by name: of sensors, see components sensor (default {})",
+        "actuators: by name: of actuators, see components actuator (default {})",
+        "rules: by name: of entity_rules, see components entity_rule (default {})",
+        "tags: a list, each: string (default [])",
+        "a robot",
+        "moved by: two_wheels",
+        "usual actuators: drive (wheel_speeds)",
+        "usual rules: battery (battery)",
+        "tags: vehicle",
+    ],
+    ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
+    ("model", "station"): ["moved by: nothing"],
+    ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)", "can be added: ball"],
+    ("entity_rule", "battery"): ["needs a model with: charge, wheel_speeds, position", "writes: charge"],
+    ("sensor", "pose"): ["modifiers: a list: of modifiers, see components modifier (default [])"],
+}
+
+
+@pytest.mark.parametrize("about", TOLD)
+def test_a_form_is_told_of_with_what_it_brings(about: tuple[str, str]) -> None:
+    lines = [line.strip() for line in told("components", *about)[0].splitlines()]
+    assert [line for line in TOLD[about] if line not in lines] == []
+
+
+def test_all_are_told_of_in_json() -> None:
+    found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])
+    assert [(one["form"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
+    by_name = {(one["form"], one["name"]): one for one in found}
+    rover, football = by_name["model", "rover"], by_name["rule", "football"]
+    assert (rover["motion"], rover["is_robot"], rover["is_rigid"], rover["tags"]) == (
+        *("two_wheels", True, False),
+        ["vehicle"],
+    )
+    assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"
+    assert football["writes"] == ["ball"] and football["each"]["ball"]["still_ticks"] == 1
+    assert by_name["kit", "table"]["entities"] == {"ball": "ball"} and by_name["kit", "table"]["addable"] == ["ball"]
+
+
+def test_bounds_are_told_of_as_they_are(site: Path) -> None:
+    out, _ = told("components", "sensor", "bounded", folder=site)
+    assert [line.strip() for line in out.splitlines() if "rate" not in line and "offset" not in line][3:-1] == [
+        "modifiers: a list: of modifiers, see components modifier (default [])",
+        "least: number, more than 0, at most 2 (required)",
+        "most: integer, at least 1, less than 7 (default 3)",
+        "times: a list, each: number, less than 0 (default [])",
+        "shares: by name, each: number (default {})",
+        "parts.NAME.size: number, more than 1 (required)",
+    ]
+
+
+def test_what_modules_print_is_not_in_the_output(site: Path) -> None:
+    out, err = told("components", "--json", folder=site)
+    assert "bounded" in [one["name"] for one in json.loads(out)] and err == "said at import\n"
+    out, err = told("schema", folder=site)
+    Draft202012Validator.check_schema(json.loads(out))
+    assert "bounded" in out and err == "said at import\n"
