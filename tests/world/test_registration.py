@@ -3,77 +3,27 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
-from importlib import invalidate_caches
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
-from foosim.common.errors import DeploymentError, Refused
-from foosim.deployment import loader
+from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.forms import registry
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
+from tests.own_forms import folder_on_path, problems, written
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
-HEAD: Final = """
-from typing import Annotated
-
-from msgspec import Struct
-from pydantic import Field
-
-from foosim.common.errors import BadValue
-from foosim.common.spec_base import SpecBase
-from foosim.world.forms.forms import ENTITY, ROBOTS
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import *
-from foosim.world.forms.settings import *
-
-
-class Number(Struct, frozen=True):
-    value: Metres
-
-
-class Nothing(Struct, frozen=True):
-    pass
-
-
-class Settings(SensorSettings):
-    count: Annotated[int, Field(gt=0)] = 1
-
-
-class Own:
-    def __init__(self, settings, at):
-        self.settings = settings
-
-    def sample(self, view):
-        return Number(0.0)
-
-    def apply(self, values, view):
-        return values
-
-
-"""
 
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder on the path."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    loader._applied.cache_clear()  # a module of one name is another one in each test
-    return tmp_path
-
-
-def written(site: Path, *lines: str, name: str = "own_form") -> Path:
-    path = site / f"{name}.py"
-    path.write_text(HEAD + "\n".join(lines) + "\n")
-    sys.modules.pop(name, None)
-    invalidate_caches()
-    return path
+    return folder_on_path(tmp_path, monkeypatch)
 
 
 NAME: Final = "a name is a lower case letter, then lower case letters, digits, - and _, at most 32 in all"
@@ -200,15 +150,6 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
     written(site, *own, "sensor('own', Bounded, Number)(Own)")
     count = said.rpartition(" ")[2]
     assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: {count}}}") == [f"{PLACE}.count: {said}"]
-
-
-def problems(*sets: str) -> list[str]:
-    """What is said of the table with settings, without places in the text."""
-    try:
-        apply_sets(TEXT, TABLE.name, sets)
-    except DeploymentError as error:
-        return [re.sub(r"^--set:\d+:\d+: ", "", problem) for problem in error.problems]
-    return []
 
 
 # --- models ----------------------------------------------------------------------------------------------------------

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Final
 
-from foosim.common.finding import Finding
+from foosim.common.finding import Finding, Location
+from foosim.common.names import nearest_name
+from foosim.common.plain_data import quoted
 from foosim.world.forms import registry
+from foosim.world.layout import doubled_slots
 from foosim.world.physics import Physics
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
+
+FELT_BY_NOBODY: Final = ""
+"""The surface of scenery that no rigid body feels."""
 
 
 def kits_of(spec: WorldSpec) -> Iterator[tuple[str, object]]:
@@ -33,15 +40,36 @@ def physics_of(spec: WorldSpec) -> Physics:
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong with the world as a whole: who says what rigid bodies feel, and places.
+    """Yield what is wrong with the world as a whole: slots that are two, who says what rigid bodies feel, and places.
 
     Meshes count once their files are there.
     """
+    yield from doubled_slots(spec)
     felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]  # type: ignore[attr-defined]
     for name in felt[1:]:
         yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
     for name, robot in spec.robots.items():
         if not felt and registry.find_model(robot.model).is_rigid:
             yield Finding(("robots", name, "model"), "a rigid body, in a world without a kit for such", robot.model)
+    if len(felt) == 1:
+        yield from _unfelt(spec)
     for _, kit in kits_of(spec):
         yield from kit.findings()  # type: ignore[attr-defined]
+
+
+def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the surfaces of scenery that the kit with what rigid bodies feel does not have."""
+    made: list[tuple[Location, str, Iterable[Shape]]] = [
+        ((name,), f"kit {name}", kit.shapes())  # type: ignore[attr-defined]
+        for name, kit in kits_of(spec)
+    ]
+    if spec.scene is not None:
+        shapes = registry.find("scene", spec.scene.kind).made(spec.scene)
+        made.append((("scene", "kind"), f"scene {spec.scene.kind}", shapes))
+    known = physics_of(spec).surfaces
+    for location, what, shapes in made:
+        for surface in dict.fromkeys(shape.surface for shape in shapes):
+            if surface != FELT_BY_NOBODY and surface not in known:
+                valid = f"there are: {', '.join(sorted(known))}; and '' of what no rigid body feels"
+                nearest = quoted(nearest_name(surface, known))
+                yield Finding(location, f"{what} has scenery of an unknown surface ({valid})", surface, nearest)

@@ -1,0 +1,331 @@
+"""Worlds of somebody's own forms that cannot be: refused with the place and what is valid, before a run begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.assembly.used_forms import forms_of
+from foosim.world.forms import registry
+from foosim.world.layout import build_layout
+from tests.own_forms import TABLE, folder_on_path, problems, written
+
+TEXT: Final = TABLE.read_text()
+WAREHOUSE: Final = (TABLE.parent / "warehouse.yaml").read_text()
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path."""
+    return folder_on_path(tmp_path, monkeypatch)
+
+
+# --- slots -----------------------------------------------------------------------------------------------------------
+
+SENSOR: Final = "robots.red.goal.sensors.own={kind: 'own_form:Sensor', rate: 100 Hz}"
+RULE: Final = "robots.red.goal.rules={own: {kind: 'own_form:Rule'}}"
+WORLD: Final = "rules={own: {kind: 'own_form:World'}}"
+TWO: Final = (
+    "class Sensor(Own): pass",
+    "class Rule(Own): pass",
+    "class World(Own): pass",
+    "sensor('own-sensor', Settings, Number, slots={SENSOR})(Sensor)",
+    "entity_rule('own-rule', EntityRuleSettings, slots={RULE})(Rule)",
+    "rule('own-world', RuleSettings, each={WORLD})(World)",
+)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "rule", "world", "told"),
+    [
+        ("{'a': 1}", "{'b': 1}", "{ROBOTS: {'c': 1}}", []),
+        ("{'a': 1}", "{'a': 1}", "{}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own has "
+            "already, 'a'"]),
+        ("{'a': 2}", "{}", "{ROBOTS: {'a': 1}}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own of the "
+            "world has already, 'a'"]),
+        ("{}", "{'a': 1}", "{'rod': {'a': 1}}", [
+            "robots.red.goal.rules: the rule own declares the slot own.a of red.goal, which the rule own of the world "
+            "has already, 'a'"]),
+        ("{}", "{}", "{'camera': {'a': 1}, ROBOTS: {'a': 2}}", [
+            "rules: the rule own of the world declares the slot own.a of camera, which the rule own of the world has "
+            "already, 'a'"]),
+        ("{}", "{}", "{ROBOTS: {'samples': 2}}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.samples of red.goal, which the rule own of "
+            "the world has already, 'samples'"]),
+    ],
+)  # fmt: skip
+def test_a_slot_is_declared_once(site: Path, sensor: str, rule: str, world: str, told: list[str]) -> None:
+    """Names of components may be equal where their slots are not."""
+    written(site, *(line.format(SENSOR=sensor, RULE=rule, WORLD=world) for line in TWO))
+    assert problems(SENSOR, RULE, WORLD) == told
+
+
+def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
+    """A kind may be called as the second of another kind is."""
+    written(site, "modifier('delay2', ModifierSettings, slots={'values': 1})(Own)")
+    delay = "{kind: delay, time: 20 ms}"
+    text = apply_sets(TEXT, "t.yaml", [f"robots.camera.sensors.ball.modifiers=[{delay}, {{kind: 'own_form:Own'}}, "
+                                       f"{delay}]"])  # fmt: skip
+    counts = build_layout(load_deployment(text, "t.yaml"))["camera"].counts
+    found = {slot: count for slot, count in counts.items() if slot.endswith(".values")}
+    assert set(found) == {"ball.delay.values", "ball.delay2.values", "ball.delay3.values"}
+    assert found["ball.delay2.values"] == 1 < found["ball.delay.values"] == found["ball.delay3.values"]
+
+
+# --- models and their motions ----------------------------------------------------------------------------------------
+
+DRONE: Final = "robots.camera={model: 'own_form:Own'}"
+FIELDS: Final = "an omni has x, y, down, refused, quarantined"
+MODELS: Final = {
+    "motion('hover', needs=('x',), writes=('y',))": None,
+    "": "a model without its motion: unknown motion (there are: two_wheels, or any module:Class), 'hover'",
+    "motion('hover', needs=('x', 'charge'))": f"a model whose motion hover needs charge: {FIELDS}",
+    "motion('hover', needs=('refusd',))": "a model whose motion hover needs refusd: "
+    f"{FIELDS}, nearest to refusd is refused",
+    "motion('hover', writes=('z',))": f"a model whose motion hover writes z: {FIELDS}",
+    "motion('hover', kit='hall')": "a model whose motion is hover of a hall in a world without one",
+}
+
+
+@pytest.mark.parametrize("motion", MODELS)
+def test_a_model_has_what_its_motion_needs(site: Path, motion: str) -> None:
+    own = "model('omni', RobotSettings, slots={'x': 1, 'y': 1}, motion='hover')(Own)"
+    written(site, own, f"{motion}(Own)" if motion else "")
+    told = MODELS[motion]
+    assert problems(DRONE, "players={}") == ([] if told is None else [f"robots.camera.model: {told}, 'own_form:Own'"])
+
+
+def test_a_rigid_model_that_the_islands_do_not_know_is_refused(site: Path) -> None:
+    written(site, "model('crate', RobotSettings, is_rigid=True)(Own)")
+    assert problems(DRONE) == [
+        "robots.camera.model: a rigid model whose reach the islands do not know; valid are rod, ball, and models with "
+        "a motion, 'own_form:Own'"
+    ]
+
+
+def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
+    written(site, "entity_rule('fade', EntityRuleSettings)(Own)")
+    assert problems("robots.camera.rules={fade: {kind: 'own_form:Own'}}") == [
+        "robots.camera.rules.fade.kind: rule of entities that would never apply: a camera is neither rigid nor has a "
+        "motion, 'own_form:Own'"
+    ]
+    assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == []
+
+
+@pytest.mark.parametrize(
+    ("about", "told"),
+    [
+        ("needs=('contacts',), writes=('contacts',)", ""),
+        ("writes=('contact',)", "rule of entities that writes contact: a rod has joint_positions, joint_velocities, "
+         "joint_efforts, quarantined, down, contacts, refused, nearest to contact is contacts"),
+        ("needs=('contact',)", "rule of entities that a rod cannot carry, which has no contact (valid on: none; a rod "
+         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, nearest to "
+         "contact is contacts)"),
+    ],
+)  # fmt: skip
+def test_a_rule_of_robots_reads_and_writes_fields_that_there_are(site: Path, about: str, told: str) -> None:
+    written(site, f"entity_rule('fade', EntityRuleSettings, {about})(Own)")
+    expected = [f"robots.red.goal.rules.fade.kind: {told}, 'own_form:Own'"] if told else []
+    assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == expected
+
+
+def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
+    written(site, "model('omni', RobotSettings)(Own)")
+    assert problems("robots.camera={model: 'own_form:Own', sensors: {own: {kind: encoder, rate: 100 Hz}}}",
+                    "players={}") == [
+        "robots.camera.sensors.own.kind: sensor that an omni cannot carry, which has no joint_positions (valid on: "
+        "rod), 'encoder'"
+    ]  # fmt: skip
+
+
+# --- rules of the world ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("about", "told"),
+    [
+        ("each={ROBOTS: {'x': 1}, 'rod': {'y': 1}}, writes=('ball',)", ""),
+        ("each={'rood': {'y': 1}}", "rule of worlds that remembers something of each rood: unknown model (there are: "
+         "ball, camera, rod, rover, station), 'rood', nearest is 'rod'"),
+        ("writes=('bal',)", "rule of worlds that writes bal: unknown model (there are: ball, camera, rod, rover, "
+         "station), 'bal', nearest is 'ball'"),
+        ("writes=(ROBOTS,)", "rule of worlds that writes *: unknown model (there are: ball, camera, rod, rover, "
+         "station), '*'"),
+    ],
+)  # fmt: skip
+def test_a_rule_of_worlds_names_models_that_there_are(site: Path, about: str, told: str) -> None:
+    written(site, f"rule('laps', RuleSettings, {about})(Own)")
+    expected = [f"rules.laps.kind: {told}, 'own_form:Own'"] if told else []
+    assert problems("rules={laps: {kind: 'own_form:Own'}}") == expected
+
+
+def test_a_rule_that_a_kit_has_already_is_refused() -> None:
+    assert problems("rules={football: {kind: football}}") == [
+        "rules: a rule that the kit table has already: each world with a table has it, 'football'"
+    ]
+
+
+# --- kits ------------------------------------------------------------------------------------------------------------
+
+KIT: Final = (
+    "class Zoo(Own):",
+    "    def __init__(self, section, spec): pass",
+    "    def shapes(self): return ()",
+    "    def physics(self): return None",
+    "    def findings(self): return iter(())",
+    "class Beast(Own):",
+    "    def check_place(self, position, velocity): pass",
+    "    def place_at(self, view, position, velocity): pass",
+    "class RuleOf(RuleSettings):",
+    "    count: int = 1",
+    "class Rule(Own): pass",
+    "rule('feed', RuleOf)(Rule)",
+    "class InHall(Own): pass",
+    "rule('in-hall', RuleSettings, kit='hall')(InHall)",
+    "model('beast', RobotSettings, is_robot=False, slots={'position': 3})(Beast)",
+    "class Stone(Own): pass",
+    "model('stone', RobotSettings, is_robot=False)(Stone)",
+    "class Crate(Own): pass",
+    "model('crate', RobotSettings, is_robot=False, is_rigid=True)(Crate)",
+)
+KITS: Final = {
+    "entities={'leo': 'beast'}, addable=('beast',), rules={'feed': {'kind': 'feed', 'count': 2}}": [],
+    "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
+                                "are in robots:"],
+    "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: ball, "
+                                  "camera, rod, rover, station, or any module:Class), 'beest'"],
+    "entities={'leo': 'crate'}": ["its entity leo is a rigid model whose reach the islands do not know; valid are "
+                                  "rod, ball, and models with a motion"],
+    "entities={'world': 'beast'}": ["its entity world has a reserved name"],
+    "entities={'ball': 'beast'}": ["its entity ball has a name that is also one of the kit table's"],
+    "rules={'football': {'kind': 'feed'}}": ["its rule football has a name that is also one of the kit table's"],
+    "rules={'feed': {'kind': 'fed'}}": ["its rule feed: unknown rule of worlds (there are: football, or any "
+                                        "module:Class), 'fed'"],
+    "rules={'feed': {'kind': 'feed', 'count': 'two'}}": ["its rule feed: count: not a whole number, 'two'"],
+    "rules={'feed': {'kind': 'feed', 'coun': 2}}": ["its rule feed: unknown key, 'coun', nearest is 'count'"],
+    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: cannot be imported: ModuleNotFoundError: No module "
+                                               "named 'own_none' (is the folder that it is in on PYTHONPATH?), "
+                                               "'own_none:X'"],
+    "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
+    "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
+                           "place_at and no field position"],
+    "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: ball, camera, "
+                          "rod, rover, station, or any module:Class), 'lion'"],
+}  # fmt: skip
+"""Kits, and what is said of a table with each."""
+
+
+@pytest.mark.parametrize("about", KITS)
+def test_what_a_kit_brings_can_be_in_its_world(site: Path, about: str) -> None:
+    written(site, *KIT, f"kit('zoo', SpecBase, {about})(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    assert problems("zoo={}") == [f"kit zoo: {told}, 'zoo'" for told in KITS[about]]
+
+
+def test_models_of_a_kit_of_another_kit_need_it(site: Path) -> None:
+    written(site, *KIT, "kit('zoo', SpecBase, entities={'egg': 'ball'})(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    told = "its entity egg is of a model that cannot be there: ball of a table in a world without one"
+    assert problems("zoo={}", text=WAREHOUSE) == [f"kit zoo: {told}, 'zoo'"]
+
+
+def test_the_forms_of_a_world_have_the_models_of_its_kits() -> None:
+    """What can be added, too: two nodes with other versions of them would compute other worlds."""
+    deployment = load_deployment(TEXT, TABLE.name)
+    assert ("model", "ball") in {(form.form, form.name) for form in forms_of(deployment)}
+
+
+# --- what a form of one world says of another ------------------------------------------------------------------------
+
+
+def test_keys_of_a_rod_are_those_of_rods_alone(site: Path) -> None:
+    own = ("class Team(RobotSettings):", "    team: str", "    line: str", "model('judge', Team)(Own)")
+    written(site, *own)
+    judge = "robots.camera={model: 'own_form:Own', team: red, line: %s}"
+    assert problems(judge % "goal", "players={}") == [] == problems(judge % "none", "players={}")
+
+
+def test_a_rod_by_its_class_is_a_rod() -> None:
+    rod = "{model: 'foosim.world.models.rod:Rod', team: red, line: goal}"
+    assert problems(f"robots.camera={rod}", "players={}") == [
+        "robots.camera.line: red's line is already the rod red.goal, 'goal'"
+    ]
+
+
+def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callable[..., str]) -> None:
+    mast = (
+        "class Mast(Own):",
+        "    def __init__(self, settings, at): self.at = at",
+        "    def body(self): return None",
+        "    def place(self, view): view.write(self.at.slot('position'), 6.0, 0.0, 0.0)",
+        "    def is_plausible(self, numbers, before): return True",
+        "model('mast', RobotSettings, slots={'position': 3, 'heading': 1}, has_body=False)(Mast)",
+    )
+    written(site, *mast)
+    rays = "{kind: proximity, rate: 50 Hz, rays: 4, range: 3 m}"
+    robot = f"robots.mast={{model: 'own_form:Mast', sensors: {{rays: {rays}}}}}"
+    text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
+    done = rehearse(text, "x.yaml", 20, 1)
+    assert not done.json["failed"], done.json["reason"]
+
+
+# --- sensors that speak ----------------------------------------------------------------------------------------------
+
+
+SPEAKS: Final = (
+    "class Touch(Own):",
+    "    def __init__(self, settings, at): self.contacts = at.slot('contacts')",
+    "    def sample(self, view): return Number(view.read(self.contacts)[1])",
+    "sensor('touch', SensorSettings, Number, needs=('contacts',), speaks='contacts')(Touch)",
+)
+
+
+def test_modifiers_of_a_sensor_that_speaks_have_room_for_a_value_at_each_tick(site: Path) -> None:
+    """It measures when the ball meets the rod, beside its rate of once a second."""
+    written(site, *SPEAKS)
+    rods = [name for name, robot in load_deployment(TEXT, TABLE.name).robots.items() if robot.model == "rod"]
+    modifiers = "[{kind: delay, time: 40 ms}, {kind: bias_walk, initial: 1 mm, walk: 1 mm}]"
+    sensors = [
+        f"robots.{rod}.sensors.own={{kind: 'own_form:Touch', rate: 1 Hz, modifiers: {modifiers}}}" for rod in rods
+    ]
+    fast = ("engine=pure", "players={}", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=4 m/s")
+    text = apply_sets(TEXT, TABLE.name, [*fast, *sensors])
+    assert build_layout(load_deployment(text, TABLE.name))["red.goal"].counts["own.delay.ticks"] == 21
+    frames = Frames()
+    done = rehearse(text, TABLE.name, 400, 2, settings=Settings(on_commit=frames))
+    assert not done.json["failed"], done.json["reason"]
+    assert sum(frames.frames[-1].at(rod, "own.samples") for rod in rods) > len(rods), "the ball meets a rod"
+    assert done.digests == rehearse(text, TABLE.name, 400, 1).digests, "law 1"
+
+
+# --- scenery ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("surface", "told"),
+    [
+        ("floor", ""),
+        ("", ""),
+        ("flor", "scene own_form:shapes has scenery of an unknown surface (there are: figures, floor, goal, ramps, "
+         "rods, walls; and '' of what no rigid body feels), 'flor', nearest is 'floor'"),
+    ],
+)  # fmt: skip
+def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surface: str, told: str) -> None:
+    """A name that is misspelt would be scenery that balls fly through."""
+    scene = (
+        "from foosim.world.scene import Box, Shape",
+        "def shapes(settings):",
+        f"    return (Shape(Box((0.1, 0.1, 0.1)), {surface!r}, (0.0, 0.0, 0.0, 1.0), (5.0, 0.0, 5.0)),)",
+        "scene('plain', SceneSettings)(shapes)",
+    )
+    written(site, *scene)
+    assert problems("scene={kind: 'own_form:shapes'}") == ([f"scene.kind: {told}"] if told else [])
