@@ -340,11 +340,14 @@ def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
         for model, slots in find_rule(settings).each.items():
             named = {f"{label}.{slot}": count for slot, count in slots.items()}
             of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
+    seen: set[tuple[str, tuple[tuple[str, int], ...]]] = set()
     for name, robot in spec.robots.items():
-        kind = _model(robot.model)
-        yield from _doubled(
-            [*(one for model, one in of_rules if model in (kind.name, ROBOTS)), *declaring(spec, name, robot)], name
-        )
+        parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
+        alike = robot.model, tuple([(label, id(settings)) for label, settings in parts])
+        if alike not in seen:  # many robots of a fleet are
+            seen.add(alike)
+            remembered = [one for model, one in of_rules if model in (_model(robot.model).name, ROBOTS)]
+            yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
     for kit in kits_named(spec):
         for name, model in kit.entities.items():
             kind = _model(model)
