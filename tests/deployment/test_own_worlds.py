@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Final
 
 import pytest
+import yaml
+from jsonschema import Draft202012Validator
 
+from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
@@ -329,3 +334,82 @@ def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surfac
     )
     written(site, *scene)
     assert problems("scene={kind: 'own_form:shapes'}") == ([f"scene.kind: {told}"] if told else [])
+
+
+# --- the JSON Schema -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "is_valid"),
+    [
+        (("robots", "camera"), {"model": "own_form:Own", "arms": 2}, True),
+        (("robots", "camera"), {"model": "own_form.Own", "arms": 2}, False),
+        (("robots", "camera"), {"arms": 2}, False),
+        (("robots", "red.goal", "sensors", "own"), {"kind": "own_form:Own", "scale": 2.0}, True),
+        (("robots", "red.goal", "sensors", "own"), {"kind": "own:form:Own"}, False),
+        (("robots", "red.goal", "sensors", "own"), {"scale": 2.0}, False),
+        (("robots", "red.goal", "sensors", "encoder", "modifiers"), [{"kind": "own_form:Own"}], True),
+        (("robots", "red.goal", "actuators"), {"own": {"kind": "own_form:Own"}}, True),
+        (("robots", "red.goal", "rules"), {"own": {"kind": "own_form:Own"}}, True),
+        (("rules",), {"own": {"kind": "own_form:Own"}}, True),
+        (("rules",), {"own": {"kind": "own_form"}}, False),
+        (("scene",), {"kind": "own_form:own", "radius": "1 m"}, True),
+    ],
+)
+def test_the_schema_takes_forms_by_their_class(place: tuple[str, ...], value: object, is_valid: bool) -> None:
+    """In a file and in what it is expanded to; what the settings of such are, no schema knows."""
+    data = yaml.safe_load(TEXT)
+    inner = data
+    for step in place[:-1]:
+        inner = inner[step]
+    inner[place[-1]] = value
+    for schema in (deployment_schema(), json.loads(deployment_schema_text())):
+        assert Draft202012Validator(schema).is_valid(data) is is_valid
+
+
+OWN_CLASSES: Final = (
+    "class Wheel(SpecBase):",
+    '    """Of a kit."""',
+    "    spokes: int",
+    "class Table(SpecBase):",
+    '    """Called as a section of foosim is."""',
+    "    wheel: Wheel",
+    "class Zoo(Own): pass",
+    "kit('zoo', Table)(Zoo)",
+    "class Goal(SpecBase):",
+    '    """Called as a part of a section of foosim is."""',
+    "    nets: int",
+    "class SensorOfGoals(SensorSettings):",
+    "    goal: Goal",
+    "sensor('goals', SensorOfGoals, Number)(Own)",
+)
+
+
+def test_the_schema_keeps_classes_of_other_packages_apart(site: Path) -> None:
+    """They may be called as foosim's own are, and as each other's."""
+    before = deployment_schema()
+    written(site, *OWN_CLASSES)
+    second = [line.replace("nets", "posts").replace("'goals'", "'posts'") for line in OWN_CLASSES[-6:]]
+    written(site, *second, name="own_second")
+    for module in ("own_form", "own_second"):
+        about = site / f"{module}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
+        (about / "entry_points.txt").write_text(f"[foosim.world]\n{module} = {module}\n")
+    registry._entry_points.cache_clear()
+    assert deployment_schema() == before, "the one that is kept has foosim's own"
+    schema = deployment_schema(installed=True)
+    assert before["$defs"]["Table"] == schema["$defs"]["Table"] and before["$defs"]["Goal"] == schema["$defs"]["Goal"]
+    sensors = {"goals": {"kind": "goals", "rate": "100 Hz", "goal": {"nets": 1}}}
+    sensors |= {"posts": {"kind": "posts", "rate": "100 Hz", "goal": {"posts": 1}}}
+    for valid in (schema, json.loads(deployment_schema_text(installed=True))):
+        validator = Draft202012Validator(valid)
+        data = yaml.safe_load(TEXT)
+        data["robots"]["camera"]["sensors"] |= deepcopy(sensors)
+        data["zoo"] = {"wheel": {"spokes": 12}}
+        assert [error.message for error in validator.iter_errors(data)] == []
+        data["zoo"] = {"wheel": {"spokes": "many"}}
+        assert not validator.is_valid(data)
+        data["zoo"] = {"wheel": {"spokes": 12}}
+        data["robots"]["camera"]["sensors"]["posts"]["goal"] = {"nets": 1}
+        assert not validator.is_valid(data)
