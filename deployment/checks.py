@@ -20,6 +20,7 @@ from foosim.common.plain_data import PlainData
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
+from foosim.world.assembly.sections import FormFailed, naming_failures
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
 from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
@@ -90,8 +91,11 @@ def _kits(view: View) -> Iterator[Finding]:
     kits = dict(kits_of(view))
     for key, kit in kits.items():
         check = getattr(kit.made, "check", None)
-        if check is not None:
-            yield from check(view)
+        try:
+            with naming_failures((key,), "kit", key, kit.module):
+                yield from [*check(view)] if check is not None else []
+        except FormFailed as failed:
+            yield failed.finding
         for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
             yield Finding((key,), f"kit {key}: {problem}", key, at="key")
     for label in view.mapping("rules"):

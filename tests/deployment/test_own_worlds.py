@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
@@ -247,6 +248,32 @@ def test_the_forms_of_a_world_have_the_models_of_its_kits() -> None:
     """What can be added, too: two nodes with other versions of them would compute other worlds."""
     deployment = load_deployment(TEXT, TABLE.name)
     assert ("model", "ball") in {(form.form, form.name) for form in forms_of(deployment)}
+
+
+FAILING: Final = {
+    "    def __init__(self, section, spec): pass": "    def __init__(self, section): pass",
+    "    def shapes(self): return ()": "    def shapes(self): return (1 // 0,)",
+    "    def physics(self): return None": "    def physics(self): return self.nothing",
+    "    def findings(self): return iter(())": "    def findings(self): yield from 3",
+    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda data: 1 // 0)",
+}
+"""Lines of a kit, and others that raise."""
+
+
+@pytest.mark.parametrize("line", FAILING)
+def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: str) -> None:
+    lines = [FAILING[line] if one == line else one for one in KIT]
+    written(site, *lines, "kit('zoo', SpecBase)(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    (told,) = problems("zoo={}")
+    assert re.match(r"zoo: kit zoo failed: \w+Error: .*, 'zoo'$", told), told
+    assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
+
+
+def test_a_scene_that_fails_is_named_with_the_place_in_its_file(site: Path) -> None:
+    written(site, "def shapes(settings):", "    return [settings.height]", "scene('plain', SceneSettings)(shapes)")
+    (told,) = problems("scene={kind: 'own_form:shapes'}")
+    assert told.startswith("scene.kind: scene plain failed: AttributeError: 'SceneSettings' object has no attribute")
 
 
 # --- what a form of one world says of another ------------------------------------------------------------------------
