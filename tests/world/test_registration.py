@@ -231,6 +231,10 @@ def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) ->
     ]
     assert problems("zoo={fence: 1 m}") == [f"unknown key; {why}, 'zoo'"]
     assert problems("capture.zoo=3") == ["capture: unknown key, 'zoo'"]
+    assert problems("robots.red.goal.rules={own: {kind: laps}}") == [
+        f"robots.red.goal.rules.own.kind: unknown rule of entities; {why} (there are: battery, or any module:Class), "
+        "'laps'"
+    ]
     assert problems("rules={own: {kind: laps}}") == [
         f"rules.own.kind: unknown rule of worlds; {why} (there are: football, or any module:Class), 'laps'"
     ]
