@@ -286,6 +286,15 @@ def test_keys_of_a_rod_are_those_of_rods_alone(site: Path) -> None:
     assert problems(judge % "goal", "players={}") == [] == problems(judge % "none", "players={}")
 
 
+def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callable[..., str]) -> None:
+    """A surface is of use where a robot is one; that no such robot is solved yet is another matter."""
+    written(site, "model('crate', RobotSettings, is_rigid=True, slots={'linear_velocity': 3})(Own)")
+    sets = ("scenery.goods-1.surface=floor", "players={}", "nodes={one: {robots: ['*']}}", "network={}")
+    surface = "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"
+    assert surface in problems(*sets, text=fleet_text(1))
+    assert surface not in problems(*sets, "robots.crate={model: 'own_form:Own'}", text=fleet_text(1))
+
+
 def test_a_rod_by_its_class_is_a_rod() -> None:
     rod = "{model: 'foosim.world.models.rod:Rod', team: red, line: goal}"
     assert problems(f"robots.camera={rod}", "players={}") == [
