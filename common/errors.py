@@ -89,12 +89,14 @@ class Malformed(Refused):
 
 
 class UnknownName(BadValue):
-    """A robot, channel, destination or class that does not exist; the text lists those that do."""
+    """A robot, channel, destination or class that does not exist; the text lists those that do, and says what `also`
+    would be valid."""
 
-    def __init__(self, what: str, value: str, choices: Iterable[str]) -> None:
+    def __init__(self, what: str, value: str, choices: Iterable[str], also: str = "") -> None:
         names = sorted(set(choices))
         nearest = nearest_name(value, names)
         shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
+        shown = f"{shown or 'none'}, or {also}" if also else shown
         super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))
 
 

@@ -1,9 +1,9 @@
 """Checks between the fields of a deployment: references to names, and numbers that depend on each other.
 
 It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
-one go: whatever is missing or malformed is passed over here, since the schema reports it. deployment_file.py turns
-findings into lines with places; what concerns the network is in
-network_references.py, rates and offsets are in timing_references.py.
+one go: whatever is missing or malformed is passed over here, since the schema reports it. loader.py turns findings into
+lines with places; what concerns the network is in network_checks.py and radio_checks.py, rates and offsets are in
+timing_checks.py.
 """
 
 import re
@@ -11,14 +11,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import translate
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from foosim.common import limits, names, units
-from foosim.common.errors import BadValue, Refused
-from foosim.common.finding import Finding, Location
+from foosim.common.errors import BadValue, Refused, UnknownName, describe
+from foosim.common.finding import Finding, Location, path_text
 from foosim.common.plain_data import PlainData
 from foosim.deployment.schema import Deployment
+from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
+from foosim.world.assembly.sections import FormFailed, naming_failures
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Kit
+from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
+from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.layout import WORLD
 from foosim.world.spec import KITS
 
@@ -82,11 +87,46 @@ def kits_of(view: PlainData) -> Iterator[tuple[str, Kit]]:
 
 
 def _kits(view: View) -> Iterator[Finding]:
-    """Settings of a kit fit each other; one kit says what rigid bodies feel."""
-    for _, kit in kits_of(view):
+    """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
+    kits = dict(kits_of(view))
+    for key, kit in kits.items():
         check = getattr(kit.made, "check", None)
-        if check is not None:
-            yield from check(view)
+        try:
+            with naming_failures((key,), "kit", key, kit.module):
+                yield from [*check(view)] if check is not None else []
+        except FormFailed as failed:
+            yield failed.finding
+        for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
+            yield Finding((key,), f"kit {key}: {problem}", key, at="key")
+    for label in view.mapping("rules"):
+        others = [key for key, kit in kits.items() if label in kit.rules]
+        if others:
+            what = f"a rule that the kit {others[0]} has already: each world with a {others[0]} has it"
+            yield Finding(("rules", label), what, label, at="key")
+
+
+def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]:
+    """Yield what is wrong with the rules that a kit brings."""
+    for label, settings in kit.rules.items():
+        for other in kits:
+            if other < name and label in kits[other].rules:
+                yield f"its rule {label} has a name that is also one of the kit {other}'s"
+        try:
+            rule = registry.find("rule", settings["kind"])
+            rule.settings.model_validate(dict(settings))
+        except UnknownName as error:
+            yield f"its rule {label}: {error.what}"
+        except Refused as error:
+            yield f"its rule {label}: {error.what}, {settings['kind']!r}"
+        except ValidationError as error:
+            for finding in settings_findings(error, rule.settings, ()):
+                path = path_text(finding.location if finding.at == "value" else finding.location[:-1])
+                text = describe(finding.what, finding.value, finding.nearest)
+                yield f"its rule {label}: {path}{': ' if path else ''}{text}"
+        else:
+            assert isinstance(rule, WorldRule), rule
+            for problem in (*needs_kit(rule, kits), *rule_problems(rule)):
+                yield f"its rule {label}: {problem}"
 
 
 def _names(view: View) -> Iterator[Finding]:
@@ -303,7 +343,7 @@ def _scenery(view: View) -> Iterator[Finding]:
     """Some engines have no meshes, only free bodies feel surfaces; waves cross a material, or have a loss."""
     engine = view.get("engine")
     no_meshes = isinstance(engine, str) and _is_without_meshes(engine)
-    has_rigid = any(registry.find_model(model).is_free for _, kit in kits_of(view) for model in kit.entities.values())
+    has_rigid = any(model.is_free for model in _models(view))
     for name in view.mapping("scenery"):
         if name in view.robots:
             yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")
@@ -316,6 +356,17 @@ def _scenery(view: View) -> Iterator[Finding]:
             what = f"the engine {engine} has no meshes (boxes and cylinders it has, and the engine bullet has all)"
             yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
         yield from _radio(view, ("scenery", name, "radio"))
+
+
+def _models(view: View) -> Iterator[Model]:
+    """Yield the models of robots, of what kits put into the world, and of what can be added, where there are such."""
+    named = {model for robot in view.robots for _, model in view.texts("robots", robot, "model")}
+    for _, kit in kits_of(view):
+        named |= {*kit.entities.values(), *kit.addable}
+    for name in sorted(named):
+        model = find_kit_model(name)
+        if model is not None:
+            yield model
 
 
 def _is_without_meshes(engine: str) -> bool:

@@ -9,36 +9,35 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import parse_ns, period_ticks
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Carrier, Component, Form, Model
+from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule
+from foosim.world.forms.misfits import (
+    component_problems,
+    model_problems,
+    models_of_robots,
+    needs_kit,
+    rule_problems,
+)
 from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
 from foosim.world.forms.settings import (
+    BASES,
     ActuatorSettings,
     ComponentSettings,
-    EntityRuleSettings,
     ModifierSettings,
     RobotSettings,
-    RuleSettings,
-    SceneSettings,
     SensorSettings,
 )
 from foosim.world.spec import KITS
 
-SECTIONS: Final[Mapping[str, tuple[str, type[ComponentSettings]]]] = {
-    "sensors": ("sensor", SensorSettings),
-    "actuators": ("actuator", ActuatorSettings),
-    "rules": ("entity_rule", EntityRuleSettings),
-}
-"""The sections of a robot that have components: their form, and what all settings have."""
+SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
+"""The sections of a robot that have components, and their form."""
 OF_MODEL: Final = ("actuators", "rules")
 """The sections of which a robot that says nothing has those of its model."""
-WORDS: Final = {"entity_rule": "rule of entities", "rule": "rule of worlds"}
-"""What forms are called, where that is not their name."""
 
 
 def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Finding]]:
@@ -62,11 +61,10 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
     rules = data.get("rules")
     if isinstance(rules, dict):
         read["rules"] = {
-            name: reader.component("rule", RuleSettings, None, ("rules", name), settings)
-            for name, settings in rules.items()
+            name: reader.component("rule", None, ("rules", name), settings) for name, settings in rules.items()
         }
     if isinstance(data.get("scene"), dict):
-        read["scene"] = reader.component("scene", SceneSettings, None, ("scene",), data["scene"])
+        read["scene"] = reader.component("scene", None, ("scene",), data["scene"])
     return read, reader.findings
 
 
@@ -89,6 +87,8 @@ class _Reader:
         self._data = data
         self.kits: set[str] = set()
         self.findings: list[Finding] = []
+        self._refused: dict[int, Any] = {}
+        """What stands for settings that were refused, by its identity."""
         self._read: dict[tuple[str, Any, int], Any] = {}
         """What was read without findings: by form, model and the identity of the plain data, which lives as long."""
 
@@ -126,8 +126,8 @@ class _Reader:
         try:
             model = registry.find_model(name)
         except UnknownName as error:
-            choices = [other.name for other in _models_of_robots()]
-            refused = error if ":" in name else UnknownName("unknown model", name, choices)
+            choices = [other.name for other in models_of_robots()]
+            refused = error if ":" in name else registry.unknown("model", name, choices)
             self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
         except Refused as error:
             self.findings.append(Finding((*location, "model"), error.what, name))
@@ -141,8 +141,7 @@ class _Reader:
             what = f"no model of robots: {model.name} is there without an owner"
             self.findings.append(Finding((*location, "model"), what, robot["model"]))
             return RobotSettings.model_construct(model=model.name)
-        if model.kit and model.kit not in self.kits:
-            what = f"a robot of a {model.kit} in a world without one"
+        for what in (*needs_kit(model, self.kits, "a robot"), *model_problems(model, self.kits)):
             self.findings.append(Finding((*location, "model"), what, robot["model"]))
         for section in OF_MODEL:
             if robot.get(section) is None:
@@ -157,31 +156,27 @@ class _Reader:
     def _components_of(self, model: Model | None, location: Location, robot: Mapping[str, Any]) -> dict[str, Any]:
         """Return the data of a robot with the settings of its components read."""
         found = dict(robot)
-        for section, (form, base) in SECTIONS.items():
+        for section, form in SECTIONS.items():
             if isinstance(robot.get(section), dict):
                 found[section] = {
-                    name: self.component(form, base, model, (*location, section, name), settings)
+                    name: self.component(form, model, (*location, section, name), settings)
                     for name, settings in robot[section].items()
                 }
-        self.findings += _competing(found.get("actuators"), (*location, "actuators"))
+        self.findings += self._competing(found.get("actuators"), (*location, "actuators"))
         return found
 
-    def component(
-        self, form: str, base: type[ComponentSettings], model: Model | None, location: Location, settings: Any
-    ) -> Any:
+    def component(self, form: str, model: Model | None, location: Location, settings: Any) -> Any:
         """Return the settings of one component. What many robots share, by a template, is read once."""
         key = form, None if model is None else model.name, id(settings)
         if key not in self._read:
             count = len(self.findings)
-            read = self._read_component(form, base, model, location, settings)
+            read = self._read_component(form, model, location, settings)
             if len(self.findings) > count:
                 return read
             self._read[key] = read
         return self._read[key]
 
-    def _read_component(
-        self, form: str, base: type[ComponentSettings], model: Model | None, location: Location, settings: Any
-    ) -> Any:
+    def _read_component(self, form: str, model: Model | None, location: Location, settings: Any) -> Any:
         """Return the settings of one component; in place of what is refused, settings that say its kind alone."""
         kind = settings.get("kind") if isinstance(settings, dict) else None
         if not isinstance(kind, str):
@@ -196,6 +191,7 @@ class _Reader:
             found = component.settings.model_validate(settings)
             if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
                 assert isinstance(component, Component), component
+                self.findings += self._unfit_slots(component, found, location)
                 self.findings += self._unfit_modifiers(component, found, location)
             return found
         except UnknownName as error:
@@ -204,25 +200,31 @@ class _Reader:
             self.findings.append(Finding((*location, "kind"), error.what, kind))
         except ValidationError as error:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
-        return base.model_construct(kind=kind)
+        refused = BASES[form].model_construct(kind=kind)
+        self._refused[id(refused)] = refused
+        return refused
 
     def _misfits(self, component: Form, model: Model | None, location: Location, kind: str) -> Iterator[Finding]:
         """Yield what the world or a model does not have that a component needs."""
-        word = WORDS.get(component.form, component.form)
-        if component.kit and component.kit not in self.kits:
-            yield Finding(location, f"{word} of a {component.kit} in a world without one", kind)
-            return
-        needs: tuple[str, ...] = getattr(component, "needs", ())
-        needs += tuple(field for field in (getattr(component, "speaks", ""),) if field and field not in needs)
-        missing = [] if model is None else [field for field in needs if field not in model.slots]
-        if missing and model is not None:
-            fitting = ", ".join(other.name for other in _models_of_robots() if {*needs} <= {*other.slots})
-            lacking = f"a {model.name} cannot carry, which has no {', '.join(missing)}"
-            yield Finding(location, f"{word} that {lacking} (valid on: {fitting or 'none'})", kind)
+        problems = [*needs_kit(component, self.kits)]
+        if not problems and model is not None:
+            problems += component_problems(component, model)
+        if isinstance(component, WorldRule):
+            problems += rule_problems(component)
+        for problem in problems:
+            yield Finding(location, problem, kind)
 
     def _modifiers(self, location: Location, modifiers: list[Any]) -> Iterator[Any]:
         for number, settings in enumerate(modifiers):
-            yield self.component("modifier", ModifierSettings, None, (*location, number), settings)
+            yield self.component("modifier", None, (*location, number), settings)
+
+    def _unfit_slots(
+        self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
+    ) -> Iterator[Finding]:
+        """Yield why the slots of a sensor or actuator do not follow from its settings."""
+        period_ns = self._period_ns(component, settings)
+        if period_ns is not None:
+            yield from _unknown_slots(component, settings, Carrier(0, period_ns), location)
 
     def _unfit_modifiers(
         self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
@@ -235,8 +237,8 @@ class _Reader:
                 what = f"a modifier of what is not numbers alone: {component.form} {component.name}"
                 yield Finding((*place, "kind"), what, modifier.kind)
                 continue
-            period_ns = self._period_ns(settings)
-            if type(modifier) is not ModifierSettings and period_ns is not None:
+            period_ns = self._period_ns(component, settings)
+            if id(modifier) not in self._refused and period_ns is not None:
                 yield from _unfit(
                     registry.find_component("modifier", modifier.kind),
                     modifier,
@@ -245,32 +247,26 @@ class _Reader:
                     place,
                 )
 
-    def _period_ns(self, settings: SensorSettings | ActuatorSettings) -> int | None:
-        """Return the time between two values; None where it is wrong, which is found elsewhere."""
+    def _competing(self, actuators: Any, location: Location) -> Iterator[Finding]:
+        """Yield the actuators that command motors which another one commands already."""
+        moving = [
+            (name, settings.kind)
+            for name, settings in (actuators.items() if isinstance(actuators, dict) else ())
+            if isinstance(settings, ActuatorSettings)
+            and id(settings) not in self._refused
+            and registry.find_component("actuator", settings.kind).moves
+        ]
+        for name, kind in moving[1:]:
+            yield Finding((*location, name, "kind"), f"commands the motors that {moving[0][0]} commands already", kind)
+
+    def _period_ns(self, component: Component, settings: SensorSettings | ActuatorSettings) -> int | None:
+        """Return the least time between two values; None where it is wrong, which is found elsewhere."""
         try:
             tick_ns = parse_ns(self._data.get("tick"))
             ticks = period_ticks(settings.rate_hz, tick_ns) if isinstance(settings, SensorSettings) else 1
-            return ticks * tick_ns or None
+            return (tick_ns if component.speaks else ticks * tick_ns) or None
         except (BadValue, ZeroDivisionError):
             return None
-
-
-def _models_of_robots() -> list[Model]:
-    found = map(registry.find_model, registry.names("model"))
-    return [model for model in found if model.is_robot]
-
-
-def _competing(actuators: Any, location: Location) -> Iterator[Finding]:
-    """Yield the actuators that command motors which another one commands already."""
-    moving = [
-        (name, settings.kind)
-        for name, settings in (actuators.items() if isinstance(actuators, dict) else ())
-        if type(settings) is not ActuatorSettings
-        and isinstance(settings, ActuatorSettings)
-        and registry.find_component("actuator", settings.kind).moves
-    ]
-    for name, kind in moving[1:]:
-        yield Finding((*location, name, "kind"), f"commands the motors that {moving[0][0]} commands already", kind)
 
 
 def _unfit(
@@ -299,6 +295,24 @@ def _unfit(
         check = getattr(component.made, "check", None)
         if check is not None:
             check(settings, numbers)
+    except BadValue as error:
+        yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
+    except Exception as error:  # noqa: BLE001  # of whoever wrote the modifier
+        yield Finding(place, f"its check failed: {type(error).__name__}: {error}", settings.kind)
+    else:
+        yield from _unknown_slots(component, settings, carrier, place)
+
+
+def _unknown_slots(
+    component: Component, settings: ComponentSettings, carrier: Carrier, place: Location
+) -> Iterator[Finding]:
+    """Yield why the slots of a component do not follow from its settings and what it is on."""
+    try:
         component.slots_on(settings, carrier)
     except BadValue as error:
-        yield Finding((*place, "kind"), error.problem, error.value, error.nearest)
+        yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
+
+
+def _value_of(error: BadValue, kind: str) -> object:
+    """Return the value that an error is about; that of a component is its kind where none is said."""
+    return kind if error.value is ABSENT else error.value

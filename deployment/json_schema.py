@@ -3,40 +3,25 @@
 import json
 from typing import Any, Final
 
-from pydantic import BaseModel
-
 from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
-from foosim.world.forms.settings import (
-    ActuatorSettings,
-    EntityRuleSettings,
-    ModifierSettings,
-    RobotSettings,
-    RuleSettings,
-    SceneSettings,
-    SensorSettings,
-)
+from foosim.world.forms.forms import Form, with_article, word_of
+from foosim.world.forms.settings import BASES, RobotSettings
 from foosim.world.spec import KITS
 
-OPEN: Final = {
-    SensorSettings.__name__: "sensor",
-    ActuatorSettings.__name__: "actuator",
-    ModifierSettings.__name__: "modifier",
-    EntityRuleSettings.__name__: "entity_rule",
-    RuleSettings.__name__: "rule",
-    SceneSettings.__name__: "scene",
-    RobotSettings.__name__: "model",
-}
+OPEN: Final = {base.__name__: form for form, base in BASES.items()}
 """Definitions that stand for anything of a form."""
 OWN: Final = "foosim."
+REF: Final = "#/$defs/"
 
 
 def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
     """The JSON Schema of a deployment in which nothing is abbreviated, which the checks and the reference go by.
 
-    It has foosim's own components; with `installed` those of other packages, too.
+    It has foosim's own forms; with `installed` those of other packages, too. The settings of one that is named as
+    `module:Class` are any.
     """
     schema = Deployment.model_json_schema(by_alias=True, mode="validation")
     schema["properties"]["engine"] = _any_engine(installed=installed)
@@ -47,7 +32,7 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
     for kind in registry.names("kit"):
         kit = registry.find("kit", kind)
         if installed or kit.module.startswith(OWN):
-            properties[kind] = {"$ref": _add(kit.settings, kit.settings.__name__, definitions)}
+            properties[kind] = {"$ref": REF + _add(kit, definitions)}
     robots = definitions.pop(RobotSettings.__name__)
     ((pattern, _),) = properties["robots"]["patternProperties"].items()
     properties["robots"] = {**properties["robots"], "patternProperties": {pattern: robots}}
@@ -64,8 +49,11 @@ def _any_engine(*, installed: bool) -> dict[str, Any]:
     """Return the schema of an engine's name."""
     found = [registry.find("engine", name) for name in registry.names("engine")]
     known = [engine.name for engine in found if installed or engine.module.startswith(OWN)]
-    of_class = {"pattern": CLASS_PATTERN, "title": "Class", "type": "string"}
-    return {"anyOf": [{"enum": known, "type": "string"}, of_class], "title": "Engine"}
+    return {"anyOf": [{"enum": known, "type": "string"}, _class()], "title": "Engine"}
+
+
+def _class() -> dict[str, Any]:
+    return {"pattern": CLASS_PATTERN, "title": "Class", "type": "string"}
 
 
 def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool) -> dict[str, Any]:
@@ -74,26 +62,61 @@ def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool) -> 
     mapping = {}
     for kind in registry.names(form):
         found = registry.find(form, kind)
-        is_own = found.module.startswith(OWN)
-        if (not installed and not is_own) or not getattr(found, "is_robot", True):
+        if (not installed and not found.module.startswith(OWN)) or not getattr(found, "is_robot", True):
             continue
-        name = found.settings.__name__ if is_own else f"{kind.title()}{form.title()}Settings"
-        assert name not in definitions or name in OPEN, f"two definitions are called {name}"
-        mapping[kind] = _add(found.settings, name, definitions)
+        name = _add(found, definitions)
+        mapping[kind] = REF + name
         properties = definitions[name]["properties"]
         definitions[name]["properties"] = {**properties, key: {"const": kind, "title": key.title(), "type": "string"}}
+    noun = with_article(word_of(form)).capitalize()
+    any_class = f"{form.title().replace('_', '')}ByClass"
+    definitions[any_class] = {
+        "allOf": [{"required": [key]}],  # of a part of it, too: any other part is one of a kind that is known
+        "description": f"{noun} of any module on the path. Its other keys are those of its settings.",
+        "properties": {key: _class()},
+        "required": [key],
+        "title": any_class,
+        "type": "object",
+    }
     return {
         "discriminator": {"mapping": mapping, "propertyName": key},
-        "oneOf": [{"$ref": reference} for reference in mapping.values()],
+        "oneOf": [{"$ref": reference} for reference in (*mapping.values(), REF + any_class)],
     }
 
 
-def _add(settings: type[BaseModel], name: str, definitions: dict[str, Any]) -> str:
-    """Add the schema of settings to the definitions, and what it refers to; return the reference to it."""
-    schema = settings.model_json_schema(by_alias=True, ref_template="#/$defs/{model}")
+def _add(form: Form, definitions: dict[str, Any]) -> str:
+    """Add the schema of a form's settings to the definitions, and what it refers to; return its name there.
+
+    Classes of other packages may be called as foosim's, or each other's, are: their names have form and kind in front.
+    """
+    schema = form.settings.model_json_schema(by_alias=True, ref_template=REF + "{model}")
     inner = schema.pop("$defs", {})
-    schema = inner.pop(schema["$ref"].rpartition("/")[2]) if "$ref" in schema else schema
+    schema = inner.pop(schema["$ref"].removeprefix(REF)) if "$ref" in schema else schema
+    is_own = form.module.startswith(OWN)
+    name = form.settings.__name__ if is_own else f"{form.form}.{form.name}"
+    if not is_own:
+        renamed = {REF + other: f"{REF}{name}.{other}" for other in inner if other not in OPEN}
+        renamed[REF + form.settings.__name__] = REF + name  # where it refers to itself
+        schema = _with_references(schema, renamed)
+        inner = {
+            (renamed.get(REF + other) or other).removeprefix(REF): _with_references(its, renamed)
+            for other, its in inner.items()
+        }
+    assert name not in definitions or name in OPEN, f"two definitions are called {name}"
     for other, its in inner.items():
+        assert other in OPEN or definitions.get(other, its) == its, f"two definitions are called {other}"
         definitions.setdefault(other, its)
     definitions[name] = schema
-    return f"#/$defs/{name}"
+    return name
+
+
+def _with_references(schema: Any, renamed: dict[str, str]) -> Any:
+    """Return a schema whose references have other names."""
+    if isinstance(schema, list):
+        return [_with_references(one, renamed) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {
+        key: renamed.get(value, value) if isinstance(value, str) else _with_references(value, renamed)
+        for key, value in schema.items()
+    }

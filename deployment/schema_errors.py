@@ -18,6 +18,7 @@ from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.deployment import hosts
+from foosim.world.forms import registry
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {
@@ -40,6 +41,19 @@ _KINDS: Final = {
     "model_type": "not a mapping",
     "model_attributes_type": "not a mapping",
 }
+_BOUNDS: Final = {
+    "greater_than_equal": "less than the least that is valid, {ge}",
+    "less_than_equal": "more than the most that is valid, {le}",
+    "greater_than": "not above {gt}",
+    "less_than": "not below {lt}",
+    "multiple_of": "not a multiple of {multiple_of}",
+    "finite_number": "not finite",
+    "string_too_long": "longer than {max_length} characters",
+    "string_too_short": "shorter than {min_length} characters",
+    "too_long": "more than {max_length} entries",
+    "too_short": "fewer than {min_length} entries",
+}
+UNKNOWN: Final = "unknown key"
 _BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
 # pydantic reports this for a field whose default depends on another one that is wrong: that one is reported anyway.
 _CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
@@ -52,7 +66,9 @@ def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Fi
     """
     details = error.errors(include_url=False)
     root = _deployment()
-    return (_finding(detail, (*under, *detail["loc"]), root) for detail in details if _is_cause(detail))
+    for detail in details:
+        if _is_cause(detail):
+            yield _with_failures(_finding(detail, (*under, *detail["loc"]), root))
 
 
 def settings_findings(error: ValidationError, settings: type[BaseModel], under: Location) -> Iterator[Finding]:
@@ -62,6 +78,13 @@ def settings_findings(error: ValidationError, settings: type[BaseModel], under: 
         if _is_cause(detail):
             finding = _finding(detail, detail["loc"], root)
             yield replace(finding, location=(*under, *finding.location))
+
+
+def _with_failures(finding: Finding) -> Finding:
+    """Return the finding of a key that no kit has with why packages, of which one might, could not be imported."""
+    if finding.what != UNKNOWN or len(finding.location) > 1:
+        return finding
+    return replace(finding, what="; ".join([UNKNOWN, *registry.load_entry_points()]))
 
 
 def _is_cause(detail: ErrorDetails) -> bool:
@@ -87,19 +110,10 @@ def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
 
 
 def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
-    match kind:
-        case "greater_than_equal":
-            return f"less than the least that is valid, {context['ge']}"
-        case "less_than_equal":
-            return f"more than the most that is valid, {context['le']}"
-        case "string_too_long":
-            return f"longer than {context['max_length']} characters"
-        case "too_long":
-            return f"more than {context['max_length']} entries"
-        case "too_short":
-            least = context.get("min_length", 1)
-            return "empty" if least == 1 else f"fewer than {least} entries"
-    return None
+    if kind == "too_short" and context.get("min_length", 1) == 1:
+        return "empty"
+    text = _BOUNDS.get(kind)
+    return None if text is None else text.format(**context)
 
 
 def _missing(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
@@ -109,7 +123,7 @@ def _missing(location: Location, schema: Mapping[str, Any], value: object, conte
 def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
     key = location[-1]
     nearest = nearest_name(key, parent.get("properties", ()))
-    return Finding(location, "unknown key", key, None if nearest is None else repr(nearest), "key")
+    return Finding(location, UNKNOWN, key, None if nearest is None else repr(nearest), "key")
 
 
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:

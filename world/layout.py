@@ -8,12 +8,13 @@ the deployment and of what was added since, so every process builds the same one
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Final
 
 from foosim.common.errors import Malformed
+from foosim.common.finding import Finding, Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     ROBOTS,
@@ -28,7 +29,7 @@ from foosim.world.forms.forms import (
     WorldRule,
 )
 from foosim.world.forms.per_field import Numbers, numbers_of
-from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings
+from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
 from foosim.world.spec import WorldSpec
 
 WORLD: Final = "world"
@@ -209,7 +210,7 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     if of_world:
         models[WORLD] = WORLD
     models |= {name: robot.model for name, robot in spec.robots.items()}
-    carried = {name: _carried(spec, robot) for name, robot in spec.robots.items()}
+    carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
     declared = Declared(frozenset(models), carried, memory, tuple(addable))
@@ -282,23 +283,91 @@ def of_motion(model: Model) -> dict[str, int]:
     return {f"{MOTION}.{slot}": count for slot, count in find_motion(model).slots.items()}
 
 
-def _carried(spec: WorldSpec, robot: RobotSettings) -> Carried:
-    """Return the slots of a robot's motion, of its components and of their modifiers, in name order."""
-    solver = of_motion(_model(robot.model))
-    for name, actuator in sorted(robot.actuators.items()):
+@dataclass(frozen=True, slots=True)
+class Declaring:
+    """What declares slots on an entity: what it is called, where it stands in the deployment, and its slots by name.
+
+    `is_owners` says that the owner writes them, and not the solver.
+    """
+
+    what: str
+    location: Location
+    slots: Mapping[str, int]
+    is_owners: bool = False
+
+
+def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Declaring]:
+    """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
+    place: Location = ("robots", name)
+    model = _model(robot.model)
+    yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
+    for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
-        solver |= _slots(name, component, actuator, Carrier(0, spec.tick_ns))
-        solver |= _slots_of_modifiers(name, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
-    for name, rule in sorted(robot.rules.items()):
-        solver |= {f"{name}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
-    owner: dict[str, int] = {}
-    for name, sensor in sorted(robot.sensors.items()):
+        slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns))
+        slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
+        yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
+    for label, rule in sorted(robot.rules.items()):
+        slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
+        yield Declaring(f"rule {label}", (*place, "rules", label), slots)
+    for label, sensor in sorted(robot.sensors.items()):
         component = registry.find_component("sensor", sensor.kind)
-        period_ns = spec.turns(sensor)[0] * spec.tick_ns
-        owner |= _slots(name, component, sensor, Carrier(0, period_ns))
-        owner |= _slots_of_modifiers(name, sensor.modifiers, numbers_of(component, sensor), period_ns)
-        owner[f"{name}.{SAMPLES}"] = 1
+        period_ns = least_period_ns(spec, component, sensor)
+        slots = _slots(label, component, sensor, Carrier(0, period_ns))
+        slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor), period_ns)
+        slots[f"{label}.{SAMPLES}"] = 1
+        yield Declaring(f"sensor {label}", (*place, "sensors", label), slots, is_owners=True)
+
+
+def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> int:
+    """Return the least time between two readings: a sensor that speaks may measure at each tick."""
+    return spec.tick_ns if sensor.speaks else spec.turns(settings)[0] * spec.tick_ns
+
+
+def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:
+    """Return the slots of a robot that are not of its model."""
+    solver: dict[str, int] = {}
+    owner: dict[str, int] = {}
+    for one in declaring(spec, name, robot):
+        (owner if one.is_owners else solver).update(one.slots)
     return Carried(solver, owner)
+
+
+def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield what declares a slot of an entity that something else has declared: it would be in one place for both."""
+    of_rules: list[tuple[str, Declaring]] = []
+    for label, settings in world_rules(spec).items():
+        place: Location = ("rules", label) if label in spec.rules else tuple(_kit_with(spec, label))
+        for model, slots in find_rule(settings).each.items():
+            named = {f"{label}.{slot}": count for slot, count in slots.items()}
+            of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
+    seen: set[tuple[str, tuple[tuple[str, int], ...]]] = set()
+    for name, robot in spec.robots.items():
+        parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
+        alike = robot.model, tuple([(label, id(settings)) for label, settings in parts])
+        if alike not in seen:  # many robots of a fleet are
+            seen.add(alike)
+            remembered = [one for model, one in of_rules if model in (_model(robot.model).name, ROBOTS)]
+            yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
+    for kit in kits_named(spec):
+        for name, model in kit.entities.items():
+            kind = _model(model)
+            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
+            yield from _doubled([motion, *(one for its, one in of_rules if its == kind.name)], name)
+
+
+def _kit_with(spec: WorldSpec, rule: str) -> Iterator[str]:
+    """Yield the kits that have a rule."""
+    return (kit.name for kit in kits_named(spec) if rule in kit.rules)
+
+
+def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
+    first: dict[str, Declaring] = {}
+    for one in all_of_it:
+        for slot in one.slots:
+            other = first.setdefault(slot, one)
+            if other is not one:
+                what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
+                yield Finding(one.location, what, slot.partition(".")[2], at="key")
 
 
 def _slots_of_modifiers(
@@ -318,8 +387,12 @@ def _slots(name: str, component: Component, settings: ComponentSettings, carrier
 
 def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:
     """Return the names of the modifiers of a component: their kinds, numbered where there are several of one."""
-    kinds = [registry.find_component("modifier", settings.kind).name for settings in modifiers]
-    return [
-        kind if kinds.index(kind) == place else f"{kind}{kinds[:place].count(kind) + 1}"
-        for place, kind in enumerate(kinds)
-    ]
+    labels: list[str] = []
+    for settings in modifiers:
+        kind = label = registry.find_component("modifier", settings.kind).name
+        number = 1
+        while label in labels:
+            number += 1
+            label = f"{kind}{number}"
+        labels.append(label)
+    return labels

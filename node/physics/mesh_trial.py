@@ -1,6 +1,6 @@
 """A mesh from outside meets the physics engine in a throw-away process first, and only then in one that matters.
 
-What Python can check is checked before (`protocol.mesh`); what is left is that Bullet may crash, hang or use up the
+What Python can check is checked before (`world.mesh_files`); what is left is that Bullet may crash, hang or use up the
 memory. The throw-away process has 1 GiB of address space, 5 s of processor time a mesh, and can open nothing: it builds
 the world with that mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it ends in any
 other way than well, the run does not begin, and the message says which file did it.

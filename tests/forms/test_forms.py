@@ -39,7 +39,7 @@ def test_every_form_has_a_world_of_its_own() -> None:
     assert sorted(WORLDS) == own()
     for (form, name), world in WORLDS.items():
         used = {(found.form, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
-        assert (form, name) in used or (form, name) == ("model", "ball")
+        assert (form, name) in used
 
 
 @EACH

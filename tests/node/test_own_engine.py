@@ -125,11 +125,12 @@ def test_its_class_is_what_a_node_makes() -> None:
 
 
 def test_an_installed_engine_is_known_by_its_name(site: Path) -> None:
-    assert "unknown engine (there are: bullet, pure), 'still'" in problem("engine=still")
+    assert "unknown engine (there are: bullet, pure, or any module:Class), 'still'" in problem("engine=still")
     install(site)
     assert registry.names("engine") == ["bullet", "pure", "still"]
-    assert "engine: unknown engine (there are: bullet, pure, still), 'stil', nearest is 'still'" in problem(
-        "engine=stil"
+    assert (
+        "engine: unknown engine (there are: bullet, pure, still, or any module:Class), 'stil', nearest is 'still'"
+        in problem("engine=stil")
     )
     apply_sets(TEXT, TABLE.name, ["engine=still"])
     (own,), (installed,) = (
@@ -153,9 +154,9 @@ def test_an_engine_without_meshes_says_so() -> None:
     ("engine", "reason"),
     [
         ("own_absent:Engine", "engine: cannot be imported: ModuleNotFoundError"),
-        ("own_still:Engine", "engine: registered as no engine"),
+        ("own_still:Engine", "engine: not registered as an engine"),
         ("own_still:Stil", "engine: own_still registers no such class (there are: Still), 'own_still:Stil'"),
-        ("foosim.world.sensors.pose:PoseTracker", "engine: registered as no engine"),
+        ("foosim.world.sensors.pose:PoseTracker", "engine: not registered as an engine"),
         ("3", "engine: not a text, 3"),
     ],
 )

@@ -176,6 +176,9 @@ MODULES: Final = {
     "own_broken": "def begin():\n    return 1 / 0\n\nbegin()\n",
     "own_importer": "import own_missing\n",
     "own_leaver": "import sys\nsys.exit(0)\n",
+    "own_unwritten": "import sys\ndef : 1\n",
+    "own_package/__init__": "",
+    "own_package/broken": "import json\n\nraise RuntimeError('two\\nlines')\n",
 }
 
 
@@ -186,6 +189,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         names(form)
     folder = tmp_path / "site"
     folder.mkdir()
+    (folder / "own_package").mkdir()
     for name, source in MODULES.items():
         (folder / f"{name}.py").write_text(source)
     monkeypatch.syspath_prepend(str(folder))
@@ -277,7 +281,7 @@ def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str
     with pytest.raises(UnknownName) as error:
         find(form, kind)
     there = ", ".join(names(form))
-    assert str(error.value) == f"unknown {form} (there are: {there}), {kind!r}{nearest}"
+    assert str(error.value) == f"unknown {form} (there are: {there}, or any module:Class), {kind!r}{nearest}"
 
 
 # --- by module and class ---------------------------------------------------------------------------------------------
@@ -294,16 +298,19 @@ def test_a_class_of_any_module_is_found_by_its_path() -> None:
 
 
 REFUSED: Final = {
-    "own_gauges:Idle": "registered as no sensor",
-    "own_gauges:ReachSettings": "registered as no sensor",
-    "own_winch:Winch": "registered as no sensor",
-    "json:dumps": "registered as no sensor",
-    "own_gone:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
+    "own_gauges:Idle": "not registered as a sensor",
+    "own_gauges:ReachSettings": "not registered as a sensor",
+    "own_winch:Winch": "not registered as a sensor",
+    "json:dumps": "not registered as a sensor",
+    "own_gone:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
+    "(is the folder that it is in on PYTHONPATH?)",
     "own_gauges.more:Gauge": "cannot be imported: ModuleNotFoundError: "
     "No module named 'own_gauges.more'; 'own_gauges' is not a package",
-    "own_importer:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
-    "own_broken:Gauge": "cannot be imported: ZeroDivisionError: division by zero",
-    "own_leaver:Gauge": "cannot be imported: SystemExit: 0",
+    "own_importer:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
+    "own_broken:Gauge": "cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",
+    "own_leaver:Gauge": "cannot be imported: SystemExit: 0 (own_leaver.py:2)",
+    "own_unwritten:Gauge": "cannot be imported: SyntaxError: invalid syntax (own_unwritten.py:2)",
+    "own_package.broken:Gauge": "cannot be imported: RuntimeError: two lines (own_package/broken.py:3)",
     "own_gauges:": "not a class (module:Class)",
     ":ReachGauge": "not a class (module:Class)",
     "own_gauges:ReachGauge.made": "not a class (module:Class)",
@@ -382,7 +389,7 @@ def test_a_name_that_no_deployment_can_write_is_refused(name: str) -> None:
 
 
 def test_a_slot_that_each_sensor_has_is_not_declared_again() -> None:
-    with pytest.raises(Refused, match="sensor own_counter has a slot samples, which each sensor has already"):
+    with pytest.raises(Refused, match=r"sensor own_counter of .*each sensor has a slot samples already"):
         sensor("own_counter", SensorSettings, Spoken, slots={"samples": 1})(type("Own", (), {}))
 
 
@@ -411,10 +418,12 @@ def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
 
 
 BROKEN: Final = {
-    "own_broken": "own_broken of worn 0.3 cannot be imported: ZeroDivisionError: division by zero",
-    "own_importer": "own_importer of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_missing'",
-    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
-    "own_leaver": "own_leaver of worn 0.3 cannot be imported: SystemExit: 0",
+    "own_broken": "own_broken of worn 0.3 cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",
+    "own_importer": "own_importer of worn 0.3 cannot be imported: "
+    "ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
+    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
+    "(is the folder that it is in on PYTHONPATH?)",
+    "own_leaver": "own_leaver of worn 0.3 cannot be imported: SystemExit: 0 (own_leaver.py:2)",
 }
 
 
@@ -429,7 +438,8 @@ def test_a_package_that_cannot_be_imported_is_named_and_hurts_nobody_else(site: 
         pytest.fail("a package that leaves takes the process with it")
     assert str(error.value) == (
         f"unknown sensor; {BROKEN[module]} "
-        "(there are: ball, battery, encoder, odometry, pose, proximity, reach), 'reech', nearest is 'reach'"
+        "(there are: ball, battery, encoder, odometry, pose, proximity, reach, or any module:Class), 'reech', "
+        "nearest is 'reach'"
     )
     assert find("sensor", "reach").module == "own_gauges" and find("sensor", "encoder").name == "encoder"
     load_deployment(apply_sets(TEXT, TABLE.name, [REACH.replace("own_gauges:ReachGauge", "reach")]), TABLE.name)
@@ -587,13 +597,13 @@ WRONG: Final = (
      [("2 kg", ".grain: not a length (a number and one of m, cm, mm, um, km), '2 kg', nearest is '2 km'"),
       ("3 mm", ".rate: not a rate (a number and one of Hz, kHz, mHz), '3 mm'")]),
     ("rate: 100 Hz, kind: 'own_gauges:Idle'",
-     [("'own", ".kind: registered as no sensor, 'own_gauges:Idle'")]),
+     [("'own", ".kind: not registered as a sensor, 'own_gauges:Idle'")]),
     ("kind: 'own_gone:Idle', rate: 100 Hz",
-     [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone', "
-       "'own_gone:Idle'")]),
+     [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
+       "(is the folder that it is in on PYTHONPATH?), 'own_gone:Idle'")]),
     ("kind: own_gauges.ReachGauge, rate: 100 Hz",
-     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity), "
-       "'own_gauges.ReachGauge'")]),
+     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity, "
+       "or any module:Class), 'own_gauges.ReachGauge'")]),
 )  # fmt: skip
 """Settings, and what is said of them at which word."""
 

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from typing import Final
 
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form
+from foosim.world.forms.forms import Form, Model
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
 from foosim.world.layout import find_motion, kits_named, world_rules
 from foosim.world.spec import WorldSpec
@@ -30,22 +30,28 @@ def forms_of(spec: WorldSpec) -> list[Form]:
 
 def _forms_of(spec: WorldSpec) -> Iterator[Form]:
     yield registry.find("engine", spec.engine)
-    yield from kits_named(spec)
+    for kit in kits_named(spec):
+        yield kit
+        for name in (*kit.entities.values(), *kit.addable):
+            yield from _with_motion(registry.find_model(name))
     for rule in world_rules(spec).values():
         yield registry.find("rule", rule.kind)
     if spec.scene is not None:
         yield registry.find("scene", spec.scene.kind)
     for robot in spec.robots.values():
-        model = registry.find_model(robot.model)
-        yield model
-        if model.motion:
-            yield find_motion(model)
+        yield from _with_motion(registry.find_model(robot.model))
         for sensor in robot.sensors.values():
             yield from _with_modifiers("sensor", sensor)
         for actuator in robot.actuators.values():
             yield from _with_modifiers("actuator", actuator)
         for of_entity in robot.rules.values():
             yield registry.find("entity_rule", of_entity.kind)
+
+
+def _with_motion(model: Model) -> Iterator[Form]:
+    yield model
+    if model.motion:
+        yield find_motion(model)
 
 
 def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:

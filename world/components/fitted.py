@@ -23,7 +23,7 @@ from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, modifier_labels
+from foosim.world.layout import Entity, Layout, least_period_ns, modifier_labels
 from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
@@ -152,7 +152,8 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "sensor", robot.name, channel))
         period, offset = spec.turns(settings)
         sensor = _made(component, settings, mounting)
-        modifiers = tuple(_modifiers(component, settings, mounting, sensor, period * spec.tick_ns))
+        least_ns = least_period_ns(spec, component, settings)
+        modifiers = tuple(_modifiers(component, settings, mounting, sensor, least_ns))
         numbers = numbers_of(component, settings)
         fitted.append(
             FittedSensor(

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from foosim.common.errors import BadValue, show
+from foosim.common.names import NAME_RULE, is_name
+
 if TYPE_CHECKING:
     from msgspec import Struct
 
@@ -27,6 +30,10 @@ NO_ENTITY: Final = -1.0
 SAMPLES: Final = "samples"
 """The slot of each sensor that counts what it has sampled; no component declares one of this name."""
 ROBOTS: Final = "*"
+SLOTS_MAX: Final = 65_536
+"""Numbers in all slots of one component, model, motion or rule."""
+WORDS: Final[Mapping[str, str]] = MappingProxyType({"entity_rule": "rule of entities", "rule": "rule of worlds"})
+"""What forms are called, where that is not their name."""
 NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
 NO_SETTINGS: Final[Mapping[str, float | None]] = MappingProxyType({})
 
@@ -52,8 +59,35 @@ class Carrier:
     period_ns: int
 
 
+def word_of(form: str) -> str:
+    """Return what one of a form is called."""
+    return WORDS.get(form, form)
+
+
+def with_article(noun: str) -> str:
+    """Return a noun behind `a` or `an`."""
+    return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
+
+
+def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
+    """Return what is wrong with slots: a mapping of names to counts of numbers; empty if nothing is."""
+    if not isinstance(slots, Mapping):
+        return f"they are a mapping of names to counts of numbers, not {show(slots)}"
+    numbers = 0
+    for name, size in slots.items():
+        if not (isinstance(name, str) and is_name(name)):
+            return f"{show(name)}: {NAME_RULE}"
+        if name == SAMPLES and is_sensor:
+            return f"each sensor has a slot {SAMPLES} already"
+        if not isinstance(size, int) or isinstance(size, bool) or not 1 <= size <= SLOTS_MAX:
+            return f"{name} has 1 to {SLOTS_MAX} numbers, or ENTITY, not {show(size)}"
+        numbers += size
+    return f"{numbers} numbers in all, at most {SLOTS_MAX} are valid" if numbers > SLOTS_MAX else ""
+
+
 SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
-"""The slots of a modifier, by its settings and what it is on. Raises BadValue for settings that do not fit that."""
+"""The slots of a component, by its settings and what it is on; a sensor or actuator is on no numbers. Raises BadValue
+for settings that do not fit that."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,21 +136,34 @@ class Component(Form):
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
-        """Return its slots with these settings. Raises BadValue where a modifier does not fit what it is on."""
-        return self.slots(settings, carrier) if callable(self.slots) else self.slots
+        """Return its slots with these settings. Raises BadValue where these do not fit what it is on, or no slots
+        follow from them."""
+        if not callable(self.slots):
+            return self.slots
+        try:
+            found: Any = self.slots(settings, carrier)
+        except BadValue:
+            raise
+        except Exception as error:
+            raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", self.name) from error
+        problem = slots_problem(found, is_sensor=self.form == "sensor")
+        if problem:
+            raise BadValue(f"its slots are wrong: {problem}", self.name)
+        return found  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model(Form):
     """A model of entities.
 
-    `slots` are the fields of its state. An engine solves one that is rigid; one with a `motion` goes on by that; any
-    other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of a
-    robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one standing
-    for all behind it; fields that every model calls the same need none.
+    `slots` are the fields of its state. Those that foosim itself needs it has whatever it declares: robots `down` and
+    `refused`, what is solved `quarantined`. An engine solves one that is rigid; one with a `motion` goes on by that;
+    any other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of
+    a robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one
+    standing for all behind it; fields that every model calls the same need none.
     """
 
-    slots: Mapping[str, int]
+    slots: Mapping[str, int] = field(default_factory=dict)
     is_robot: bool = True
     has_body: bool = True
     """Whether it is somewhere, with an antenna; else only a place of the network can say where."""

@@ -84,9 +84,12 @@ def codec_of(kind: str, form: str) -> PayloadCodec:
 
 
 def numbers_of(component: Component, settings: ComponentSettings) -> Numbers | None:
-    """Return the numbers of a component's readings or commands; None where these have something else, too."""
+    """Return the numbers of a component's readings or commands; None where these have something else, too, or as many
+    as nobody says."""
     codec = codec_of(component.name, component.form)
     if not all(field.is_number or field.is_several for field in codec.fields):
+        return None
+    if codec.fields[-1].is_several and not component.several:
         return None
     more = getattr(settings, component.several) - 1 if codec.fields[-1].is_several else 0
     return Numbers(codec.fields, getattr(component.value, GROUPS, {}), len(codec.fields) + more)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -18,11 +19,10 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from foosim.common.errors import Refused, UnknownName
-from foosim.common.names import CLASS_PATTERN, NAME_RULE, is_name
+from foosim.common.names import CLASS_PATTERN
 from foosim.world.forms.forms import (
     NO_SETTINGS,
     NO_SLOTS,
-    SAMPLES,
     Component,
     Engine,
     EntityRule,
@@ -33,7 +33,11 @@ from foosim.world.forms.forms import (
     Scene,
     SlotsOf,
     WorldRule,
+    with_article,
+    word_of,
 )
+from foosim.world.forms.importing import failure_of
+from foosim.world.forms.registration import check_form
 from foosim.world.forms.settings import ComponentSettings
 
 if TYPE_CHECKING:
@@ -59,6 +63,12 @@ FOLDERS: Final[Mapping[str, str]] = {
 }
 """Where foosim's own are, by form."""
 FORMS: Final = tuple(FOLDERS)
+OF_ROBOTS: Final = ("down", "refused")
+"""Fields that each robot has: whether it is out of service, and how many commands it has refused."""
+OF_SOLVED: Final = ("quarantined",)
+"""Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
+BY_CLASS: Final = "module:Class"
+"""What names a form beside its name."""
 
 Made = TypeVar("Made", bound=Callable[..., Any])
 
@@ -72,7 +82,7 @@ def sensor(
     settings: type[ComponentSettings],
     reading: type[Struct],
     *,
-    slots: Mapping[str, int] = NO_SLOTS,
+    slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
     needs: tuple[str, ...] = (),
     kit: str = "",
     several: str = "",
@@ -102,7 +112,7 @@ def actuator(
     settings: type[ComponentSettings],
     command: type[Struct],
     *,
-    slots: Mapping[str, int] = NO_SLOTS,
+    slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
     needs: tuple[str, ...] = (),
     kit: str = "",
     moves: bool = True,
@@ -141,8 +151,20 @@ def modifier(
 
 
 def model(name: str, settings: type[RobotSettings], **about: Any) -> Callable[[Made], Made]:
-    """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`."""
-    return _registering(lambda made: Model(form="model", name=name, made=made, settings=settings, **about))
+    """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`.
+
+    The fields that foosim itself needs, and that it does not declare, come after those that it does.
+    """
+
+    def describe(made: Callable[..., Any]) -> Model:
+        found = Model(form="model", name=name, made=made, settings=settings, **about)
+        needed = (*(OF_ROBOTS if found.is_robot else ()), *(OF_SOLVED if found.is_solved else ()))
+        declared: Any = found.slots
+        if not isinstance(declared, Mapping):
+            return found  # it is refused
+        return replace(found, slots={**declared, **{slot: 1 for slot in needed if slot not in declared}})
+
+    return _registering(describe)
 
 
 def motion(name: str, **about: Any) -> Callable[[Made], Made]:
@@ -184,12 +206,8 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Callable[[Made], M
 def _registering(describe: Callable[[Callable[..., Any]], Form]) -> Callable[[Made], Made]:
     def register(made: Made) -> Made:
         found = describe(made)
+        check_form(found)
         key = found.form, found.name
-        if not is_name(found.name):
-            raise Refused(f"{found.module} registers a {found.form} as {found.name!r}: {NAME_RULE}")
-        slots = getattr(found, "slots", NO_SLOTS)
-        if found.form == "sensor" and SAMPLES in slots:
-            raise Refused(f"{found.form} {found.name} has a slot {SAMPLES}, which each sensor has already")
         own = f"{FOLDERS[found.form]}.{found.name}"
         if found.module != own and _is_there(*key):
             raise Refused(f"{found.form} {found.name} is registered by {found.module}, and is in {own}")
@@ -213,8 +231,13 @@ def find(form: str, kind: str) -> Form:
     """
     found = lookup(form, kind)
     if found is None:
-        raise UnknownName("; ".join([f"unknown {form}", *load_entry_points()]), kind, names(form))
+        raise unknown(form, kind, names(form))
     return found
+
+
+def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
+    """Return the error for a name that nothing has, with the packages that could not be imported."""
+    return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, f"any {BY_CLASS}")
 
 
 def lookup(form: str, kind: str) -> Form | None:
@@ -281,7 +304,7 @@ def _load(entry: EntryPoint) -> str:
     except BaseException as error:  # noqa: BLE001  # SystemExit, too: a module may do anything
         _forget_new(known)
         giver = "a package" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
-        return f"{entry.value} of {giver} cannot be imported: {type(error).__name__}: {error}"
+        return f"{entry.value} of {giver} cannot be imported: {failure_of(error, entry.module)}"
     return ""
 
 
@@ -301,7 +324,7 @@ def _is_there(form: str, name: str) -> bool:
 def _of_class(form: str, path: str) -> Form:
     """Return the one that `module:Class` registered."""
     if not re.fullmatch(CLASS_PATTERN, path):
-        raise Refused("not a class (module:Class)")
+        raise Refused(f"not a class ({BY_CLASS})")
     module_name, _, class_name = path.partition(":")
     known = dict(_known)
     try:
@@ -310,7 +333,7 @@ def _of_class(form: str, path: str) -> Form:
         raise
     except BaseException as error:  # SystemExit, too: a module may do anything
         _forget_new(known)
-        raise Refused(f"cannot be imported: {type(error).__name__}: {error}") from error
+        raise Refused(f"cannot be imported: {failure_of(error, module_name)}") from error
     if not hasattr(module, class_name):
         there = [component.made.__qualname__ for component in _known.values() if component.module == module_name]
         raise UnknownName(f"{module_name} registers no such class", class_name, there)
@@ -318,10 +341,11 @@ def _of_class(form: str, path: str) -> Form:
     for component in _known.values():
         if component.form == form and component.made is made:
             return component
-    raise Refused(f"registered as no {form}")
+    raise Refused(f"not registered as {with_article(word_of(form))}")
 
 
 def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:
-    """Forget what a module has registered that then could not be imported."""
+    """Forget what modules have registered that then could not be imported; what they imported before stays."""
     for key in _known.keys() - known.keys():
-        del _known[key]
+        if _known[key].module not in sys.modules:
+            del _known[key]

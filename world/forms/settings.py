@@ -1,5 +1,7 @@
 """What the settings of all forms have, in a deployment."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Final
 
 from pydantic import Field, SerializeAsAny, StringConstraints
@@ -63,3 +65,17 @@ class RobotSettings(SpecBase):
     actuators: dict[Name, SerializeAsAny[ActuatorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     rules: dict[Name, SerializeAsAny[EntityRuleSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
+
+
+BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
+    {
+        "sensor": SensorSettings,
+        "actuator": ActuatorSettings,
+        "modifier": ModifierSettings,
+        "entity_rule": EntityRuleSettings,
+        "rule": RuleSettings,
+        "scene": SceneSettings,
+        "model": RobotSettings,
+    }
+)
+"""What the settings of a form have in common with all others of it; settings of kits are any."""

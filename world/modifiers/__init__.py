@@ -1,1 +1,1 @@
-"""Modifiers of readings and commands: one file each, with its settings and its registration (`world.registry`)."""
+"""Modifiers of readings and commands: one file each, with settings and registration (`world.forms.registry`)."""

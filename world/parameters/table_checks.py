@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
+from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.plain_data import PlainData, mm
+from foosim.world.forms import registry
 from foosim.world.parameters.table import LINE_NAMES, TABLE
 
 
@@ -18,18 +20,27 @@ def table_findings(data: PlainData) -> Iterator[Finding]:
 
 
 def _robots(data: PlainData) -> Iterator[Finding]:
-    """Lines exist and have one rod a team."""
+    """Lines exist and have one rod a team; other models may have such keys, too."""
     rods: dict[tuple[str, str], str] = {}
     lines = data.get(TABLE, "lines")
     for name in data.mapping("robots"):
         team, line = data.get("robots", name, "team"), data.get("robots", name, "line")
-        if not (isinstance(team, str) and isinstance(line, str)):
+        if not (isinstance(team, str) and isinstance(line, str) and _is_rod(data.get("robots", name, "model"))):
             continue
         if line in LINE_NAMES and isinstance(lines, dict) and line not in lines:
             yield Finding(("robots", name, "line"), "not in table.lines", line, data.nearest(line, lines))
         first = rods.setdefault((team, line), name)
         if first != name:
             yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
+
+
+def _is_rod(model: object) -> bool:
+    """Whether robots of a model are rods; what is wrong with its name is found elsewhere."""
+    try:
+        found = registry.lookup("model", model) if isinstance(model, str) else None
+    except Refused:
+        return False
+    return found is not None and found.name == "rod"
 
 
 def _lines(data: PlainData) -> Iterator[Finding]:

@@ -1,1 +1,1 @@
-"""The football table and the warehouse: bodies, scenery and behaviour in a tick."""
+"""Scenes: functions of settings that return scenery, one file each."""

@@ -1,1 +1,1 @@
-"""Sensors: one file each, which has its settings, its reading, and its registration (`world.registry`)."""
+"""Sensors: one file each, which has its settings, its reading, and its registration (`world.forms.registry`)."""

@@ -59,7 +59,10 @@ class Proximity:
         obstacles = obstacles_of(at.spec)
         self._position = at.robot.offsets["position"]
         self._heading = at.robot.offsets["heading"]
-        self._rovers = [rover.offsets["position"] for rover in at.layout.of("rover")]
+        rovers = at.layout.of("rover")
+        self._rovers = [rover.offsets["position"] for rover in rovers]
+        self._own = next((place for place, rover in enumerate(rovers) if rover.name == at.robot.name), None)
+        """Which of the rovers it is itself on: that is nowhere in its way."""
         self.radius_m, self.range_m = rover.radius, settings.range
         angles = [2.0 * pi * ray / settings.rays for ray in range(settings.rays)]
         self._cos = np.array([[cos(angle)] for angle in angles])
@@ -134,7 +137,8 @@ def ways_of(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Numbers:
     reach = np.array([one.range_m for one in sensors]).reshape(-1, 1, 1) + first.radius_m + radii
     near = (np.abs(middles_x) <= reach) & (np.abs(middles_y) <= reach)
     for row, one in enumerate(sensors):
-        near[row, 0, len(first._circles[0]) + first._rovers.index(one._position)] = False
+        if one._own is not None:
+            near[row, 0, len(first._circles[0]) + one._own] = False
     met = np.flatnonzero(near.any(axis=(0, 1)))
     if len(met):
         to_circles = _to_circles(dx, dy, middles_x[:, :, met], middles_y[:, :, met], radii[met])

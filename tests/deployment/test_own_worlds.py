@@ -1,0 +1,451 @@
+"""Worlds of somebody's own forms that cannot be: refused with the place and what is valid, before a run begins."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from typing import Final
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.assembly.used_forms import forms_of
+from foosim.world.forms import registry
+from foosim.world.layout import build_layout
+from tests.own_forms import TABLE, folder_on_path, problems, written
+
+TEXT: Final = TABLE.read_text()
+WAREHOUSE: Final = (TABLE.parent / "warehouse.yaml").read_text()
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path."""
+    return folder_on_path(tmp_path, monkeypatch)
+
+
+# --- slots -----------------------------------------------------------------------------------------------------------
+
+SENSOR: Final = "robots.red.goal.sensors.own={kind: 'own_form:Sensor', rate: 100 Hz}"
+RULE: Final = "robots.red.goal.rules={own: {kind: 'own_form:Rule'}}"
+WORLD: Final = "rules={own: {kind: 'own_form:World'}}"
+TWO: Final = (
+    "class Sensor(Own): pass",
+    "class Rule(Own): pass",
+    "class World(Own): pass",
+    "sensor('own-sensor', Settings, Number, slots={SENSOR})(Sensor)",
+    "entity_rule('own-rule', EntityRuleSettings, slots={RULE})(Rule)",
+    "rule('own-world', RuleSettings, each={WORLD})(World)",
+)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "rule", "world", "told"),
+    [
+        ("{'a': 1}", "{'b': 1}", "{ROBOTS: {'c': 1}}", []),
+        ("{'a': 1}", "{'a': 1}", "{}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own has "
+            "already, 'a'"]),
+        ("{'a': 2}", "{}", "{ROBOTS: {'a': 1}}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own of the "
+            "world has already, 'a'"]),
+        ("{}", "{'a': 1}", "{'rod': {'a': 1}}", [
+            "robots.red.goal.rules: the rule own declares the slot own.a of red.goal, which the rule own of the world "
+            "has already, 'a'"]),
+        ("{}", "{}", "{'camera': {'a': 1}, ROBOTS: {'a': 2}}", [
+            "rules: the rule own of the world declares the slot own.a of camera, which the rule own of the world has "
+            "already, 'a'"]),
+        ("{}", "{}", "{ROBOTS: {'samples': 2}}", [
+            "robots.red.goal.sensors: the sensor own declares the slot own.samples of red.goal, which the rule own of "
+            "the world has already, 'samples'"]),
+    ],
+)  # fmt: skip
+def test_a_slot_is_declared_once(site: Path, sensor: str, rule: str, world: str, told: list[str]) -> None:
+    """Names of components may be equal where their slots are not."""
+    written(site, *(line.format(SENSOR=sensor, RULE=rule, WORLD=world) for line in TWO))
+    assert problems(SENSOR, RULE, WORLD) == told
+
+
+def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
+    """A kind may be called as the second of another kind is."""
+    written(site, "modifier('delay2', ModifierSettings, slots={'values': 1})(Own)")
+    delay = "{kind: delay, time: 20 ms}"
+    text = apply_sets(TEXT, "t.yaml", [f"robots.camera.sensors.ball.modifiers=[{delay}, {{kind: 'own_form:Own'}}, "
+                                       f"{delay}]"])  # fmt: skip
+    counts = build_layout(load_deployment(text, "t.yaml"))["camera"].counts
+    found = {slot: count for slot, count in counts.items() if slot.endswith(".values")}
+    assert set(found) == {"ball.delay.values", "ball.delay2.values", "ball.delay3.values"}
+    assert found["ball.delay2.values"] == 1 < found["ball.delay.values"] == found["ball.delay3.values"]
+
+
+# --- models and their motions ----------------------------------------------------------------------------------------
+
+DRONE: Final = "robots.camera={model: 'own_form:Own'}"
+FIELDS: Final = "an omni has x, y, down, refused, quarantined"
+MODELS: Final = {
+    "motion('hover', needs=('x',), writes=('y',))": None,
+    "": "a model without its motion: unknown motion (there are: two_wheels, or any module:Class), 'hover'",
+    "motion('hover', needs=('x', 'charge'))": f"a model whose motion hover needs charge: {FIELDS}",
+    "motion('hover', needs=('refusd',))": "a model whose motion hover needs refusd: "
+    f"{FIELDS}, nearest to refusd is refused",
+    "motion('hover', writes=('z',))": f"a model whose motion hover writes z: {FIELDS}",
+    "motion('hover', kit='hall')": "a model whose motion is hover of a hall in a world without one",
+}
+
+
+@pytest.mark.parametrize("motion", MODELS)
+def test_a_model_has_what_its_motion_needs(site: Path, motion: str) -> None:
+    own = "model('omni', RobotSettings, slots={'x': 1, 'y': 1}, motion='hover')(Own)"
+    written(site, own, f"{motion}(Own)" if motion else "")
+    told = MODELS[motion]
+    assert problems(DRONE, "players={}") == ([] if told is None else [f"robots.camera.model: {told}, 'own_form:Own'"])
+
+
+def test_a_rigid_model_that_the_islands_do_not_know_is_refused(site: Path) -> None:
+    written(site, "model('crate', RobotSettings, is_rigid=True)(Own)")
+    assert problems(DRONE) == [
+        "robots.camera.model: a rigid model whose reach the islands do not know; valid are rod, ball, and models with "
+        "a motion, 'own_form:Own'"
+    ]
+
+
+def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
+    written(site, "entity_rule('fade', EntityRuleSettings)(Own)")
+    assert problems("robots.camera.rules={fade: {kind: 'own_form:Own'}}") == [
+        "robots.camera.rules.fade.kind: rule of entities that would never apply: a camera is neither rigid nor has a "
+        "motion, 'own_form:Own'"
+    ]
+    assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == []
+
+
+@pytest.mark.parametrize(
+    ("about", "told"),
+    [
+        ("needs=('contacts',), writes=('contacts',)", ""),
+        ("writes=('contact',)", "rule of entities that writes contact: a rod has joint_positions, joint_velocities, "
+         "joint_efforts, quarantined, down, contacts, refused, nearest to contact is contacts"),
+        ("needs=('contact',)", "rule of entities that a rod cannot carry, which has no contact (valid on: none; a rod "
+         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, nearest to "
+         "contact is contacts)"),
+    ],
+)  # fmt: skip
+def test_a_rule_of_robots_reads_and_writes_fields_that_there_are(site: Path, about: str, told: str) -> None:
+    written(site, f"entity_rule('fade', EntityRuleSettings, {about})(Own)")
+    expected = [f"robots.red.goal.rules.fade.kind: {told}, 'own_form:Own'"] if told else []
+    assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == expected
+
+
+def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
+    written(site, "model('omni', RobotSettings)(Own)")
+    assert problems("robots.camera={model: 'own_form:Own', sensors: {own: {kind: encoder, rate: 100 Hz}}}",
+                    "players={}") == [
+        "robots.camera.sensors.own.kind: sensor that an omni cannot carry, which has no joint_positions (valid on: "
+        "rod), 'encoder'"
+    ]  # fmt: skip
+
+
+# --- rules of the world ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("about", "told"),
+    [
+        ("each={ROBOTS: {'x': 1}, 'rod': {'y': 1}}, writes=('ball',)", ""),
+        ("each={'rood': {'y': 1}}", "rule of worlds that remembers something of each rood: unknown model (there are: "
+         "ball, camera, rod, rover, station), 'rood', nearest is 'rod'"),
+        ("writes=('bal',)", "rule of worlds that writes bal: unknown model (there are: ball, camera, rod, rover, "
+         "station), 'bal', nearest is 'ball'"),
+        ("writes=(ROBOTS,)", "rule of worlds that writes *: unknown model (there are: ball, camera, rod, rover, "
+         "station), '*'"),
+    ],
+)  # fmt: skip
+def test_a_rule_of_worlds_names_models_that_there_are(site: Path, about: str, told: str) -> None:
+    written(site, f"rule('laps', RuleSettings, {about})(Own)")
+    expected = [f"rules.laps.kind: {told}, 'own_form:Own'"] if told else []
+    assert problems("rules={laps: {kind: 'own_form:Own'}}") == expected
+
+
+def test_a_rule_that_a_kit_has_already_is_refused() -> None:
+    assert problems("rules={football: {kind: football}}") == [
+        "rules: a rule that the kit table has already: each world with a table has it, 'football'"
+    ]
+
+
+# --- kits ------------------------------------------------------------------------------------------------------------
+
+KIT: Final = (
+    "class Zoo(Own):",
+    "    def __init__(self, section, spec): pass",
+    "    def shapes(self): return ()",
+    "    def physics(self): return None",
+    "    def findings(self): return iter(())",
+    "class Beast(Own):",
+    "    def check_place(self, position, velocity): pass",
+    "    def place_at(self, view, position, velocity): pass",
+    "class RuleOf(RuleSettings):",
+    "    count: int = 1",
+    "class Rule(Own): pass",
+    "rule('feed', RuleOf)(Rule)",
+    "class InHall(Own): pass",
+    "rule('in-hall', RuleSettings, kit='hall')(InHall)",
+    "model('beast', RobotSettings, is_robot=False, slots={'position': 3})(Beast)",
+    "class Stone(Own): pass",
+    "model('stone', RobotSettings, is_robot=False)(Stone)",
+    "class Crate(Own): pass",
+    "model('crate', RobotSettings, is_robot=False, is_rigid=True)(Crate)",
+)
+KITS: Final = {
+    "entities={'leo': 'beast'}, addable=('beast',), rules={'feed': {'kind': 'feed', 'count': 2}}": [],
+    "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
+                                "are in robots:"],
+    "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: ball, "
+                                  "camera, rod, rover, station, or any module:Class), 'beest'"],
+    "entities={'leo': 'crate'}": ["its entity leo is a rigid model whose reach the islands do not know; valid are "
+                                  "rod, ball, and models with a motion"],
+    "entities={'world': 'beast'}": ["its entity world has a reserved name"],
+    "entities={'ball': 'beast'}": ["its entity ball has a name that is also one of the kit table's"],
+    "rules={'football': {'kind': 'feed'}}": ["its rule football has a name that is also one of the kit table's"],
+    "rules={'feed': {'kind': 'fed'}}": ["its rule feed: unknown rule of worlds (there are: football, or any "
+                                        "module:Class), 'fed'"],
+    "rules={'feed': {'kind': 'feed', 'count': 'two'}}": ["its rule feed: count: not a whole number, 'two'"],
+    "rules={'feed': {'kind': 'feed', 'coun': 2}}": ["its rule feed: unknown key, 'coun', nearest is 'count'"],
+    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: cannot be imported: ModuleNotFoundError: No module "
+                                               "named 'own_none' (is the folder that it is in on PYTHONPATH?), "
+                                               "'own_none:X'"],
+    "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
+    "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
+                           "place_at and no field position"],
+    "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: ball, camera, "
+                          "rod, rover, station, or any module:Class), 'lion'"],
+}  # fmt: skip
+"""Kits, and what is said of a table with each."""
+
+
+@pytest.mark.parametrize("about", KITS)
+def test_what_a_kit_brings_can_be_in_its_world(site: Path, about: str) -> None:
+    written(site, *KIT, f"kit('zoo', SpecBase, {about})(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    assert problems("zoo={}") == [f"kit zoo: {told}, 'zoo'" for told in KITS[about]]
+
+
+def test_models_of_a_kit_of_another_kit_need_it(site: Path) -> None:
+    written(site, *KIT, "kit('zoo', SpecBase, entities={'egg': 'ball'})(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    told = "its entity egg is of a model that cannot be there: ball of a table in a world without one"
+    assert problems("zoo={}", text=WAREHOUSE) == [f"kit zoo: {told}, 'zoo'"]
+
+
+def test_the_forms_of_a_world_have_the_models_of_its_kits() -> None:
+    """What can be added, too: two nodes with other versions of them would compute other worlds."""
+    deployment = load_deployment(TEXT, TABLE.name)
+    assert ("model", "ball") in {(form.form, form.name) for form in forms_of(deployment)}
+
+
+FAILING: Final = {
+    "    def __init__(self, section, spec): pass": "    def __init__(self, section): pass",
+    "    def shapes(self): return ()": "    def shapes(self): return (1 // 0,)",
+    "    def physics(self): return None": "    def physics(self): return self.nothing",
+    "    def findings(self): return iter(())": "    def findings(self): yield from 3",
+    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda data: 1 // 0)",
+}
+"""Lines of a kit, and others that raise."""
+
+
+@pytest.mark.parametrize("line", FAILING)
+def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: str) -> None:
+    lines = [FAILING[line] if one == line else one for one in KIT]
+    written(site, *lines, "kit('zoo', SpecBase)(Zoo)")
+    registry.find("kit", "own_form:Zoo")
+    (told,) = problems("zoo={}")
+    assert re.match(r"zoo: kit zoo failed: \w+Error: .*, 'zoo'$", told), told
+    assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
+
+
+def test_a_scene_that_fails_is_named_with_the_place_in_its_file(site: Path) -> None:
+    written(site, "def shapes(settings):", "    return [settings.height]", "scene('plain', SceneSettings)(shapes)")
+    (told,) = problems("scene={kind: 'own_form:shapes'}")
+    assert told.startswith("scene.kind: scene plain failed: AttributeError: 'SceneSettings' object has no attribute")
+
+
+# --- what a form of one world says of another ------------------------------------------------------------------------
+
+
+def test_keys_of_a_rod_are_those_of_rods_alone(site: Path) -> None:
+    own = ("class Team(RobotSettings):", "    team: str", "    line: str", "model('judge', Team)(Own)")
+    written(site, *own)
+    judge = "robots.camera={model: 'own_form:Own', team: red, line: %s}"
+    assert problems(judge % "goal", "players={}") == [] == problems(judge % "none", "players={}")
+
+
+def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callable[..., str]) -> None:
+    """A surface is of use where a robot is one; that no such robot is solved yet is another matter."""
+    written(site, "model('crate', RobotSettings, is_rigid=True, slots={'linear_velocity': 3})(Own)")
+    sets = ("scenery.goods-1.surface=floor", "players={}", "nodes={one: {robots: ['*']}}", "network={}")
+    surface = "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"
+    assert surface in problems(*sets, text=fleet_text(1))
+    assert surface not in problems(*sets, "robots.crate={model: 'own_form:Own'}", text=fleet_text(1))
+
+
+def test_a_rod_by_its_class_is_a_rod() -> None:
+    rod = "{model: 'foosim.world.models.rod:Rod', team: red, line: goal}"
+    assert problems(f"robots.camera={rod}", "players={}") == [
+        "robots.camera.line: red's line is already the rod red.goal, 'goal'"
+    ]
+
+
+def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callable[..., str]) -> None:
+    mast = (
+        "class Mast(Own):",
+        "    def __init__(self, settings, at): self.at = at",
+        "    def body(self): return None",
+        "    def place(self, view): view.write(self.at.slot('position'), 6.0, 0.0, 0.0)",
+        "    def is_plausible(self, numbers, before): return True",
+        "model('mast', RobotSettings, slots={'position': 3, 'heading': 1}, has_body=False)(Mast)",
+    )
+    written(site, *mast)
+    rays = "{kind: proximity, rate: 50 Hz, rays: 4, range: 3 m}"
+    robot = f"robots.mast={{model: 'own_form:Mast', sensors: {{rays: {rays}}}}}"
+    text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
+    done = rehearse(text, "x.yaml", 20, 1)
+    assert not done.json["failed"], done.json["reason"]
+
+
+# --- sensors that speak ----------------------------------------------------------------------------------------------
+
+
+SPEAKS: Final = (
+    "class Touch(Own):",
+    "    def __init__(self, settings, at): self.contacts = at.slot('contacts')",
+    "    def sample(self, view): return Number(view.read(self.contacts)[1])",
+    "sensor('touch', SensorSettings, Number, needs=('contacts',), speaks='contacts')(Touch)",
+)
+
+
+def test_modifiers_of_a_sensor_that_speaks_have_room_for_a_value_at_each_tick(site: Path) -> None:
+    """It measures when the ball meets the rod, beside its rate of once a second."""
+    written(site, *SPEAKS)
+    rods = [name for name, robot in load_deployment(TEXT, TABLE.name).robots.items() if robot.model == "rod"]
+    modifiers = "[{kind: delay, time: 40 ms}, {kind: bias_walk, initial: 1 mm, walk: 1 mm}]"
+    sensors = [
+        f"robots.{rod}.sensors.own={{kind: 'own_form:Touch', rate: 1 Hz, modifiers: {modifiers}}}" for rod in rods
+    ]
+    fast = ("engine=pure", "players={}", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=4 m/s")
+    text = apply_sets(TEXT, TABLE.name, [*fast, *sensors])
+    assert build_layout(load_deployment(text, TABLE.name))["red.goal"].counts["own.delay.ticks"] == 21
+    frames = Frames()
+    done = rehearse(text, TABLE.name, 400, 2, settings=Settings(on_commit=frames))
+    assert not done.json["failed"], done.json["reason"]
+    assert sum(frames.frames[-1].at(rod, "own.samples") for rod in rods) > len(rods), "the ball meets a rod"
+    assert done.digests == rehearse(text, TABLE.name, 400, 1).digests, "law 1"
+
+
+# --- scenery ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("surface", "told"),
+    [
+        ("floor", ""),
+        ("", ""),
+        ("flor", "scene own_form:shapes has scenery of an unknown surface (there are: figures, floor, goal, ramps, "
+         "rods, walls; and '' of what no rigid body feels), 'flor', nearest is 'floor'"),
+    ],
+)  # fmt: skip
+def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surface: str, told: str) -> None:
+    """A name that is misspelt would be scenery that balls fly through."""
+    scene = (
+        "from foosim.world.scene import Box, Shape",
+        "def shapes(settings):",
+        f"    return (Shape(Box((0.1, 0.1, 0.1)), {surface!r}, (0.0, 0.0, 0.0, 1.0), (5.0, 0.0, 5.0)),)",
+        "scene('plain', SceneSettings)(shapes)",
+    )
+    written(site, *scene)
+    assert problems("scene={kind: 'own_form:shapes'}") == ([f"scene.kind: {told}"] if told else [])
+
+
+# --- the JSON Schema -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "is_valid"),
+    [
+        (("robots", "camera"), {"model": "own_form:Own", "arms": 2}, True),
+        (("robots", "camera"), {"model": "own_form.Own", "arms": 2}, False),
+        (("robots", "camera"), {"arms": 2}, False),
+        (("robots", "red.goal", "sensors", "own"), {"kind": "own_form:Own", "scale": 2.0}, True),
+        (("robots", "red.goal", "sensors", "own"), {"kind": "own:form:Own"}, False),
+        (("robots", "red.goal", "sensors", "own"), {"scale": 2.0}, False),
+        (("robots", "red.goal", "sensors", "encoder", "modifiers"), [{"kind": "own_form:Own"}], True),
+        (("robots", "red.goal", "actuators"), {"own": {"kind": "own_form:Own"}}, True),
+        (("robots", "red.goal", "rules"), {"own": {"kind": "own_form:Own"}}, True),
+        (("rules",), {"own": {"kind": "own_form:Own"}}, True),
+        (("rules",), {"own": {"kind": "own_form"}}, False),
+        (("scene",), {"kind": "own_form:own", "radius": "1 m"}, True),
+    ],
+)
+def test_the_schema_takes_forms_by_their_class(place: tuple[str, ...], value: object, is_valid: bool) -> None:
+    """In a file and in what it is expanded to; what the settings of such are, no schema knows."""
+    data = yaml.safe_load(TEXT)
+    inner = data
+    for step in place[:-1]:
+        inner = inner[step]
+    inner[place[-1]] = value
+    for schema in (deployment_schema(), json.loads(deployment_schema_text())):
+        assert Draft202012Validator(schema).is_valid(data) is is_valid
+
+
+OWN_CLASSES: Final = (
+    "class Wheel(SpecBase):",
+    '    """Of a kit."""',
+    "    spokes: int",
+    "class Table(SpecBase):",
+    '    """Called as a section of foosim is."""',
+    "    wheel: Wheel",
+    "class Zoo(Own): pass",
+    "kit('zoo', Table)(Zoo)",
+    "class Goal(SpecBase):",
+    '    """Called as a part of a section of foosim is."""',
+    "    nets: int",
+    "class SensorOfGoals(SensorSettings):",
+    "    goal: Goal",
+    "sensor('goals', SensorOfGoals, Number)(Own)",
+)
+
+
+def test_the_schema_keeps_classes_of_other_packages_apart(site: Path) -> None:
+    """They may be called as foosim's own are, and as each other's."""
+    before = deployment_schema()
+    written(site, *OWN_CLASSES)
+    second = [line.replace("nets", "posts").replace("'goals'", "'posts'") for line in OWN_CLASSES[-6:]]
+    written(site, *second, name="own_second")
+    for module in ("own_form", "own_second"):
+        about = site / f"{module}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
+        (about / "entry_points.txt").write_text(f"[foosim.world]\n{module} = {module}\n")
+    registry._entry_points.cache_clear()
+    assert deployment_schema() == before, "the one that is kept has foosim's own"
+    schema = deployment_schema(installed=True)
+    assert before["$defs"]["Table"] == schema["$defs"]["Table"] and before["$defs"]["Goal"] == schema["$defs"]["Goal"]
+    sensors = {"goals": {"kind": "goals", "rate": "100 Hz", "goal": {"nets": 1}}}
+    sensors |= {"posts": {"kind": "posts", "rate": "100 Hz", "goal": {"posts": 1}}}
+    for valid in (schema, json.loads(deployment_schema_text(installed=True))):
+        validator = Draft202012Validator(valid)
+        data = yaml.safe_load(TEXT)
+        data["robots"]["camera"]["sensors"] |= deepcopy(sensors)
+        data["zoo"] = {"wheel": {"spokes": 12}}
+        assert [error.message for error in validator.iter_errors(data)] == []
+        data["zoo"] = {"wheel": {"spokes": "many"}}
+        assert not validator.is_valid(data)
+        data["zoo"] = {"wheel": {"spokes": 12}}
+        data["robots"]["camera"]["sensors"]["posts"]["goal"] = {"nets": 1}
+        assert not validator.is_valid(data)

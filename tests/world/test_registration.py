@@ -1,0 +1,240 @@
+"""What a form says of itself is checked when it registers itself: refused with its name, its module and its place."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.common.errors import Refused
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.forms import registry
+from foosim.world.forms.registry import find, find_model
+from foosim.world.layout import build_layout
+from tests.own_forms import folder_on_path, problems, written
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = TABLE.read_text()
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path."""
+    return folder_on_path(tmp_path, monkeypatch)
+
+
+NAME: Final = "a name is a lower case letter, then lower case letters, digits, - and _, at most 32 in all"
+REFUSED: Final = {
+    'sensor("own", ActuatorSettings, Number)': "its settings are a class derived from SensorSettings, not "
+    "ActuatorSettings",
+    'actuator("own", SensorSettings, Number)': "its settings are a class derived from ActuatorSettings, not "
+    "SensorSettings",
+    'modifier("own", dict)': "its settings are a class derived from ModifierSettings, not dict",
+    'rule("own", EntityRuleSettings)': "its settings are a class derived from RuleSettings, not EntityRuleSettings",
+    'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
+    'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
+    'model("own", SpecBase)': "its settings are a class derived from RobotSettings, not SpecBase",
+    'kit("own", Own)': "its settings are a class derived from SpecBase, not Own",
+    'sensor("own", Settings, dict)': "its reading is a class derived from msgspec.Struct, not dict",
+    'actuator("own", ActuatorSettings, 3)': "its command is a class derived from msgspec.Struct, not 3",
+    'sensor("own", Settings, Nothing)': "its reading Nothing has no fields",
+    'sensor("own", Settings, Number, needs="contacts")': "needs is a tuple of names, not 'contacts': a tuple of one is "
+    "('contacts',)",
+    'sensor("own", Settings, Number, needs=(3,))': "needs is a tuple of names, not a list of 1",
+    'sensor("own", Settings, Number, kit=3)': "kit is the name of a kit, not 3",
+    'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
+    'sensor("own", Settings, Number, speaks=("contacts",))': "speaks is a name, not a list of 1",
+    'sensor("own", Settings, Number, slots=("kept",))': "slots: they are a mapping of names to counts of numbers, not "
+    "a list of 1",
+    'sensor("own", Settings, Number, slots={"a.b": 1})': f"slots: 'a.b': {NAME}",
+    'sensor("own", Settings, Number, slots={"kept": 0})': "slots: kept has 1 to 65536 numbers, or ENTITY, not 0",
+    'sensor("own", Settings, Number, slots={"kept": 1.0})': "slots: kept has 1 to 65536 numbers, or ENTITY, not 1.0",
+    'sensor("own", Settings, Number, slots={"kept": True})': "slots: kept has 1 to 65536 numbers, or ENTITY, not true",
+    'sensor("own", Settings, Number, slots={"a": 65536, "b": 1})': "slots: 65537 numbers in all, at most 65536 are "
+    "valid",
+    'modifier("own", ModifierSettings, per_field={"std": 0.0})': "per_field names no setting, 'std' (there are: kind)",
+    'modifier("own", ModifierSettings, per_field={"kind": "0"})': "the least value of the setting kind is a number or "
+    "None, not '0'",
+    'modifier("own", ModifierSettings, per_field=("std",))': "per_field is a mapping of settings to least values, not "
+    "a list of 1",
+    'rule("own", RuleSettings, slots=lambda settings, on: {})': "slots: they are a mapping",
+    'rule("own", RuleSettings, writes="ball")': "writes is a tuple of names, not 'ball': a tuple of one is ('ball',)",
+    'rule("own", RuleSettings, each=("rod",))': "each is a mapping of models to slots, not a list of 1",
+    'rule("own", RuleSettings, each={"rod": 1})': "each rod: they are a mapping of names to counts of numbers, not 1",
+    'entity_rule("own", EntityRuleSettings, needs=["charge"])': "needs is a tuple of names, not a list of 1",
+    'motion("own", writes="position")': "writes is a tuple of names, not 'position'",
+    'model("own", RobotSettings, slots={"down": 2})': "down, which foosim writes, is one number, not 2",
+    'model("own", RobotSettings, tags="vehicle")': "tags is a tuple of names, not 'vehicle'",
+    'model("own", RobotSettings, motion=None)': "motion is the name of a motion, not null",
+    'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators, drive: settings are a mapping with "
+    "a kind, not 'wheel_speeds'",
+    'kit("own", SpecBase, entities=("ball",))': "entities are a mapping of names to models, not a list of 1",
+    'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
+    'kit("own", SpecBase, addable="ball")': "addable is a tuple of names, not 'ball'",
+    'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
+}
+"""Registrations, and what is said of each."""
+
+
+@pytest.mark.parametrize("registration", REFUSED)
+def test_a_registration_that_cannot_be_is_refused_with_name_module_and_place(site: Path, registration: str) -> None:
+    path = written(site, f"{registration}(Own)")
+    form = registration.partition("(")[0]
+    line = len(path.read_text().splitlines())
+    with pytest.raises(Refused) as error:
+        find(form, "own_form:Own")
+    told = str(error.value)
+    word = {"rule": "rule of worlds", "entity_rule": "rule of entities"}.get(form, form)
+    assert told.startswith(f"cannot be imported: Refused: {word} own of own_form: {REFUSED[registration]}"), told
+    assert told.endswith(f" (own_form.py:{line})")
+    assert registry.lookup(form, "own") is None
+
+
+# --- slots that follow from settings ---------------------------------------------------------------------------------
+
+PLACE: Final = "robots.red.goal.sensors.own"
+SLOTS: Final = {
+    "lambda settings, on: {'kept': settings.count}": "",
+    "lambda settings, on: [settings.count]": "its slots are wrong: they are a mapping of names to counts of numbers, "
+    "not a list of 1, 'own'",
+    "lambda settings, on: {'kept': 100_000}": "its slots are wrong: kept has 1 to 65536 numbers, or ENTITY, not "
+    "100000, 'own'",
+    "lambda settings, on: {'samples': 1}": "its slots are wrong: each sensor has a slot samples already, 'own'",
+    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero, "
+    "'own'",
+    "lambda settings: {}": "its slots are not known: TypeError: <lambda>() takes 1 positional argument but 2 were "
+    "given, 'own'",
+    "refuse": "more than can be kept, '3 s'",
+}
+
+
+@pytest.mark.parametrize("slots", SLOTS)
+def test_slots_that_do_not_follow_from_settings_are_a_problem_of_the_component(site: Path, slots: str) -> None:
+    refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
+    written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)")
+    assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}") == (
+        [f"{PLACE}: {SLOTS[slots]}"] if SLOTS[slots] else []
+    )
+
+
+@pytest.mark.parametrize("slots", [slots for slots in SLOTS if "samples" not in slots])
+def test_slots_of_modifiers_are_a_problem_of_the_modifier(site: Path, slots: str) -> None:
+    refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
+    written(site, *refuse, f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)")
+    place = "robots.red.goal.sensors.encoder.modifiers"
+    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {SLOTS[slots]}"] if SLOTS[slots] else [])
+
+
+def test_a_sensor_whose_slots_follow_from_its_settings_has_them(site: Path) -> None:
+    written(site, "sensor('own', Settings, Number, slots=lambda settings, on: {'kept': settings.count})(Own)")
+    text = apply_sets(TEXT, "t.yaml", [f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}"])
+    assert build_layout(load_deployment(text, "t.yaml"))["red.goal"].counts["own.kept"] == 7
+
+
+def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
+    written(
+        site, "Own.check = staticmethod(lambda settings, numbers: 1 // 0)", "modifier('own', ModifierSettings)(Own)"
+    )
+    (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
+    assert problem.endswith("modifiers[0]: its check failed: ZeroDivisionError: integer division or modulo by zero, "
+                            "'own_form:Own'")  # fmt: skip
+
+
+@pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),
+                                             ("multiple_of=3", "not a multiple of 3, 4")])  # fmt: skip
+def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, said: str) -> None:
+    own = ("class Bounded(SensorSettings):", f"    count: Annotated[int, Field({bound})]", "")
+    written(site, *own, "sensor('own', Bounded, Number)(Own)")
+    count = said.rpartition(" ")[2]
+    assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: {count}}}") == [f"{PLACE}.count: {said}"]
+
+
+# --- models ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("about", "fields"),
+    [
+        ("", ["down", "refused"]),
+        ("slots={'x': 1}", ["x", "down", "refused"]),
+        ("slots={'refused': 1, 'x': 2}", ["refused", "x", "down"]),
+        ("slots={'x': 1}, motion='two_wheels'", ["x", "down", "refused", "quarantined"]),
+        ("slots={'x': 1}, is_rigid=True, is_robot=False", ["x", "quarantined"]),
+        ("slots={'x': 1}, is_robot=False", ["x"]),
+    ],
+)
+def test_a_model_has_the_fields_that_foosim_needs(site: Path, about: str, fields: list[str]) -> None:
+    written(site, f"model('own', RobotSettings, {about})(Own)")
+    assert [*find_model("own_form:Own").slots] == fields
+
+
+def test_foosims_own_models_keep_the_places_of_their_fields() -> None:
+    """Digests of layouts, and captures, have them."""
+    assert [*find_model("rod").slots] == [
+        *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused")
+    ]
+    assert [*find_model("station").slots] == [*find_model("camera").slots] == ["down", "refused"]
+
+
+# --- modules that cannot be imported ---------------------------------------------------------------------------------
+
+
+def test_what_a_broken_module_has_imported_before_stays_registered(site: Path) -> None:
+    """It stays imported, so that nothing would register it again."""
+    code = """
+import json
+from foosim.common.errors import Refused
+from foosim.world.forms.registry import find
+for kind in ("own_broken:Own", "own_broken:Own"):
+    try:
+        find("sensor", kind)
+    except Refused as error:
+        told = str(error)
+print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module, told]))
+"""
+    written(site, "sensor('own', Settings, Number)(Own)")
+    broken = ("import foosim.world.sensors.encoder", "import own_form", "class Other(Own): pass",
+              "sensor('other', Settings, Number)(Other)", "raise RuntimeError('at import')")  # fmt: skip
+    written(site, *broken, name="own_broken")
+    encoder, own, told = fresh(code, site)
+    assert (encoder, own) == ("foosim.world.sensors.encoder", "own_form")
+    assert told.startswith("cannot be imported: RuntimeError: at import (own_broken.py:")
+
+
+def fresh(code: str, folder: Path) -> Any:
+    """Return what a new process, with a folder on its path, prints as JSON."""
+    import os
+    import subprocess
+
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) -> None:
+    """A model, kit or engine that is unknown may be in it."""
+    written(site, "raise RuntimeError('at import')")
+    about = site / "worn-0.3.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: worn\nVersion: 0.3\n")
+    (about / "entry_points.txt").write_text("[foosim.world]\nform = own_form\n")
+    registry._entry_points.cache_clear()
+    line = len((site / "own_form.py").read_text().splitlines())
+    why = f"own_form of worn 0.3 cannot be imported: RuntimeError: at import (own_form.py:{line})"
+    assert problems("robots.camera.model=zeppelin") == [
+        f"robots.camera.model: unknown model; {why} (there are: camera, rod, rover, station, or any module:Class), "
+        "'zeppelin'"
+    ]
+    assert problems("zoo={fence: 1 m}") == [f"unknown key; {why}, 'zoo'"]
+    assert problems("capture.zoo=3") == ["capture: unknown key, 'zoo'"]
+    assert problems("robots.red.goal.rules={own: {kind: laps}}") == [
+        f"robots.red.goal.rules.own.kind: unknown rule of entities; {why} (there are: battery, or any module:Class), "
+        "'laps'"
+    ]
+    assert problems("rules={own: {kind: laps}}") == [
+        f"rules.own.kind: unknown rule of worlds; {why} (there are: football, or any module:Class), 'laps'"
+    ]

@@ -1,0 +1,60 @@
+"""Why a module with forms could not be imported, on one line: the error, and the place in the user's own files."""
+
+from __future__ import annotations
+
+import sys
+import sysconfig
+import traceback
+from contextlib import suppress
+from types import FrameType
+from typing import Final
+
+OURS: Final = "foosim"
+TEXT_LENGTH_MAX: Final = 500
+"""A longer text of an error is cut."""
+
+
+def failure_of(error: BaseException, module: str) -> str:
+    """Return `RuntimeError: at import (raises.py:3)` for the error that importing a module has raised.
+
+    The place is in the innermost frame of that module's package, or of others that are in no library.
+    """
+    kind, text = type(error).__name__, "its text cannot be made"
+    with suppress(Exception):  # the user's own code, too
+        said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
+        text = " ".join(said.split())
+    text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
+    return (f"{kind}: {text}" if text else kind) + _place_of(error, module)
+
+
+def _place_of(error: BaseException, module: str) -> str:
+    if isinstance(error, SyntaxError) and error.filename:
+        return f" ({_shown(error.filename)}:{error.lineno})"
+    own = [at for at in traceback.walk_tb(error.__traceback__) if _is_own(at[0], module)]
+    if own:
+        frame, line = own[-1]
+        return f" ({_shown(frame.f_code.co_filename)}:{line})"
+    top = module.partition(".")[0]
+    is_missing = isinstance(error, ModuleNotFoundError) and error.name == top
+    return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
+
+
+def _is_own(frame: FrameType, module: str) -> bool:
+    """Whether a frame is in the package of a module, or in no library and not in foosim."""
+    package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    if package == OURS:
+        return False
+    file = frame.f_code.co_filename
+    return package == module.partition(".")[0] or not (file.startswith("<") or _in_library(file))
+
+
+def _in_library(file: str) -> bool:
+    """Whether a file is one of Python's own modules or of an installed package."""
+    paths = sysconfig.get_paths()
+    return file.startswith(tuple(f"{paths[key]}/" for key in ("stdlib", "platstdlib", "purelib", "platlib")))
+
+
+def _shown(file: str) -> str:
+    """Return a file as it is called in its folder of the path."""
+    folders = [f"{folder}/" for folder in sys.path if folder and file.startswith(f"{folder}/")]
+    return file.removeprefix(max(folders, key=len, default=""))
