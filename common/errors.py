@@ -6,7 +6,6 @@ choices, so that it can be shown to a person as it is. Each part of the project 
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from traceback import walk_tb
 from typing import ClassVar, Final, TypeVar
 
 from foosim.common.names import nearest_name
@@ -98,27 +97,3 @@ class UnknownName(BadValue):
         shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
         shown = f"{shown or 'none'}, or {also}" if also else shown
         super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))
-
-
-# --- errors of other people's code -----------------------------------------------------------------------------------
-
-
-def place_of(error: BaseException) -> str:
-    """Return file and line, `laps.py:12`, of the deepest call of the first package that is not foosim's.
-
-    What that one calls, numpy for one, is not it. Empty where all is foosim's.
-    """
-    frames = [(frame.f_globals.get("__name__", ""), frame, line) for frame, line in walk_tb(error.__traceback__)]
-    packages = [str(name).partition(".")[0] for name, _, _ in frames]
-    foreign = [package for package in packages if package not in ("foosim", "importlib")]
-    if not foreign:
-        return ""
-    (_, frame, line) = [entry for package, entry in zip(packages, frames, strict=True) if package == foreign[0]][-1]
-    return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
-
-
-def told(error: BaseException) -> str:
-    """Return an error in words: its type, what it says, and where it arose."""
-    place = place_of(error)
-    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return f"{said} ({place})" if place else said

@@ -20,8 +20,9 @@ from foosim.common.plain_data import PlainData
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
-from foosim.world.assembly.sections import FormFailed, naming_failures
+from foosim.world.assembly.used_forms import OWN
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
 from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.layout import WORLD
@@ -92,10 +93,11 @@ def _kits(view: View) -> Iterator[Finding]:
     for key, kit in kits.items():
         check = getattr(kit.made, "check", None)
         try:
-            with naming_failures((key,), "kit", key, kit.module):
-                yield from [*check(view)] if check is not None else []
-        except FormFailed as failed:
-            yield failed.finding
+            yield from [*check(view)] if check is not None else []
+        except Exception as error:
+            if kit.module.startswith(OWN):
+                raise
+            yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", key, at="key")
         for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
             yield Finding((key,), f"kit {key}: {problem}", key, at="key")
     for label in view.mapping("rules"):

@@ -42,14 +42,26 @@ class Settings(SensorSettings):
 
 
 class Own:
-    def __init__(self, settings, at):
-        self.settings = settings
+    def __init__(self, *made_with):
+        pass
 
     def sample(self, view):
         return Number(0.0)
 
-    def apply(self, values, view):
+    def apply(self, values, view=None):
         return values
+
+    def body(self):
+        return None
+
+    def place(self, view):
+        pass
+
+    def is_plausible(self, numbers, before):
+        return True
+
+    def move(self, entities, motors, view):
+        pass
 
 
 """

@@ -112,7 +112,7 @@ def test_the_guide_says_how_each_is_used() -> None:
     ]
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", ["laps.py", "omni.py"])
 def test_an_example_is_the_same_world_on_any_number_of_nodes(tmp_path: Path, name: str) -> None:
     """In an empty folder, on one, two and three nodes, in processes of their own."""
     deployment, sets = planted(tmp_path, name)
@@ -125,7 +125,7 @@ def test_an_example_is_the_same_world_on_any_number_of_nodes(tmp_path: Path, nam
     assert ("laps" in results[0]) == (name == "laps.py")
 
 
-@pytest.mark.parametrize("name", USES)
+@pytest.mark.parametrize("name", RUNS)
 def test_the_check_of_components_finds_nothing_in_an_example(tmp_path: Path, name: str) -> None:
     deployment, sets = planted(tmp_path, name)
     form, ticks = USES[name].form, str(TICKS[USES[name].deployment])

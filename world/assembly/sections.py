@@ -3,54 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
-from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.world.forms import registry
-from foosim.world.forms.importing import failure_of
-from foosim.world.layout import doubled_slots
 from foosim.world.physics import Physics
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
 FELT_BY_NOBODY: Final = ""
 """The surface of scenery that no rigid body feels."""
-OWN: Final = "foosim."
-
-
-class FormFailed(Exception):
-    """The code of a kit or scene of another package has raised; `finding` says which, why and where."""
-
-    def __init__(self, finding: Finding) -> None:
-        super().__init__(finding.what)
-        self.finding = finding
-
-
-@contextmanager
-def naming_failures(location: Location, form: str, name: str, module: str) -> Iterator[None]:
-    """Raise FormFailed for what the code of a kit or scene raises that is in a module of another package."""
-    try:
-        yield
-    except (Refused, FormFailed):
-        raise
-    except Exception as error:
-        if module.startswith(OWN):
-            raise
-        what = f"{form} {name} failed: {failure_of(error, module)}"
-        raise FormFailed(Finding(location, what, name)) from error
 
 
 def kits_of(spec: WorldSpec) -> Iterator[tuple[str, object]]:
     """Yield the kits of a world, made from their sections, by name in name order."""
     for name, section in sorted(spec.kits.items()):
-        kit = registry.find("kit", name)
-        with naming_failures((name,), "kit", name, kit.module):
-            made = kit.made(section, spec)
-        yield name, made
+        yield name, registry.find("kit", name).made(section, spec)
 
 
 def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
@@ -69,22 +39,11 @@ def physics_of(spec: WorldSpec) -> Physics:
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong with the world as a whole: slots that are two, who says what rigid bodies feel, and places.
+    """Yield what is wrong with the world as a whole: who says what rigid bodies feel, and places.
 
     Meshes count once their files are there.
     """
-    yield from doubled_slots(spec)
-    try:
-        yield from _findings_of(spec)
-    except FormFailed as failed:
-        yield failed.finding
-
-
-def _findings_of(spec: WorldSpec) -> Iterator[Finding]:
-    felt = []
-    for name, kit in kits_of(spec):
-        with naming_failures((name,), "kit", name, type(kit).__module__):
-            felt += [name] if kit.physics() is not None else []  # type: ignore[attr-defined]
+    felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]  # type: ignore[attr-defined]
     for name in felt[1:]:
         yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
     for name, robot in spec.robots.items():
@@ -92,22 +51,17 @@ def _findings_of(spec: WorldSpec) -> Iterator[Finding]:
             yield Finding(("robots", name, "model"), "a rigid body, in a world without a kit for such", robot.model)
     if len(felt) == 1:
         yield from _unfelt(spec)
-    for name, kit in kits_of(spec):
-        with naming_failures((name,), "kit", name, type(kit).__module__):
-            found = [*kit.findings()]  # type: ignore[attr-defined]
-        yield from found
+    for _, kit in kits_of(spec):
+        yield from kit.findings()  # type: ignore[attr-defined]
 
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the surfaces of scenery that the kit with what rigid bodies feel does not have."""
     made: list[tuple[Location, str, list[str]]] = []
     for name, kit in kits_of(spec):
-        with naming_failures((name,), "kit", name, type(kit).__module__):
-            made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()]))  # type: ignore[attr-defined]
+        made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()]))  # type: ignore[attr-defined]
     if spec.scene is not None:
-        scene = registry.find("scene", spec.scene.kind)
-        with naming_failures(("scene", "kind"), "scene", scene.name, scene.module):
-            surfaces = [shape.surface for shape in scene.made(spec.scene)]
+        surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces))
     known = physics_of(spec).surfaces
     for location, what, surfaces in made:

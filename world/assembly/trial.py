@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from foosim.common.errors import ABSENT, told
+from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
 from foosim.common.json_text import encode_json
 from foosim.world.assembly.world import NO_TEXT, World, initial_numbers, model_of, rules_of, world_status, world_texts
@@ -20,6 +20,7 @@ from foosim.world.components.fitted import FittedActuator, FittedSensor, actuato
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, WritableView
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Kit, Model
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, build_layout
@@ -40,7 +41,7 @@ def trial_findings(spec: WorldSpec) -> Iterator[Finding]:
     try:
         trial = _Trial(spec)
     except Exception as error:  # noqa: BLE001  # of what other people's forms declare
-        yield Finding((), f"the layout fails: {told(error)}", ABSENT)
+        yield Finding((), f"the layout fails: {failure_of(error)}", ABSENT)
         return
     for step in (trial.try_sections, trial.try_models, trial.try_rules, trial.try_components, trial.try_tick):
         step()
@@ -65,7 +66,7 @@ class _Trial:
         except _Unmet as error:
             said = f"{what}: {error}"
         except Exception as error:  # noqa: BLE001  # other people's code may raise anything
-            said = f"{what} fails: {told(error)}"
+            said = f"{what} fails: {failure_of(error)}"
         self.found.append(
             Finding(location, said, location[-1] if location else ABSENT, at="key" if location else "value")
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from foosim.common.errors import told
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.sections import fixed_shapes, kits_of
 from foosim.world.components.entities import (
@@ -23,6 +22,7 @@ from foosim.world.components.entities import (
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import ComponentError, Mounting, SolvingView, View, WritableView
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_motion, find_rule, world_rules
@@ -126,7 +126,7 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
             try:
                 status |= one.status(seen)
             except Exception as error:  # noqa: BLE001  # a run goes on without it
-                status |= {"failed": f"status of {what}: {told(error)}"}
+                status |= {"failed": f"status of {what}: {failure_of(error)}"}
     return status
 
 
@@ -140,7 +140,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
             try:
                 found.append(one.text(status))
             except Exception as error:  # noqa: BLE001  # without its part of the status, for one
-                found.append(f"{NO_TEXT} {one.__qualname__}: {told(error)}")
+                found.append(f"{NO_TEXT} {one.__qualname__}: {failure_of(error)}")
     return [text for text in found if text]
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
-from foosim.common.errors import told
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import Entity, Layout
 from foosim.world.spec import WorldSpec
@@ -26,7 +26,7 @@ class ComponentError(Exception):
     """A component has raised: whichever node computes its tick, it would raise again. `cause` has its traceback."""
 
     def __init__(self, what: str, tick: int, cause: Exception) -> None:
-        super().__init__(f"{what} failed at tick {tick}: {told(cause)}")
+        super().__init__(f"{what} failed at tick {tick}: {failure_of(cause)}")
         self.cause = cause
 
 

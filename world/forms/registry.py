@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from foosim.common.errors import Refused, UnknownName
 from foosim.common.names import CLASS_PATTERN
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     NO_SETTINGS,
     NO_SLOTS,
@@ -36,7 +37,6 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.importing import failure_of
 from foosim.world.forms.registration import check_form
 from foosim.world.forms.settings import ComponentSettings
 

@@ -1,11 +1,10 @@
-"""Why a module with forms could not be imported, on one line: the error, and the place in the user's own files."""
+"""Errors of other people's code on one line: what was raised, and the place in their own files."""
 
 from __future__ import annotations
 
 import sys
-import sysconfig
-import traceback
 from contextlib import suppress
+from traceback import walk_tb
 from types import FrameType
 from typing import Final
 
@@ -14,10 +13,11 @@ TEXT_LENGTH_MAX: Final = 500
 """A longer text of an error is cut."""
 
 
-def failure_of(error: BaseException, module: str) -> str:
-    """Return `RuntimeError: at import (raises.py:3)` for the error that importing a module has raised.
+def failure_of(error: BaseException, module: str = "") -> str:
+    """Return `RuntimeError: at import (raises.py:3)` for an error that importing or calling a module has raised.
 
-    The place is in the innermost frame of that module's package, or of others that are in no library.
+    The place is in the innermost frame of that module's package, or of others that are in no library. Without a module
+    it is that of the first call that is not foosim's.
     """
     kind, text = type(error).__name__, "its text cannot be made"
     with suppress(Exception):  # the user's own code, too
@@ -30,7 +30,9 @@ def failure_of(error: BaseException, module: str) -> str:
 def _place_of(error: BaseException, module: str) -> str:
     if isinstance(error, SyntaxError) and error.filename:
         return f" ({_shown(error.filename)}:{error.lineno})"
-    own = [at for at in traceback.walk_tb(error.__traceback__) if _is_own(at[0], module)]
+    frames = [*walk_tb(error.__traceback__)]
+    module = module or next((package for frame, _ in frames if (package := _package(frame)) != OURS), "")
+    own = [at for at in frames if _is_own(at[0], module)]
     if own:
         frame, line = own[-1]
         return f" ({_shown(frame.f_code.co_filename)}:{line})"
@@ -39,9 +41,13 @@ def _place_of(error: BaseException, module: str) -> str:
     return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
 
 
+def _package(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0]
+
+
 def _is_own(frame: FrameType, module: str) -> bool:
     """Whether a frame is in the package of a module, or in no library and not in foosim."""
-    package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    package = _package(frame)
     if package == OURS:
         return False
     file = frame.f_code.co_filename
@@ -50,6 +56,8 @@ def _is_own(frame: FrameType, module: str) -> bool:
 
 def _in_library(file: str) -> bool:
     """Whether a file is one of Python's own modules or of an installed package."""
+    import sysconfig  # takes longer than all else here, and few processes ask
+
     paths = sysconfig.get_paths()
     return file.startswith(tuple(f"{paths[key]}/" for key in ("stdlib", "platstdlib", "purelib", "platlib")))
 
