@@ -178,7 +178,7 @@ class NodeCore:
         self.work = None
         if work.islands:
             self._solved_ticks += 1
-        quarantined = self.stepper(work.layout).quarantined
+        quarantined = self._term.stepper.quarantined
         while quarantined:
             self.actions.append(Log("warning", quarantined.pop(0)))
         for place, number in self._remembered.items():

@@ -16,10 +16,12 @@ from foosim.world.spec import WorldSpec
 
 def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, list[float]]:
     """Return layout and numbers of the edited frame; the order's edits apply in their order."""
+    if not edits:
+        return frame.layout, frame.numbers.copy()
     layout, gone = layout_after(frame.layout, edits), removed(frame.layout, edits)
     numbers = frame.numbers.copy() if layout is frame.layout and not gone else _moved(frame, layout, gone)
     view = WritableView(frame.tick, numbers)
-    for change in fitting_edits(frame.layout, edits) if edits else ():
+    for change in fitting_edits(frame.layout, edits):
         if isinstance(change, Add) and change.name in layout:
             model_of(spec, layout, layout[change.name]).place_at(view, change.position, change.velocity)  # type: ignore[attr-defined]
         elif isinstance(change, Push) and change.name in layout:

@@ -106,7 +106,8 @@ class Stepper:
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
-        world = self.world if layout.digest == self.layout.digest else World(self.deployment, layout)
+        is_same = layout is self.layout or layout.digest == self.layout.digest
+        world = self.world if is_same else World(self.deployment, layout)
         world.apply_rules(numbers, frame.tick)
         return layout, numbers
 
@@ -122,6 +123,8 @@ class Stepper:
 
         `start` is a copy of the numbers as they are before; None: it is made here.
         """
+        if not packets and not self._waiting:
+            return {}
         outboxes: dict[int, list[OutboxPacket]] = {}
         view = WritableView(tick, numbers, numbers.copy() if start is None else start)
         for entity, one in self._waiting:

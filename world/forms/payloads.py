@@ -108,7 +108,8 @@ class PayloadCodec:
 
     def encode_numbers(self, numbers: Sequence[float]) -> bytes:
         """Return the payload of a value's numbers; raises BadValue for one that is not finite."""
-        payload = struct.pack(f"<{len(numbers)}d", *numbers)
+        is_whole = not self._many and len(numbers) == len(self.fields)
+        payload = self._packed.pack(*numbers) if is_whole else struct.pack(f"<{len(numbers)}d", *numbers)
         if not all(map(isfinite, numbers)):
             raise BadValue(f"{self.name} with numbers that are not finite", list(numbers))
         return payload

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from foosim.world.components.view import ModifierMounting, View
@@ -36,6 +37,7 @@ class GaussianNoise:
 
         self.std = at.per_field(settings.std, 0.0)
         self.low, self.high = at.low, at.high
+        self._is_bounded = any(map(isfinite, (*at.low, *at.high)))
         self.key = at.key
         self._stream, self._ahead = NoiseKey(at.key), NoiseAhead(at.key, at.numbers.size, at.period_ticks)
 
@@ -43,6 +45,8 @@ class GaussianNoise:
         """Return the values with noise."""
         count = view.count
         noise = self._stream.normal(view.tick, len(values), count) if count else self._ahead.normal(view.tick)
+        if not self._is_bounded:
+            return [value + std * one for value, std, one in zip(values, self.std, noise, strict=True)]
         return [
             value if not low < value < high else min(max(value + std * one, low), high)
             for value, std, one, low, high in zip(values, self.std, noise, self.low, self.high, strict=True)
