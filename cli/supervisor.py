@@ -327,7 +327,7 @@ def _show(answer: Answer, json: bool) -> None:
 
 
 @app.command()
-@with_options("file")
+@with_options("file", "sets")
 def validate(
     options: RunOptions,
     expanded: Annotated[
@@ -335,7 +335,7 @@ def validate(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Check a deployment file.
+    """Check a deployment file, with settings if there are any.
 
     Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
     classes of the players on this machine are imported, in a separate process.

@@ -146,6 +146,7 @@ def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
     for tick in range(FINGERPRINT_TICKS):
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)
+    stepper.quarantined.clear()  # of a run that is none
     content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
     meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
     return blake2b(np.array(content).tobytes() + b"".join(meshes), digest_size=32).digest()

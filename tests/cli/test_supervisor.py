@@ -56,6 +56,9 @@ def test_the_version_is_that_of_the_package(command: Command) -> None:
 
 
 def test_a_valid_file_is_summed_up(command: Command) -> None:
+    refused = command("validate", TABLE, "--set", "table.ball.mass=20")
+    assert refused.code == 2 and "--set:1:17: table.ball.mass: not a mass" in refused.err
+    assert "seed: 77\n" in command("validate", TABLE, "--set", "seed=77", "--expanded").out
     assert command("validate", TABLE).out == f"{TABLE}: valid, world table, 9 robots on 2 nodes, 2 players\n"
     warehouse = TABLE.with_name("warehouse.yaml")
     written_out = load_deployment(command("validate", warehouse, "--expanded").out, "expanded")

@@ -146,7 +146,7 @@ def test_what_comes_under_the_name_of_what_went_in_one_order_is_new() -> None:
 
 
 def test_a_state_that_cannot_be_is_said_once_with_what_it_is() -> None:
-    """A ball faster than its limit stands in quarantine from then on."""
+    """A ball faster than its limit stands in quarantine from then on; the small run of engines says nothing."""
     lines: list[str] = []
 
     def prepare(system: System) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.components.view import Mounting
 from foosim.world.forms.registry import find_model, names
 from foosim.world.kits.table import BALL
 from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
@@ -175,3 +176,18 @@ def test_a_layout_does_not_know_who_computes_it() -> None:
 def test_only_balls_with_free_names_are_added(wrong: list[tuple[str, str]]) -> None:
     with pytest.raises(Malformed, match=f"{wrong[-1][1]} {wrong[-1][0]} cannot be added"):
         build_layout(DEPLOYMENT, wrong)
+
+
+def test_a_slot_of_a_rule_is_not_that_of_a_sensor_of_its_name() -> None:
+    """Nor may the sensor write it: what is the solver's is no owner's."""
+    sets = ["robots.red.goal.rules={}", "robots.red.goal.sensors.wear={kind: encoder, rate: 100 Hz}"]
+    deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
+    layout = build_layout(deployment)
+    rod = layout["red.goal"]
+    solvers = {**rod.offsets, "wear.contacts": rod.offsets["contacts"]}
+    both = replace(rod, offsets=solvers, counts={**rod.counts, "wear.contacts": 3})
+    sensor = Mounting(deployment, layout, both, "wear", b"", is_owners=True)
+    rule = Mounting(deployment, layout, both, "wear", b"")
+    assert (sensor.slot("contacts").name, sensor.slot("contacts").is_own) == ("red.goal contacts", False)
+    assert (rule.slot("contacts").name, rule.slot("contacts").is_own) == ("red.goal wear.contacts", True)
+    assert sensor.slot("samples").is_own and "wear.samples" in sensor.slot("samples").name

@@ -149,7 +149,8 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
         component = registry.find_component("sensor", settings.kind)
-        mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "sensor", robot.name, channel))
+        key = draw_key(spec.seed, "sensor", robot.name, channel)
+        mounting = Mounting(spec, layout, robot, channel, key, is_owners=True)
         period, offset = spec.turns(settings)
         sensor = _made(component, settings, mounting)
         least_ns = least_period_ns(spec, component, settings)
@@ -206,7 +207,7 @@ def _modifiers(
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
         key = draw_key(spec.seed, component.form, robot.name, channel, label)
-        own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key)
+        own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, period_ns / 1e9, key)
         made_modifier = _made(registry.find_component("modifier", its.kind), its, at)
         yield FittedModifier(f"modifier {label} of {robot.name} {channel}", made_modifier)

@@ -163,7 +163,8 @@ def check_write(slot: Slot, values: Sequence[float]) -> None:
 class Mounting:
     """Where a component is: on which entity of which world, under which name, and the key of its draws.
 
-    `writes` are the fields of the entity itself that it may write, beside its own slots.
+    `writes` are the fields of the entity itself that it may write, beside its own slots. `is_owners`: its slots are the
+    owner's, as those of sensors; a rule of one name has the solver's.
     """
 
     spec: WorldSpec
@@ -172,13 +173,16 @@ class Mounting:
     name: str
     key: bytes
     writes: frozenset[str] = frozenset()
+    is_owners: bool = False
 
     def slot(self, field: str) -> Slot:
         """Return a slot of the component itself, else one of its entity, by field."""
-        own = f"{self.name}.{field}"
-        name = own if own in self.robot.offsets else field
-        is_own = name is own or field in self.writes
-        return Slot(self.robot.offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", is_own)
+        offsets, own = self.robot.offsets, f"{self.name}.{field}"
+        is_there = own in offsets and (offsets[own] >= self.robot.split) == self.is_owners
+        name = own if is_there else field
+        return Slot(
+            offsets[name], self.robot.counts[name], f"{self.robot.name} {name}", is_there or field in self.writes
+        )
 
     def of(self, entity: Entity, field: str) -> Slot:
         """Return a field of any entity, to be read: of another one as it was at the start of the tick."""
