@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final, Protocol
+from typing import Final
 
 from foosim.world import materials
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
-from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Walls
+from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Table, Walls
 from foosim.world.scene import Box, Colour, Shape, Vector
 
 GREEN: Final[Colour] = (0.16, 0.45, 0.24, 1.0)
@@ -37,32 +37,8 @@ class FootballTableSettings(SceneSettings):
     ramps: Ramps
 
 
-class Table(Protocol):
-    """What the table's scenery follows from."""
-
-    @property
-    def field(self) -> Playfield:
-        """Between the walls."""
-
-    @property
-    def floor(self) -> Floor:
-        """Its upper face is z = 0."""
-
-    @property
-    def walls(self) -> Walls:
-        """Around the field."""
-
-    @property
-    def goal(self) -> Goal:
-        """Either of them."""
-
-    @property
-    def ramps(self) -> Ramps:
-        """In the corners; without a height or a leg there are none."""
-
-
 @scene("football_table", FootballTableSettings)
-def table_scenery(table: Table) -> tuple[Shape, ...]:
+def table_scenery(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     """Floor, walls, goals and ramps; boxes only, since a concave mesh lets fast balls through."""
     return (_floor(table), *_side_walls(table), *_end_walls(table), *_goals(table), *_ramps(table))
 
@@ -81,14 +57,14 @@ def _mirrored(low: Vector, high: Vector, surface: str, colour: Colour) -> tuple[
     )
 
 
-def _floor(table: Table) -> Shape:
+def _floor(table: Table | FootballTableSettings) -> Shape:
     """Return the floor: it reaches under the walls and the goals' pockets."""
     x = table.field.length / 2 + 2 * table.walls.thickness + table.goal.depth
     y = table.field.width / 2 + table.walls.thickness
     return _box((-x, -y, -table.floor.thickness), (x, y, 0.0), "floor", GREEN)
 
 
-def _side_walls(table: Table) -> tuple[Shape, ...]:
+def _side_walls(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     x = table.field.length / 2 + table.walls.thickness
     inner, outer, top = table.field.width / 2, table.field.width / 2 + table.walls.thickness, table.walls.height
     return (
@@ -97,7 +73,7 @@ def _side_walls(table: Table) -> tuple[Shape, ...]:
     )
 
 
-def _end_walls(table: Table) -> tuple[Shape, ...]:
+def _end_walls(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     """Return the end walls, each in three parts: beside the goal on either side, and above it."""
     inner, top, goal = table.field.length / 2, table.walls.height, table.goal
     outer, y, post = inner + table.walls.thickness, table.field.width / 2, goal.width / 2
@@ -110,7 +86,7 @@ def _end_walls(table: Table) -> tuple[Shape, ...]:
     return tuple(walls)
 
 
-def _goals(table: Table) -> tuple[Shape, ...]:
+def _goals(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     """Return the pockets behind the goals' openings: two sides, a back and a roof each; the floor is the table's."""
     thick, goal = table.walls.thickness, table.goal
     front, post = table.field.length / 2 + thick, goal.width / 2
@@ -123,14 +99,14 @@ def _goals(table: Table) -> tuple[Shape, ...]:
     )
 
 
-def _ramps(table: Table) -> tuple[Shape, ...]:
+def _ramps(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     """Return a tilted box in each corner whose upper face rises from the floor to the corner, within both walls."""
     if table.ramps.height == 0.0 or table.ramps.leg == 0.0:
         return ()
     return tuple(_ramp(table, side_x, side_y) for side_x, side_y in _TO_CORNER)
 
 
-def _ramp(table: Table, side_x: float, side_y: float) -> Shape:
+def _ramp(table: Table | FootballTableSettings, side_x: float, side_y: float) -> Shape:
     """Return one ramp: its local x climbs towards the corner, its local z is the face's normal."""
     height, leg, thick = table.ramps.height, table.ramps.leg, table.floor.thickness
     run = leg * sqrt(0.5)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final, Protocol
+from typing import Final
 
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
 from foosim.world.materials import CONCRETE
-from foosim.world.parameters.hall import HallWalls, Side
+from foosim.world.parameters.hall import Hall, HallWalls, Side
 from foosim.world.scene import Box, Colour, Shape, Vector
 
 GREY: Final[Colour] = (0.62, 0.62, 0.60, 1.0)
@@ -25,24 +25,8 @@ class HallSettings(SceneSettings):
     walls: HallWalls
 
 
-class HallShape(Protocol):
-    """What a hall's scenery follows from."""
-
-    @property
-    def length(self) -> float:
-        """Along x (m)."""
-
-    @property
-    def width(self) -> float:
-        """Along y (m)."""
-
-    @property
-    def walls(self) -> HallWalls:
-        """Their height and thickness."""
-
-
 @scene("hall", HallSettings)
-def hall_scenery(hall: HallShape) -> tuple[Shape, ...]:
+def hall_scenery(hall: HallSettings | Hall) -> tuple[Shape, ...]:
     """A floor, which reaches under the walls, and the four walls around it."""
     x, y, thick, top = hall.length / 2, hall.width / 2, hall.walls.thickness, hall.walls.height
     long, wide = Box((x + thick, thick / 2, top / 2)), Box((thick / 2, y, top / 2))
