@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing, redirect_stdout
+from contextlib import closing, contextmanager, redirect_stdout
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FrameType
 from typing import Annotated, Any, Final
 
 import typer
@@ -212,21 +214,46 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
     label, folder = f"{form.form} {form.name}", file.parent
     text, files = pin_assets(text, str(file), folder)
     check = ComponentCheck(text, str(file), ticks, seed, files, partial(rehearse, folder=folder))
-    if sys.stderr.isatty():
-        check.on_step = _told_of_step
-    is_broken = False
-    try:
-        for line in _all_broken(check, folder):
-            is_broken = True
-            print(f"{label}: {line}", flush=True)
-    except KeyboardInterrupt:
-        _told_of_step(f"{label}: interrupted, {check.now}")
-        raise
+    shows, is_broken = sys.stderr.isatty(), False
+    with _noted_interrupts() as noted:
+
+        def begun(line: str) -> None:
+            if noted:
+                raise KeyboardInterrupt
+            if shows:
+                _told_of_step(line)
+
+        check.on_step = begun
+        try:
+            for line in _all_broken(check, folder):
+                is_broken = True
+                print(f"{label}: {line}", flush=True)
+            if noted:
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            _told_of_step(f"{label}: interrupted, {check.now}")
+            raise
     if not is_broken:
         print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
     if not check.has_failed:
         print(f"{label}: {check.compared} of {check.sensors} sensors measured, and were compared alone and with others")
     return FAILED if is_broken else DONE
+
+
+@contextmanager
+def _noted_interrupts() -> Iterator[list[int]]:
+    """Give the interrupts so far: Python drops one that is raised while an object is destroyed."""
+    noted: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        noted.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _all_broken(check: ComponentCheck, folder: Path) -> Iterator[str]:
