@@ -46,6 +46,7 @@ OTHER_OPTIONS: Final = {
     "--slow-start",
     "--load",
     "--before",
+    "--install",
 }
 """Options that belong to no command of ours, or to all."""
 
