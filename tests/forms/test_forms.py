@@ -11,6 +11,7 @@ from typing import Final
 
 import pytest
 
+from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.component_check import broken_laws
@@ -89,6 +90,7 @@ def problem_of(key: Key, edge: Edge) -> str:
 def test_it_obeys_the_laws_for_long(key: Key, seed: int) -> None:
     text = WORLDS[key].text().replace("seed: 1\n", f"seed: {seed}\n")
     assert list(broken_laws(text, NAME, 2_000, seed)) == []
+    assert list(elsewhere(text, NAME, 2_000)) == []
 
 
 @pytest.mark.campaign

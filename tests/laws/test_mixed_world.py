@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import yaml
 
+from foosim.cli.rehearse import elsewhere
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.component_check import broken_laws
 from foosim.rehearsal.run import rehearse
@@ -70,6 +71,10 @@ def test_every_form_is_in_it() -> None:
 
 def test_nodes_moves_and_new_objects_change_nothing() -> None:
     assert list(broken_laws(mixed(), NAME, TICKS)) == []
+
+
+def test_another_process_computes_the_same() -> None:
+    assert list(elsewhere(mixed(), NAME, TICKS)) == []
 
 
 def test_a_kit_changes_nothing_of_another() -> None:
