@@ -247,6 +247,13 @@ def threads_of(process: int) -> int:
     return len(os.listdir(f"/proc/{process}/task"))
 
 
+def await_threads_at_most(most: int) -> int:
+    """Return this process's threads once they are so few: one that is over is listed until the kernel has ended it."""
+    while (number := threads_of(os.getpid())) > most:
+        os.sched_yield()
+    return number
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
 def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """While it is stopped there is no timer, which is a thread of faulthandler's: so none is over when it goes on."""
@@ -257,15 +264,14 @@ def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.Monke
     def cancel_and_see_it_gone() -> None:
         """The thread ends after it has let go of what `cancel` waits for; a stop in between keeps it."""
         cancel()
-        while threads_of(os.getpid()) > 2:
-            os.sched_yield()
+        await_threads_at_most(2)
 
     def stops() -> None:
-        before = threads_of(os.getpid())
+        before = await_threads_at_most(3)
         monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel_and_see_it_gone)
         signal.raise_signal(signal.SIGTSTP)
         monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel)
-        os.write(told, bytes([before, threads_of(os.getpid())]))
+        os.write(told, bytes([before, await_threads_at_most(3)]))
 
     Hangs.how = stops
     child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None))
