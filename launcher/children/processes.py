@@ -169,10 +169,10 @@ class Launcher:
             earlier.let_go()
         try:
             with log.open("ab") as file:
+                begin = file.tell()  # before the child shares this file, and its place
                 process = subprocess.Popen(
                     line, stdin=subprocess.PIPE, stdout=file, stderr=subprocess.STDOUT, process_group=0
                 )
-                begin = file.tell()
         except FileNotFoundError:
             raise Failed(f"there is no ssh here, which {name} is to be started with on host {remote.name}") from None
         child = self.children[name] = Child(name, tuple(command), log, process, remote, begin)
