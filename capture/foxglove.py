@@ -37,7 +37,7 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
 from foosim.world.mesh import Mesh
-from foosim.world.scene import Box, Scene, Shape, Sphere, Vector
+from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, moved, rotate
 from foosim.world.scene import Quaternion as Turn
 
 WORLD_FRAME: Final = "world"
@@ -122,9 +122,10 @@ def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> Sc
         elif isinstance(geometry, Sphere):
             size = _doubled((geometry.radius, geometry.radius, geometry.radius))
             spheres.append(SpherePrimitive(pose=pose, size=_vector(size), color=colour))
-        elif isinstance(geometry, Mesh):
-            points = [Point3(x=x, y=y, z=z) for x, y, z in geometry.vertices.tolist()]
-            indices = geometry.triangles.ravel().tolist()
+        elif isinstance(geometry, Mesh | Hull):
+            mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
+            points = [Point3(x=x, y=y, z=z) for x, y, z in mesh.vertices.tolist()]
+            indices = mesh.triangles.ravel().tolist()
             triangles.append(TriangleListPrimitive(pose=pose, points=points, indices=indices, color=colour))
         else:
             across = 2.0 * geometry.radius
@@ -132,6 +133,11 @@ def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> Sc
             cylinders.append(
                 CylinderPrimitive(pose=pose, size=_vector(size), bottom_scale=1.0, top_scale=1.0, color=colour)
             )
+            if isinstance(geometry, Capsule):  # Foxglove has no capsule: a cylinder and two spheres look like one
+                for end in (-geometry.length / 2, geometry.length / 2):
+                    middle = moved(shape.position, rotate(shape.orientation, (0.0, 0.0, end)), 1.0)
+                    at_end = Pose(position=_vector(middle), orientation=_quaternion(shape.orientation))
+                    spheres.append(SpherePrimitive(pose=at_end, size=_vector((across, across, across)), color=colour))
     return SceneEntity(
         timestamp=at,
         frame_id=frame,

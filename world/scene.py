@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import cos, sin, sqrt
-from typing import Literal
+from math import cos, inf, sin, sqrt
+from typing import Final, Literal, TypeAlias
 
 from foosim.world.materials import UNKNOWN, RadioMaterial
 from foosim.world.mesh import Mesh
@@ -50,13 +50,31 @@ class Cylinder:
 
 
 @dataclass(frozen=True, slots=True)
+class Capsule:
+    """A capsule, centred, whose axis is the local z: a cylinder of this length with a half sphere at each end."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Hull:
+    """A convex body: the corners and outer triangles of a convex hull, counter-clockwise seen from outside."""
+
+    mesh: Mesh
+
+
+Geometry: TypeAlias = Box | Sphere | Cylinder | Capsule | Hull | Mesh
+
+
+@dataclass(frozen=True, slots=True)
 class Shape:
     """A geometry at a pose in its link (in the world for scenery), its surface (a key of the physics') and colour.
 
     `radio` is what waves lose in it; `name` is that of the scenery it belongs to, empty in a body, which has its own.
     """
 
-    geometry: Box | Sphere | Cylinder | Mesh
+    geometry: Geometry
     surface: str
     colour: Colour
     position: Vector = ORIGIN
@@ -65,31 +83,54 @@ class Shape:
     name: str = ""
 
 
+JointKind: TypeAlias = Literal["free", "prismatic", "revolute", "continuous", "fixed"]
+
+
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A rigid part that hangs on the link before it (the first on the body's base) by one joint.
+    """A rigid part that hangs on its parent by one joint.
 
-    `free` has six degrees of freedom, `prismatic` slides along `axis` within `limits` (m), `revolute` turns about it
-    (rad, without limits), `fixed` does nothing. The link's frame is the joint's; `inertia` is the diagonal about the
-    centre of mass.
+    `parent` is the index of the parent among the body's links, below its own; -1 is the body's base. A `free` joint has
+    six degrees of freedom and is that of the first link only. Of any other, `position` and `orientation` are the pose
+    of the joint in the frame of the parent: `prismatic` slides along `axis` within `limits` (m), `revolute` turns about
+    it within `limits` (rad), `continuous` turns without limits, `fixed` does nothing. The link's frame is the joint's.
+
+    `inertia` is the diagonal about the centre of mass, in the principal axes, whose orientation in the link's frame is
+    `principal`. A motor of the joint has at most the force `effort` (N or N m) and the speed `speed` (m/s or rad/s);
+    `damping` is what its speed is resisted with (N s/m or N m s/rad).
     """
 
     name: str
-    joint: Literal["free", "prismatic", "revolute", "fixed"]
+    joint: JointKind
     shapes: tuple[Shape, ...]
     mass: float
     inertia: Vector
     centre_of_mass: Vector = ORIGIN
     axis: Vector = ORIGIN
     limits: tuple[float, float] = (0.0, 0.0)
+    parent: int = -1
+    position: Vector = ORIGIN
+    orientation: Quaternion = UPRIGHT
+    principal: Quaternion = UPRIGHT
+    effort: float = inf
+    speed: float = inf
+    damping: float = 0.0
+
+
+MOVING: Final = frozenset(("prismatic", "revolute", "continuous"))
+"""The joints that have a position, a speed and a motor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A chain of links on a base that stands at `position`, upright. A free body's position comes from its slots.
+    """A tree of links on a base.
 
-    Radio waves leave from `antenna`, a place in its last link. `speed_limit` (m/s) is how fast a free body can be, a
-    promise of its model.
+    A fixed base has the pose `position` and `orientation`. A free body is one whose first link is free: its slots
+    `position` and `orientation` are the pose of that link's centre of mass, in the link's principal axes. The joints
+    that move have a number each in `joint_positions`, in the order of their links.
+
+    Radio waves leave from `antenna`, a place in the frame of the link `antenna_link` (an index). `speed_limit` (m/s) is
+    how fast any part of a free body can be, a promise of its model.
     """
 
     name: str
@@ -98,11 +139,18 @@ class Body:
     links: tuple[Link, ...]
     antenna: Vector = ORIGIN
     speed_limit: float = 0.0
+    orientation: Quaternion = UPRIGHT
+    antenna_link: int = -1
 
     @property
     def is_free(self) -> bool:
         """Whether its base moves; the base of any other is fixed."""
         return self.links[0].joint == "free"
+
+    @property
+    def joints(self) -> tuple[Link, ...]:
+        """The links whose joints move, in their order."""
+        return tuple([link for link in self.links if link.joint in MOVING])
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +166,11 @@ def inertia_about_axis(link: Link) -> float:
     (axis,) = [number for number in range(3) if link.axis[number] != 0.0]
     along = [link.centre_of_mass[number] for number in range(3) if number != axis]
     return link.inertia[axis] + link.mass * (along[0] * along[0] + along[1] * along[1])
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the cross product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
@@ -165,10 +218,12 @@ def shape_box(shape: Shape) -> tuple[Vector, Vector]:
     else:
         if isinstance(geometry, Cylinder):
             half: Vector = (geometry.radius, geometry.radius, geometry.length / 2)
+        elif isinstance(geometry, Capsule):
+            half = (geometry.radius, geometry.radius, geometry.length / 2 + geometry.radius)
         elif isinstance(geometry, Box):
             half = geometry.half
         else:
-            low, high = geometry.box
+            low, high = geometry.mesh.box if isinstance(geometry, Hull) else geometry.box
             half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2)
             middle = rotate(shape.orientation, moved(low, half, 1.0))
         sides = [
@@ -203,32 +258,53 @@ def enclosing(boxes: Iterable[tuple[Vector, Vector]]) -> tuple[Vector, Vector]:
 def swept_box(body: Body) -> tuple[Vector, Vector]:
     """Return the least and greatest world coordinates that a body's shapes reach over all its joint positions.
 
-    A free body's box stands around its own origin. Joints turn about or slide along a coordinate axis.
+    A free body's box stands around the origin of its first link's frame, whose axes are the world's.
     """
-    swept: tuple[Vector, Vector] | None = None
-    for link in reversed(body.links):
-        boxes = [shape_box(shape) for shape in link.shapes] + ([swept] if swept else [])
+    reached: list[list[tuple[Vector, Vector]]] = [[shape_box(shape) for shape in link.shapes] for link in body.links]
+    of_base: list[tuple[Vector, Vector]] = []
+    for link, boxes in zip(reversed(body.links), reversed(reached), strict=True):
+        if not boxes:
+            continue
         low, high = enclosing(boxes)
         if link.joint == "prismatic":
-            low = moved(low, link.axis, min(link.limits))
-            high = moved(high, link.axis, max(link.limits))
-        elif link.joint == "revolute":
+            low, high = enclosing([_slid(low, high, link.axis, way) for way in link.limits])
+        elif link.joint in MOVING:
             low, high = _revolved(low, high, link.axis)
-        swept = low, high
-    assert swept is not None, f"{body.name} has no links"
-    return moved(swept[0], body.position, 1.0), moved(swept[1], body.position, 1.0)
+        if link.joint != "free":
+            low, high = _turned(low, high, link.orientation)
+            low, high = moved(low, link.position, 1.0), moved(high, link.position, 1.0)
+        (of_base if link.parent < 0 else reached[link.parent]).append((low, high))
+    assert of_base, f"{body.name} has no shapes"
+    low, high = _turned(*enclosing(of_base), body.orientation)
+    return moved(low, body.position, 1.0), moved(high, body.position, 1.0)
 
 
 def moved(point: Vector, direction: Vector, way: float) -> Vector:
     return point[0] + way * direction[0], point[1] + way * direction[1], point[2] + way * direction[2]
 
 
+def _slid(low: Vector, high: Vector, axis: Vector, way: float) -> tuple[Vector, Vector]:
+    return moved(low, axis, way), moved(high, axis, way)
+
+
+def _turned(low: Vector, high: Vector, orientation: Quaternion) -> tuple[Vector, Vector]:
+    """Return the box around a box in a frame that is turned so."""
+    if orientation == UPRIGHT:
+        return low, high
+    half = (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2
+    x, y, z = rotate(orientation, moved(low, half, 1.0))
+    sides = [rotate(orientation, side) for side in ((half[0], 0.0, 0.0), (0.0, half[1], 0.0), (0.0, 0.0, half[2]))]
+    dx, dy, dz = (sum(abs(side[axis]) for side in sides) for axis in range(3))
+    return (x - dx, y - dy, z - dz), (x + dx, y + dy, z + dz)
+
+
 def _revolved(low: Vector, high: Vector, axis: Vector) -> tuple[Vector, Vector]:
-    """Return the box that a box sweeps when it turns fully about a coordinate axis through the origin."""
-    along = [abs(part) == 1.0 for part in axis]
-    assert sum(along) == 1, f"axis {axis} is no coordinate axis"
-    far = [max(abs(low[i]), abs(high[i])) for i in range(3)]
-    radius = sqrt(sum(far[i] * far[i] for i in range(3) if not along[i]))
-    lows = [low[i] if along[i] else -radius for i in range(3)]
-    highs = [high[i] if along[i] else radius for i in range(3)]
+    """Return the box around all that a box sweeps when it turns fully about a unit axis through the origin."""
+    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    along = [x * axis[0] + y * axis[1] + z * axis[2] for x, y, z in corners]
+    squares = [x * x + y * y + z * z - way * way for (x, y, z), way in zip(corners, along, strict=True)]
+    radius, least, most = sqrt(max(0.0, *squares)), min(along), max(along)
+    aside = [radius * sqrt(max(0.0, 1.0 - part * part)) for part in axis]
+    lows = [min(part * least, part * most) - side for part, side in zip(axis, aside, strict=True)]
+    highs = [max(part * least, part * most) + side for part, side in zip(axis, aside, strict=True)]
     return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])

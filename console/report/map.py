@@ -29,7 +29,9 @@ from foosim.world.scene import (
     UPRIGHT,
     Body,
     Box,
+    Capsule,
     Cylinder,
+    Hull,
     Quaternion,
     Shape,
     Sphere,
@@ -319,8 +321,13 @@ def _corners(shape: Shape) -> Iterable[Vector]:
         r = geometry.radius
         rings = [r * sin(pi * n / 8) for n in range(-4, 5)]
         return [(cos(t) * (r * r - z * z) ** 0.5, sin(t) * (r * r - z * z) ** 0.5, z) for t in turns for z in rings]
-    step = -(-len(geometry.vertices) // VERTICES_MAX)
-    return [(x, y, z) for x, y, z in geometry.vertices[::step].tolist()]
+    if isinstance(geometry, Capsule):
+        r, half = geometry.radius, geometry.length / 2
+        caps = [(r * cos(pi * n / 8), half + r * sin(pi * n / 8)) for n in range(5)]
+        return [(wide * cos(t), wide * sin(t), side * z) for wide, z in caps for t in turns for side in (-1.0, 1.0)]
+    vertices = (geometry.mesh if isinstance(geometry, Hull) else geometry).vertices
+    step = -(-len(vertices) // VERTICES_MAX)
+    return [(x, y, z) for x, y, z in vertices[::step].tolist()]
 
 
 def hull(points: Iterable[Place]) -> tuple[Place, ...]:

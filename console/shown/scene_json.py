@@ -16,7 +16,7 @@ from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.layout import Entity, Layout
 from foosim.world.mesh import Mesh
-from foosim.world.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "position": ("m",),
@@ -94,10 +94,13 @@ def _geometry(shape: Shape, meshes: dict[str, Mesh]) -> dict[str, Any]:
         return {"kind": "box", "half": geometry.half}
     if isinstance(geometry, Sphere):
         return {"kind": "sphere", "radius": geometry.radius}
-    if isinstance(geometry, Mesh):
-        key = geometry.digest.hex()[:16]
-        meshes[key] = geometry
+    if isinstance(geometry, Mesh | Hull):
+        mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
+        key = mesh.digest.hex()[:16]
+        meshes[key] = mesh
         return {"kind": "mesh", "mesh": key}
+    if isinstance(geometry, Capsule):
+        return {"kind": "capsule", "radius": geometry.radius, "length": geometry.length}
     return {"kind": "cylinder", "radius": geometry.radius, "length": geometry.length}
 
 

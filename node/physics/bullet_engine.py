@@ -19,7 +19,7 @@ from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
 from foosim.world.mesh import Mesh
-from foosim.world.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
+from foosim.world.scene import UPRIGHT, Body, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector, in_pieces
 
 with without_lines(b"pybullet build time:"):
     import pybullet as p
@@ -38,7 +38,8 @@ PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the scenery: no pair of theirs can touch."""
 REST: Final[Vector] = (0.0, 0.0, 0.0)
 FREE_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_velocity")
-JOINT_TYPES: Final = {"prismatic": p.JOINT_PRISMATIC, "revolute": p.JOINT_REVOLUTE}
+JOINT_TYPES: Final = {"prismatic": p.JOINT_PRISMATIC, "continuous": p.JOINT_REVOLUTE}
+SHAPE_TYPES: Final = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER, Capsule: p.GEOM_CAPSULE}
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
 SPEED_MAX: Final = 1000.0
 """Bullet clamps each coordinate's velocity of a multibody at 100 by default: a sphere of 1 cm rolls at 1 m/s."""
@@ -267,17 +268,18 @@ class BulletEngine:
         """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1."""
         if not shapes:
             return -1
+        if isinstance(shapes[0].geometry, Hull):
+            return self._make_hull(shapes, placed)
         parts: dict[str, list[Any]] = {
             key: [] for key in ("shapeTypes", "halfExtents", "radii", "lengths", "positions", "orientations")
         }
         for shape in shapes:
             geometry = shape.geometry
-            assert not isinstance(geometry, Mesh), "meshes are scenery"
-            kind = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER}[type(geometry)]
-            parts["shapeTypes"].append(kind)
+            assert isinstance(geometry, Box | Sphere | Cylinder | Capsule), geometry
+            parts["shapeTypes"].append(SHAPE_TYPES[type(geometry)])
             parts["halfExtents"].append(geometry.half if isinstance(geometry, Box) else REST)
             parts["radii"].append(0.0 if isinstance(geometry, Box) else geometry.radius)
-            parts["lengths"].append(geometry.length if isinstance(geometry, Cylinder) else 0.0)
+            parts["lengths"].append(geometry.length if isinstance(geometry, Cylinder | Capsule) else 0.0)
             parts["positions"].append(shape.position if placed else REST)
             parts["orientations"].append(shape.orientation if placed else UPRIGHT)
         made: int = p.createCollisionShapeArray(
@@ -290,6 +292,20 @@ class BulletEngine:
             physicsClientId=self._client,
         )
         assert made >= 0, shapes
+        return made
+
+    def _make_hull(self, shapes: Sequence[Shape], placed: bool) -> int:
+        """Make a convex hull: corners without triangles. Bullet has no compound shapes of these."""
+        (shape,) = shapes
+        assert isinstance(shape.geometry, Hull)
+        made: int = p.createCollisionShape(
+            p.GEOM_MESH,
+            vertices=shape.geometry.mesh.vertices.tolist(),
+            collisionFramePosition=shape.position if placed else REST,
+            collisionFrameOrientation=shape.orientation if placed else UPRIGHT,
+            physicsClientId=self._client,
+        )
+        assert made >= 0, shape
         return made
 
     def _make_dynamics(self, body: int, link: int, mass: float, inertia: Vector) -> None:

@@ -171,7 +171,7 @@ class Shaft:
 
 def is_shaft(body: Body) -> bool:
     """Whether a body slides along y and turns about y, in this order."""
-    return [(link.joint, link.axis) for link in body.links] == [("prismatic", ALONG_Y), ("revolute", ALONG_Y)]
+    return [(link.joint, link.axis) for link in body.links] == [("prismatic", ALONG_Y), ("continuous", ALONG_Y)]
 
 
 def rebound(u: float, depth: float, pull: float, restitution: float, dt: float) -> tuple[float, float]:

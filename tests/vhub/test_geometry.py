@@ -146,6 +146,7 @@ def in_bullet(shape: Shape, mask: int, client: int) -> None:
     elif isinstance(geometry, Cylinder):
         form = {"shapeType": p.GEOM_CYLINDER, "radius": geometry.radius, "height": geometry.length}
     else:
+        assert isinstance(geometry, Mesh)
         form |= {"vertices": geometry.vertices.tolist(), "indices": geometry.triangles.ravel().tolist()}
     body = p.createMultiBody(
         baseCollisionShapeIndex=p.createCollisionShape(**form, physicsClientId=client),

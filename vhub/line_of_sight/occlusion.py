@@ -15,7 +15,19 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
-from foosim.vhub.line_of_sight.solids import BOX, CYLINDER, MESH, SPHERE, Line, Piece, Solid, chord_of, joined, ray_of
+from foosim.vhub.line_of_sight.solids import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    MESH,
+    SPHERE,
+    Line,
+    Piece,
+    Solid,
+    chord_of,
+    joined,
+    ray_of,
+)
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
@@ -26,7 +38,9 @@ from foosim.world.scene import (
     ORIGIN,
     Body,
     Box,
+    Capsule,
     Cylinder,
+    Hull,
     Link,
     Quaternion,
     Scene,
@@ -88,7 +102,11 @@ class _Groups:
         if isinstance(geometry, Sphere):
             half = geometry.radius, geometry.radius, geometry.radius
             return Solid(SPHERE, half, None, group, position, orientation)
-        return Solid(MESH, ORIGIN, self._prepared(geometry), group, position, orientation)
+        if isinstance(geometry, Capsule):
+            half = geometry.radius, geometry.radius, geometry.length / 2
+            return Solid(CAPSULE, half, None, group, position, orientation)
+        mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
+        return Solid(MESH, ORIGIN, self._prepared(mesh), group, position, orientation)
 
     def _number(self, shape: Shape, body: str | None) -> int:
         key = shape.name if body is None else body, shape.radio

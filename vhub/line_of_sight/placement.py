@@ -35,7 +35,7 @@ class _Robot:
         """The number of the frame of the pose."""
         self.position: Vector = ORIGIN
         self.orientation: Quaternion = UPRIGHT
-        """The pose of the last link of its body."""
+        """The pose of the link of its body that has the antenna."""
 
 
 class World:
@@ -106,7 +106,8 @@ class World:
             return px + mx, py + my, pz + mz
         if robot.turns != self.turns:
             assert robot.entity is not None
-            _, robot.position, robot.orientation = forward_kinematics(robot.body, robot.entity, self._values())[-1]
+            poses = forward_kinematics(robot.body, robot.entity, self._values())
+            _, robot.position, robot.orientation = poses[robot.body.antenna_link]
             robot.turns = self.turns
         (px, py, pz), (ox, oy, oz) = robot.position, robot.antenna
         x, y, z = rotate(robot.orientation, (ox + mx, oy + my, oz + mz))

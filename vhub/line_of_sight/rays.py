@@ -109,6 +109,18 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
     return (enter, leave) if enter < leave else None
 
 
+def capsule_span(start: Vector, way: Vector, radius: float, half_length: float) -> Span | None:
+    """Return where a line is inside of a capsule, centred, whose axis is z: of a cylinder and the spheres at its ends.
+
+    A capsule is convex, so these spans overlap or touch.
+    """
+    x, y, z = start
+    spans = [cylinder_span(start, way, radius, half_length)]
+    spans += [sphere_span((x, y, z - end), way, radius) for end in (-half_length, half_length)]
+    found = [span for span in spans if span is not None]
+    return (min(enter for enter, _ in found), max(leave for _, leave in found)) if found else None
+
+
 class Pillar:
     """An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from math import sqrt
 from typing import Final
 
-from foosim.vhub.line_of_sight.rays import Span, Triangles, box_span, cylinder_span, sphere_span
+from foosim.vhub.line_of_sight.rays import Span, Triangles, box_span, capsule_span, cylinder_span, sphere_span
 from foosim.world.scene import Quaternion, Vector, multiply, rotate
 
 TOUCH_M: Final = 1e-9
@@ -15,6 +15,7 @@ BOX: Final = 0
 CYLINDER: Final = 1
 SPHERE: Final = 2
 MESH: Final = 3
+CAPSULE: Final = 4
 """Forms of shapes."""
 
 Line = tuple[Vector, Vector]
@@ -76,6 +77,8 @@ class Solid:
             span = box_span(start, way, self._half)
         elif self._form == CYLINDER:
             span = cylinder_span(start, way, self._half[0], self._half[2])
+        elif self._form == CAPSULE:
+            span = capsule_span(start, way, self._half[0], self._half[2])
         else:
             span = sphere_span(start, way, self._half[0])
         if span is None:

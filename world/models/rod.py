@@ -90,7 +90,7 @@ class Rod:
             limits=(-line.half_stroke, line.half_stroke),
         )
         figures = _figures(table, line, TEAM_COLOURS[self._settings.team])
-        spin = Link(f"{name}/spin", "revolute", figures, mass, inertia, (0.0, 0.0, centre), Y_AXIS)
+        spin = Link(f"{name}/spin", "continuous", figures, mass, inertia, (0.0, 0.0, centre), Y_AXIS, parent=0)
         x = line_x_m(self._at.spec, self._settings)
         return Body(name, "rod", (x, 0.0, rod.axis_height), (slide, spin))
 
