@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from foosim.world.layout import Entity
 from foosim.world.scene import (
@@ -69,37 +70,54 @@ def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
 
     A rover's is that of its wheels, which slip where it is kept from where it goes.
     """
+    return twist(body, entity, numbers, body.antenna_link % len(body.links)).linear
+
+
+class Twist(NamedTuple):
+    """How fast a place moves (m/s), and how fast what it is fixed to turns (rad/s): in the world frame."""
+
+    linear: Vector
+    angular: Vector
+
+
+def twist(body: Body, entity: Entity, numbers: Sequence[float], index: int, place: Vector | None = None) -> Twist:
+    """Return how a place (m, world frame) moves that is fixed to the link of this index: by default its origin."""
     poses = forward_kinematics(body, entity, numbers)
     speeds = entity.offsets.get("joint_velocities", 0)
     of_joint: dict[int, float] = {}
-    for index, link in enumerate(body.links):
+    for number, link in enumerate(body.links):
         if link.joint in MOVING:
-            of_joint[index] = numbers[speeds]
+            of_joint[number] = numbers[speeds]
             speeds += 1
-    index = body.antenna_link % len(body.links)
-    place, sliding = poses[index][1], ORIGIN
+    where = poses[index][1] if place is None else place
+    linear, angular = ORIGIN, ORIGIN
     while index >= 0:
         link, (_, position, orientation) = body.links[index], poses[index]
         if link.joint == "free":
-            sliding = moved(sliding, _free_velocity(entity, numbers, orientation, place), 1.0)
+            of_base, spin = _free_twist(entity, numbers, orientation, where)
+            linear, angular = moved(linear, of_base, 1.0), moved(angular, spin, 1.0)
         elif link.joint in MOVING:
             axis, speed = rotate(orientation, link.axis), of_joint[index]
-            way = axis if link.joint == "prismatic" else cross(axis, moved(place, position, -1.0))
-            sliding = moved(sliding, way, speed)
+            if link.joint == "prismatic":
+                linear = moved(linear, axis, speed)
+            else:
+                linear = moved(linear, cross(axis, moved(where, position, -1.0)), speed)
+                angular = moved(angular, axis, speed)
         index = link.parent
-    return sliding
+    return Twist(linear, angular)
 
 
-def _free_velocity(entity: Entity, numbers: Sequence[float], orientation: Quaternion, place: Vector) -> Vector:
-    """Return the velocity of a place that is fixed to a free link."""
+def _free_twist(entity: Entity, numbers: Sequence[float], orientation: Quaternion, place: Vector) -> Twist:
+    """Return how a place moves that is fixed to a free link."""
     offsets = entity.offsets
     if "wheel_speeds" in offsets:
         wheels = offsets["wheel_speeds"]
-        return rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0))
+        return Twist(rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0)), ORIGIN)
     start = offsets["linear_velocity"]
-    sliding = numbers[start], numbers[start + 1], numbers[start + 2]
+    linear = numbers[start], numbers[start + 1], numbers[start + 2]
     if "angular_velocity" not in offsets:
-        return sliding
-    at, spin = offsets["position"], offsets["angular_velocity"]
+        return Twist(linear, ORIGIN)
+    at, turning = offsets["position"], offsets["angular_velocity"]
     arm = place[0] - numbers[at], place[1] - numbers[at + 1], place[2] - numbers[at + 2]
-    return moved(sliding, cross((numbers[spin], numbers[spin + 1], numbers[spin + 2]), arm), 1.0)
+    spin = numbers[turning], numbers[turning + 1], numbers[turning + 2]
+    return Twist(moved(linear, cross(spin, arm), 1.0), spin)

@@ -1,0 +1,48 @@
+"""Where a component is mounted: a pose in the frame of a link of its robot, and how that moves in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.common.errors import BadValue
+from foosim.common.names import nearest_name
+from foosim.world.components.entities import mounting_of
+from foosim.world.components.view import Mounting
+from foosim.world.forms.placing import MountedAt
+from foosim.world.kinematics import Twist, forward_kinematics, twist
+from foosim.world.scene import Body, Quaternion, Vector, moved, multiply, rotate
+
+
+class Mounted:
+    """A place on a robot. What it keeps follows from deployment and layout."""
+
+    def __init__(self, at: Mounting, where: MountedAt) -> None:
+        """Raises BadValue for a link that the robot does not have."""
+        self._entity = at.robot
+        body: Body | None = at.robot.kind.made(
+            at.spec.robots.get(at.robot.name), mounting_of(at.spec, at.layout, at.robot)
+        ).body()
+        assert body is not None, f"{at.robot.name} has no body"
+        self._body = body
+        self.link = link_index(body, where.link)
+        self._position, self._orientation = where.position, where.orientation
+
+    def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
+        """Return the place (m) and the orientation of the mount, in the world frame, from the frame's numbers."""
+        _, position, orientation = forward_kinematics(self._body, self._entity, numbers)[self.link]
+        return moved(position, rotate(orientation, self._position), 1.0), multiply(orientation, self._orientation)
+
+    def twist(self, numbers: Sequence[float]) -> Twist:
+        """Return the velocity of the mount (m/s) and how fast it turns (rad/s), both in the world frame."""
+        place, _ = self.pose(numbers)
+        return twist(self._body, self._entity, numbers, self.link, place)
+
+
+def link_index(body: Body, name: str | None) -> int:
+    """Return the index of a body's link: its name is with or without that of the body. Raises BadValue."""
+    if name is None:
+        return 0
+    names = [link.name.removeprefix(f"{body.name}/") for link in body.links]
+    if name not in names:
+        raise BadValue(f"{body.name} has no such link; there are {', '.join(names)}", name, nearest_name(name, names))
+    return names.index(name)

@@ -1,0 +1,45 @@
+"""Where something is, in a deployment: `at: {x: 1 m, yaw: 90 deg}`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from foosim.common import units
+from foosim.common.spec_base import Name, SpecBase, default
+from foosim.common.units import Quantity
+from foosim.world.scene import Quaternion, Vector, multiply, turn
+
+Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
+Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
+
+
+class At(SpecBase):
+    """A pose in the world: a place, turned about the world's x (roll), then y (pitch), then z (yaw)."""
+
+    x: Coordinate = default("0 m")
+    y: Coordinate = default("0 m")
+    z: Coordinate = default("0 m")
+    roll: Turn = default("0 deg")
+    pitch: Turn = default("0 deg")
+    yaw: Turn = default("0 deg")
+
+    @property
+    def position(self) -> Vector:
+        """The place (m)."""
+        return self.x, self.y, self.z
+
+    @property
+    def orientation(self) -> Quaternion:
+        """The rotation from its frame to the world's."""
+        about_x, about_y = turn((1.0, 0.0, 0.0), self.roll), turn((0.0, 1.0, 0.0), self.pitch)
+        return multiply(turn((0.0, 0.0, 1.0), self.yaw), multiply(about_y, about_x))
+
+
+class MountedAt(At):
+    """A pose in the frame of a link of the robot: the one of this name, the first one without a name."""
+
+    link: Name | None = None
+
+
+ORIGIN_OF_WORLD: Final = At()
+FIRST_LINK: Final = MountedAt()
