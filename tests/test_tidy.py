@@ -44,7 +44,7 @@ PACKAGES = sorted(LEVELS)
 # The one file that knows a library which would otherwise spread.
 ONLY_IN = {
     "zenoh": "runtime/transport/session.py",
-    "pybullet": "node/physics/bullet_engine.py",
+    "pybullet": "node/physics/bullet_client.py",
     "websockets": "console/server/server.py",
 }
 

@@ -31,6 +31,6 @@ class Bullet:
 
     def prepare_spares(self, count: int) -> None:
         """Connect clients of the library, each of which takes 15 ms."""
-        from foosim.node.physics.bullet_engine import connect_spares
+        from foosim.node.physics.bullet_client import connect_spares
 
         connect_spares(count)

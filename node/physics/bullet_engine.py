@@ -3,26 +3,33 @@
 Bullet keeps more than positions and velocities: contact points of pairs, search axes, orders of pairs and islands. The
 rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each in turn and sees law 1
 fail, for which the small methods (`_settings`, `_build_order`, `_make_free`, `_make_scenery`, `_end_pairs`) are there.
-This is the only file that imports pybullet.
+It is for bodies whose joints do not couple: all that a node solves in a tick share one solve of Bullet. Neighbour:
+`bullet_islands`, for all others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
-from math import fsum, sqrt
+from math import fsum
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.quiet import without_lines
+from foosim.node.physics.bullet_client import (
+    JOINT_TYPES,
+    REST,
+    give_client,
+    make_dynamics,
+    make_shape,
+    make_surface,
+    p,
+    settings_of,
+    start_client,
+)
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
-from foosim.world.mesh import Mesh
-from foosim.world.scene import UPRIGHT, Body, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector, in_pieces
-
-with without_lines(b"pybullet build time:"):
-    import pybullet as p
+from foosim.world.scene import UPRIGHT, Body, Shape, in_pieces
 
 # Pairs that can touch: free bodies with everything, nothing else. Jointed bodies may run through the scenery, and
 # without a filter a step costs five times as much.
@@ -30,19 +37,13 @@ FREE_GROUP: Final = 1
 JOINTED_GROUP: Final = 2
 SCENERY_GROUP: Final = 4
 
-SPARES_MAX: Final = 4
 MESH_PIECE: Final = 4096
 """Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 PARKING_Z_M: Final = 100.0
 PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the scenery: no pair of theirs can touch."""
-REST: Final[Vector] = (0.0, 0.0, 0.0)
 FREE_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_velocity")
-JOINT_TYPES: Final = {"prismatic": p.JOINT_PRISMATIC, "continuous": p.JOINT_REVOLUTE}
-SHAPE_TYPES: Final = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER, Capsule: p.GEOM_CAPSULE}
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
-SPEED_MAX: Final = 1000.0
-"""Bullet clamps each coordinate's velocity of a multibody at 100 by default: a sphere of 1 cm rolls at 1 m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,34 +58,6 @@ class Chain:
     zeros: tuple[float, ...]
     places: tuple[tuple[int, int, int, int], ...]
     log: int
-
-
-_spare_clients: list[int] = []
-"""Connected clients without bodies. Emptied, a client is as new; the laws are tested with such ones, too."""
-
-
-def connect_spares(count: int) -> None:
-    """Connect this many spare clients, so that an engine can be built while ticks continue."""
-    while len(_spare_clients) < count:
-        _spare_clients.append(_connect())
-
-
-def _connect() -> int:
-    client: int = p.connect(p.DIRECT)
-    assert client >= 0, "no physics client is left"
-    return client
-
-
-def _take_client() -> int:
-    return _spare_clients.pop() if _spare_clients else _connect()
-
-
-def _give_client(client: int) -> None:
-    if len(_spare_clients) < SPARES_MAX:
-        p.resetSimulation(physicsClientId=client)
-        _spare_clients.append(client)
-    else:
-        p.disconnect(physicsClientId=client)
 
 
 def _chain(made: int, body: Body, entity: Entity) -> Chain:
@@ -124,9 +97,7 @@ class BulletEngine:
         self._physics = physics_of(deployment)
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
-        self._client: int = _take_client()
-        p.setGravity(0.0, 0.0, -self._physics.gravity, physicsClientId=self._client)
-        p.setPhysicsEngineParameter(**self._settings(), physicsClientId=self._client)
+        self._client: int = start_client(self._settings(), self._physics.gravity)
         yield
         scene = build_scene(deployment, layout)
         self._silent: set[int] = set()
@@ -164,21 +135,8 @@ class BulletEngine:
     # --- building ----------------------------------------------------------------------------------------------------
 
     def _settings(self) -> dict[str, Any]:
-        """Return the parameters of the world (facts, sections 4 and 6)."""
-        return {
-            "fixedTimeStep": self._dt,
-            "numSubSteps": 0,  # more would multiply the force limits of the motors
-            "numSolverIterations": self._physics.solver_iterations,
-            "deterministicOverlappingPairs": 1,  # pairs are solved in an order of names, not of memory
-            "minimumSolverIslandSize": 0,  # else small islands share one solver call, and stop on its common residual
-            "solverResidualThreshold": 0,  # else iteration stops on what the other islands of the call are doing
-            "contactERP": self._physics.contact_erp,  # 0.08 by default: restitution would be e + (0 to 0.08)
-            "contactBreakingThreshold": 0.001,  # 20 mm by default: points of contacts that are no more
-            "restitutionVelocityThreshold": 0.05,  # slower contacts do not bounce: a sphere comes to rest
-            "warmStartingFactor": 0,  # starts from the impulses of the last step, which are not in the frame
-            "contactSlop": 0,  # a tolerated penetration shifts where a contact begins
-            "collisionFilterMode": 0,  # a pair needs both masks
-        }
+        """Return the parameters of the world."""
+        return settings_of(self._physics, self._dt)
 
     def _build_order(self, names: list[str]) -> list[str]:
         """Return the order in which bodies are made: by name, since it sorts pairs and islands."""
@@ -188,7 +146,7 @@ class BulletEngine:
         """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
         body: int = p.createMultiBody(
             baseMass=0.0,
-            baseCollisionShapeIndex=self._make_scenery_shape(shape),
+            baseCollisionShapeIndex=make_shape(self._client, (shape,), placed=False),
             basePosition=shape.position,
             baseOrientation=shape.orientation,
             useMaximalCoordinates=rigid,
@@ -203,15 +161,15 @@ class BulletEngine:
         (link,) = body.links
         made: int = p.createMultiBody(
             baseMass=link.mass,
-            baseCollisionShapeIndex=self._make_shape(link.shapes, placed=False),
+            baseCollisionShapeIndex=make_shape(self._client, link.shapes, placed=False),
             useMaximalCoordinates=rigid,
             physicsClientId=self._client,
         )
         p.setCollisionFilterGroupMask(
             made, -1, FREE_GROUP, FREE_GROUP | JOINTED_GROUP | SCENERY_GROUP, physicsClientId=self._client
         )
-        self._make_dynamics(made, -1, link.mass, link.inertia)
-        self._make_surface(made, -1, None)
+        make_dynamics(self._client, made, -1, link.mass, link.inertia)
+        self._make_surface(made, -1, link.shapes[0].surface)
         p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=self._client)
         return made
 
@@ -223,7 +181,7 @@ class BulletEngine:
             baseMass=0.0,
             basePosition=body.position,
             linkMasses=[link.mass for link in links],
-            linkCollisionShapeIndices=[self._make_shape(link.shapes, placed=True) for link in links],
+            linkCollisionShapeIndices=[make_shape(self._client, link.shapes, placed=True) for link in links],
             linkVisualShapeIndices=[-1] * count,
             linkPositions=[REST] * count,
             linkOrientations=[UPRIGHT] * count,
@@ -237,7 +195,7 @@ class BulletEngine:
         )
         for index, link in enumerate(links):
             p.setCollisionFilterGroupMask(made, index, JOINTED_GROUP, FREE_GROUP, physicsClientId=self._client)
-            self._make_dynamics(made, index, link.mass, link.inertia)
+            make_dynamics(self._client, made, index, link.mass, link.inertia)
             if link.shapes:
                 self._make_surface(made, index, link.shapes[0].surface)
             if link.joint == "prismatic":
@@ -250,101 +208,8 @@ class BulletEngine:
                 )
         return made
 
-    def _make_scenery_shape(self, shape: Shape) -> int:
-        """Make a collision shape; a mesh's triangles are handed over as numbers, never as the name of a file."""
-        mesh = shape.geometry
-        if not isinstance(mesh, Mesh):
-            return self._make_shape((shape,), placed=False)
-        made: int = p.createCollisionShape(
-            p.GEOM_MESH,
-            vertices=mesh.vertices.tolist(),
-            indices=mesh.triangles.ravel().tolist(),
-            physicsClientId=self._client,
-        )
-        assert made >= 0, shape
-        return made
-
-    def _make_shape(self, shapes: Sequence[Shape], placed: bool) -> int:
-        """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1."""
-        if not shapes:
-            return -1
-        if isinstance(shapes[0].geometry, Hull):
-            return self._make_hull(shapes, placed)
-        parts: dict[str, list[Any]] = {
-            key: [] for key in ("shapeTypes", "halfExtents", "radii", "lengths", "positions", "orientations")
-        }
-        for shape in shapes:
-            geometry = shape.geometry
-            assert isinstance(geometry, Box | Sphere | Cylinder | Capsule), geometry
-            parts["shapeTypes"].append(SHAPE_TYPES[type(geometry)])
-            parts["halfExtents"].append(geometry.half if isinstance(geometry, Box) else REST)
-            parts["radii"].append(0.0 if isinstance(geometry, Box) else geometry.radius)
-            parts["lengths"].append(geometry.length if isinstance(geometry, Cylinder | Capsule) else 0.0)
-            parts["positions"].append(shape.position if placed else REST)
-            parts["orientations"].append(shape.orientation if placed else UPRIGHT)
-        made: int = p.createCollisionShapeArray(
-            shapeTypes=parts["shapeTypes"],
-            halfExtents=parts["halfExtents"],
-            radii=parts["radii"],
-            lengths=parts["lengths"],
-            collisionFramePositions=parts["positions"],
-            collisionFrameOrientations=parts["orientations"],
-            physicsClientId=self._client,
-        )
-        assert made >= 0, shapes
-        return made
-
-    def _make_hull(self, shapes: Sequence[Shape], placed: bool) -> int:
-        """Make a convex hull: corners without triangles. Bullet has no compound shapes of these."""
-        (shape,) = shapes
-        assert isinstance(shape.geometry, Hull)
-        made: int = p.createCollisionShape(
-            p.GEOM_MESH,
-            vertices=shape.geometry.mesh.vertices.tolist(),
-            collisionFramePosition=shape.position if placed else REST,
-            collisionFrameOrientation=shape.orientation if placed else UPRIGHT,
-            physicsClientId=self._client,
-        )
-        assert made >= 0, shape
-        return made
-
-    def _make_dynamics(self, body: int, link: int, mass: float, inertia: Vector) -> None:
-        """Set mass, inertia and damping of a body, and check that Bullet has accepted them."""
-        client = self._client
-        # Bullet's own inertia is that of the shapes' bounding box. It must be set together with the mass (alone, it
-        # makes the mass 0) and without anything else (together with a damping it is dropped silently).
-        p.changeDynamics(body, link, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
-        # Damping is 0.04 by default, which stops a rolling multibody within seconds.
-        for value in ({"linearDamping": 0.0}, {"angularDamping": 0.0}, {"jointDamping": 0.0}):
-            p.changeDynamics(body, link, **value, physicsClientId=client)
-        p.changeDynamics(body, link, maxJointVelocity=SPEED_MAX, physicsClientId=client)
-        info = p.getDynamicsInfo(body, link, physicsClientId=client)
-        assert (info[0], info[2]) == (mass, inertia), (info, mass, inertia)
-
-    def _make_surface(self, body: int, link: int, surface: str | None) -> None:
-        """Set what makes the values of a pair: products of both sides' restitution and friction.
-
-        A free body (`surface` is None) has the roots of the values of two of them, everything else what makes the
-        product with a free body its pair value; rolling friction is (each side's own times the other's friction), and a
-        free body's own is 0.
-        """
-        between = self._physics.between_free
-        bounce, grip = sqrt(between.restitution), sqrt(between.friction)
-        if surface is None:
-            values = (bounce, grip, 0.0)
-        else:
-            pair = self._physics.surfaces[surface]
-            values = (pair.restitution / bounce, pair.friction / grip, pair.rolling_friction / grip)
-        p.changeDynamics(
-            body,
-            link,
-            restitution=values[0],
-            lateralFriction=values[1],
-            rollingFriction=values[2],
-            spinningFriction=0.0,
-            contactProcessingThreshold=0.0,  # contacts ahead of the touch spoil restitution at low speed
-            physicsClientId=self._client,
-        )
+    def _make_surface(self, body: int, link: int, surface: str) -> None:
+        make_surface(self._client, body, link, self._physics.sides[surface])
 
     # --- parking -----------------------------------------------------------------------------------------------------
 
@@ -543,5 +408,5 @@ class BulletEngine:
     def close(self) -> None:
         """Empty the physics client and keep it for the next engine."""
         if self._client >= 0:
-            _give_client(self._client)
+            give_client(self._client)
             self._client = -1

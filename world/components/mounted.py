@@ -8,8 +8,8 @@ from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import Mounting
-from foosim.world.forms.placing import MountedAt
 from foosim.world.kinematics import Twist, forward_kinematics, twist
+from foosim.world.placing import MountedAt
 from foosim.world.scene import Body, Quaternion, Vector, moved, multiply, rotate
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
@@ -11,7 +12,7 @@ from foosim.world.clearance.table_clearance import clearance_findings
 from foosim.world.forms.registry import kit
 from foosim.world.parameters.table import TABLE, Surface, Table
 from foosim.world.parameters.table_checks import table_findings
-from foosim.world.physics import Contact, Physics
+from foosim.world.physics import Contact, Physics, Side
 from foosim.world.scene import Shape
 from foosim.world.scenes.football_table import table_scenery
 from foosim.world.spec import WorldSpec
@@ -37,7 +38,8 @@ class TableKit:
         return table_scenery(self._table)
 
     def physics(self) -> Physics:
-        """Return what the ball feels."""
+        """Return what the ball feels: its own sides have the roots of the values of two balls, and any other what makes
+        the product with a ball's the value of the pair."""
         table = self._table
         surfaces = {
             name: Contact(surface.restitution, surface.friction, surface.rolling_friction, silent=name in SILENT)
@@ -46,7 +48,13 @@ class TableKit:
         }
         balls = table.surfaces.balls
         between = Contact(balls.restitution, balls.friction)
-        return Physics(table.gravity, surfaces, between, table.solver_iterations, table.contact_erp)
+        bounce, grip = sqrt(between.restitution), sqrt(between.friction)
+        sides = {
+            name: Side(pair.restitution / bounce, pair.friction / grip, pair.rolling_friction / grip, pair.silent)
+            for name, pair in surfaces.items()
+        }
+        sides[BALL] = Side(bounce, grip)
+        return Physics(table.gravity, surfaces, between, table.solver_iterations, table.contact_erp, sides)
 
     def findings(self) -> Iterator[Finding]:
         """Yield the scenery that the table's bodies pass through."""

@@ -1,0 +1,174 @@
+"""Physics clients of Bullet, and what bodies are made of in them. This is the only file that imports pybullet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from foosim.node.physics.quiet import without_lines
+from foosim.world.mesh import Mesh
+from foosim.world.physics import Physics, Side
+from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector
+
+with without_lines(b"pybullet build time:"):
+    import pybullet as p
+
+__all__ = [
+    "JOINT_TYPES",
+    "REST",
+    "connect_spares",
+    "give_client",
+    "make_dynamics",
+    "make_shape",
+    "make_surface",
+    "p",
+    "settings_of",
+    "start_client",
+]
+
+SPARES_MAX: Final = 10
+"""Clients without bodies that are kept; each takes 28 MiB."""
+REST: Final[Vector] = (0.0, 0.0, 0.0)
+SPEED_MAX: Final = 1000.0
+"""Bullet clamps each coordinate's velocity of a multibody at 100 by default: a sphere of 1 cm rolls at 1 m/s."""
+JOINT_TYPES: Final = {
+    "prismatic": p.JOINT_PRISMATIC,
+    "revolute": p.JOINT_REVOLUTE,
+    "continuous": p.JOINT_REVOLUTE,
+    "fixed": p.JOINT_FIXED,
+}
+SHAPE_TYPES: Final = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER, Capsule: p.GEOM_CAPSULE}
+
+_spare_clients: list[int] = []
+"""Connected clients without bodies. Emptied, a client is as new; the laws are tested with such ones, too."""
+
+
+def connect_spares(count: int) -> None:
+    """Connect this many spare clients, so that an engine can be built while ticks continue."""
+    while len(_spare_clients) < count:
+        _spare_clients.append(_connect())
+
+
+def start_client(settings: dict[str, Any], gravity: float) -> int:
+    """Return a client without bodies, with these parameters of the world."""
+    client = _spare_clients.pop() if _spare_clients else _connect()
+    p.setGravity(0.0, 0.0, -gravity, physicsClientId=client)
+    p.setPhysicsEngineParameter(**settings, physicsClientId=client)
+    return client
+
+
+def give_client(client: int) -> None:
+    """Empty a client and keep it for the next engine."""
+    if len(_spare_clients) < SPARES_MAX:
+        p.resetSimulation(physicsClientId=client)
+        _spare_clients.append(client)
+    else:
+        p.disconnect(physicsClientId=client)
+
+
+def _connect() -> int:
+    client: int = p.connect(p.DIRECT)
+    assert client >= 0, "no physics client is left"
+    return client
+
+
+def settings_of(physics: Physics, substep_s: float) -> dict[str, Any]:
+    """Return the parameters under which a step depends on nothing but the state that it starts from."""
+    return {
+        "fixedTimeStep": substep_s,
+        "numSubSteps": 0,  # more would multiply the force limits of the motors
+        "numSolverIterations": physics.solver_iterations,
+        "deterministicOverlappingPairs": 1,  # pairs are solved in an order of names, not of memory
+        "minimumSolverIslandSize": 0,  # else small islands share one solver call, and stop on its common residual
+        "solverResidualThreshold": 0,  # else iteration stops on what the other islands of the call are doing
+        "contactERP": physics.contact_erp,  # 0.08 by default: restitution would be e + (0 to 0.08)
+        "contactBreakingThreshold": 0.001,  # 20 mm by default: points of contacts that are no more
+        "restitutionVelocityThreshold": 0.05,  # slower contacts do not bounce: a sphere comes to rest
+        "warmStartingFactor": 0,  # starts from the impulses of the last step, which are not in the frame
+        "contactSlop": 0,  # a tolerated penetration shifts where a contact begins
+        "collisionFilterMode": 0,  # a pair needs both masks
+    }
+
+
+def make_shape(client: int, shapes: Sequence[Shape], *, placed: bool) -> int:
+    """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1.
+
+    A mesh or a hull is the only one: Bullet has no compound of these. They are handed over as numbers, never as the
+    name of a file.
+    """
+    if not shapes:
+        return -1
+    if isinstance(shapes[0].geometry, Mesh | Hull):
+        (shape,) = shapes
+        return _make_triangles(client, shape, placed=placed)
+    parts: dict[str, list[Any]] = {
+        key: [] for key in ("shapeTypes", "halfExtents", "radii", "lengths", "positions", "orientations")
+    }
+    for shape in shapes:
+        geometry = shape.geometry
+        assert isinstance(geometry, Box | Sphere | Cylinder | Capsule), geometry
+        parts["shapeTypes"].append(SHAPE_TYPES[type(geometry)])
+        parts["halfExtents"].append(geometry.half if isinstance(geometry, Box) else REST)
+        parts["radii"].append(0.0 if isinstance(geometry, Box) else geometry.radius)
+        parts["lengths"].append(geometry.length if isinstance(geometry, Cylinder | Capsule) else 0.0)
+        parts["positions"].append(shape.position if placed else REST)
+        parts["orientations"].append(shape.orientation if placed else UPRIGHT)
+    made: int = p.createCollisionShapeArray(
+        shapeTypes=parts["shapeTypes"],
+        halfExtents=parts["halfExtents"],
+        radii=parts["radii"],
+        lengths=parts["lengths"],
+        collisionFramePositions=parts["positions"],
+        collisionFrameOrientations=parts["orientations"],
+        physicsClientId=client,
+    )
+    assert made >= 0, shapes
+    return made
+
+
+def _make_triangles(client: int, shape: Shape, *, placed: bool) -> int:
+    """Make a static mesh, or the convex hull of corners, which have no triangles in Bullet."""
+    geometry = shape.geometry
+    assert isinstance(geometry, Mesh | Hull), geometry
+    mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
+    triangles = {} if isinstance(geometry, Hull) else {"indices": mesh.triangles.ravel().tolist()}
+    made: int = p.createCollisionShape(
+        p.GEOM_MESH,
+        vertices=mesh.vertices.tolist(),
+        collisionFramePosition=shape.position if placed else REST,
+        collisionFrameOrientation=shape.orientation if placed else UPRIGHT,
+        physicsClientId=client,
+        **triangles,
+    )
+    assert made >= 0, shape
+    return made
+
+
+def make_dynamics(client: int, body: int, link: int, mass: float, inertia: Vector) -> None:
+    """Set mass, inertia and damping of a link, and check that Bullet has accepted them."""
+    # Bullet's own inertia is that of the shapes' bounding box. It must be set together with the mass (alone, it
+    # makes the mass 0) and without anything else (together with a damping it is dropped silently).
+    p.changeDynamics(body, link, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
+    # Damping is 0.04 by default, which stops a rolling multibody within seconds.
+    for value in ({"linearDamping": 0.0}, {"angularDamping": 0.0}, {"jointDamping": 0.0}):
+        p.changeDynamics(body, link, **value, physicsClientId=client)
+    p.changeDynamics(body, link, maxJointVelocity=SPEED_MAX, physicsClientId=client)
+    info = p.getDynamicsInfo(body, link, physicsClientId=client)
+    assert (info[0], info[2]) == (mass, inertia), (info, mass, inertia)
+
+
+def make_surface(client: int, body: int, link: int, side: Side) -> None:
+    """Set what a link brings to its contacts: Bullet takes the products of both sides' restitution and friction.
+
+    Rolling friction is each side's own times the other's friction.
+    """
+    p.changeDynamics(
+        body,
+        link,
+        restitution=side.restitution,
+        lateralFriction=side.friction,
+        rollingFriction=side.rolling_friction,
+        spinningFriction=0.0,
+        contactProcessingThreshold=0.0,  # contacts ahead of the touch spoil restitution at low speed
+        physicsClientId=client,
+    )
