@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, ParamSpec, TypeVar
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import Engine
+from foosim.node.physics.interface import Engine, IslandEngine
 from foosim.node.physics.making import kind_of
 from foosim.world.layout import Entity, Layout
 
@@ -107,6 +107,8 @@ def metered_engine(meter: Meter) -> Callable[[Deployment, Layout], Engine]:
     """Return a factory of the deployment's engine, metered."""
 
     def make(deployment: Deployment, layout: Layout) -> Engine:
-        return MeteredEngine(kind_of(deployment).make(deployment, layout), meter)
+        made = kind_of(deployment).make(deployment, layout)
+        assert not isinstance(made, IslandEngine), "the table's bodies share a solve"
+        return MeteredEngine(made, meter)
 
     return make

@@ -309,7 +309,8 @@ class NodeCore:
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         entities = layout.entities
         islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
-        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start)
+        movers = tuple(tuple(entities[index] for index in near) for near in share.movers)
+        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers)
         return True
 
     def _collect(self, now_ns: int) -> bool:

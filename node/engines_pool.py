@@ -5,7 +5,7 @@ Shared by the node's process and the rehearsal.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from hashlib import blake2b
 from typing import Final
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
-from foosim.node.physics.interface import Engine, EngineFactory
+from foosim.node.physics.interface import AnyEngine
 from foosim.node.physics.making import build_in_steps, make_engine, prepare_spares
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import initial_numbers
@@ -29,15 +29,17 @@ ENGINES_KEPT: Final = 3
 class Solver:
     """Builds the engines that a node's core needs, and solves its work. The last used engines are kept."""
 
-    def __init__(self, core: NodeCore, factory: EngineFactory | None = None, fingerprint: bytes = b"") -> None:
+    def __init__(
+        self, core: NodeCore, factory: Callable[[Deployment, Layout], AnyEngine] | None = None, fingerprint: bytes = b""
+    ) -> None:
         """`factory` overrides the deployment's engine; `fingerprint` is that of another solver of this process."""
         self._core = core
         self._factory = factory
-        self._engines: dict[bytes, Engine] = {}
+        self._engines: dict[bytes, AnyEngine] = {}
         """By layout, the one that was used last at the end."""
         self._told = 0
         """The number of the core's layouts whose engine has been reported."""
-        self._building: tuple[Layout, Generator[None, None, Engine]] | None = None
+        self._building: tuple[Layout, Generator[None, None, AnyEngine]] | None = None
         self.fingerprint = fingerprint
         """The digest of the fixed small run, empty before the first engine is built."""
 
@@ -69,7 +71,7 @@ class Solver:
     def is_building(self) -> bool:
         return self._building is not None
 
-    def _steps(self, layout: Layout) -> Generator[None, None, Engine]:
+    def _steps(self, layout: Layout) -> Generator[None, None, AnyEngine]:
         deployment = self._core.deployment
         assert deployment is not None
         if self._factory is not None:
@@ -79,7 +81,7 @@ class Solver:
             prepare_spares(deployment, layout)
         return (yield from build_in_steps(deployment, layout))
 
-    def _take(self, layout: Layout, engine: Engine) -> None:
+    def _take(self, layout: Layout, engine: AnyEngine) -> None:
         """Keep a new engine and report it to the core."""
         self._engines[layout.digest] = engine
         self._told += 1
@@ -101,7 +103,7 @@ class Solver:
                 old.close()
                 self._engines[layout.digest] = self._make(layout)
 
-    def _make(self, layout: Layout) -> Engine:
+    def _make(self, layout: Layout) -> AnyEngine:
         """Build an engine at once."""
         deployment = self._core.deployment
         assert deployment is not None
@@ -109,7 +111,7 @@ class Solver:
 
     # --- solving -----------------------------------------------------------------------------------------------------
 
-    def engine_for(self, layout: Layout) -> Engine:
+    def engine_for(self, layout: Layout) -> AnyEngine:
         """Return the engine of a layout; one that went, or never came, is built at once."""
         engine = self._engines.pop(layout.digest, None) or self._make(layout)
         self._engines[layout.digest] = engine
@@ -130,7 +132,7 @@ class Solver:
         self._engines.clear()
 
 
-def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
+def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     """Return the digest of a fixed small run: the stirred world, 32 ticks.
 
     It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,

@@ -9,13 +9,15 @@ from collections import Counter
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import cast
 
 import msgspec
 
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
 from foosim.node.edited_frame import edit, moved_reference
-from foosim.node.physics.interface import Engine
+from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
+from foosim.world.assembly.rest import Rest, wake_edited
 from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
@@ -36,7 +38,8 @@ _outbox_encoder = msgspec.msgpack.Encoder()
 class Work:
     """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`.
 
-    `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were.
+    `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were. `movers`
+    are those in the way of each island, for engines that solve one island after the other.
     """
 
     tick: int
@@ -46,6 +49,7 @@ class Work:
     numbers: list[float]
     outboxes: dict[int, bytes]
     start: list[float] = field(default_factory=list)
+    movers: tuple[tuple[Entity, ...], ...] = ()
 
 
 class Stepper:
@@ -56,6 +60,8 @@ class Stepper:
         self.layout = layout
         self.world = World(deployment, layout)
         self.substeps = deployment.substeps
+        self.rest = Rest(deployment, layout)
+        self._by_island = layout.couples
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
@@ -109,6 +115,8 @@ class Stepper:
         is_same = layout is self.layout or layout.digest == self.layout.digest
         world = self.world if is_same else World(self.deployment, layout)
         world.apply_rules(numbers, frame.tick)
+        if edits or world.has_rules:
+            wake_edited(frame, layout, numbers)
         return layout, numbers
 
     def deliver(
@@ -159,7 +167,7 @@ class Stepper:
                 return one.accept(packet.payload, view)
         return False
 
-    def solve(self, engine: Engine, work: Work) -> None:
+    def solve(self, engine: AnyEngine, work: Work) -> None:
         """Load, command, step, read: write the next state of every body of `work` into its numbers."""
         numbers = work.numbers
         bodies = [entity for island in work.islands for entity in island]
@@ -173,18 +181,48 @@ class Stepper:
         world, before = self.world, numbers.copy()
         start = work.start or before
         rigid = [entity for entity in bodies if entity.index in self._rigid]
-        if rigid:
-            view = View(work.tick, numbers, start=start)
-            driven = [entity for entity in rigid if entity.index in world.actuators]
-            engine.load(rigid, numbers)
-            engine.command(driven, world.motors(driven, view))
-            engine.step(self.substeps)
-            engine.read(rigid, numbers)
+        if rigid and self._by_island:
+            self._solve_islands(cast("IslandEngine", engine), work, start)
+        elif rigid:
+            self._solve_together(cast("Engine", engine), rigid, work, start)
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
         if not (isfinite(sum(numbers)) and world.plausible(bodies, numbers, before, work.tick)):
             self._quarantine(work, before)
+
+    def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:
+        """Solve bodies whose joints do not couple: all in one go."""
+        numbers, world = work.numbers, self.world
+        view = View(work.tick, numbers, start=start)
+        driven = [entity for entity in bodies if entity.index in world.actuators]
+        engine.load(bodies, numbers)
+        engine.command(driven, world.motors(driven, view))
+        engine.step(self.substeps)
+        engine.read(bodies, numbers)
+
+    def _solve_islands(self, engine: IslandEngine, work: Work, start: Sequence[float]) -> None:
+        """Solve the rigid bodies of one island after the other; those at rest are left as they are."""
+        numbers, world = work.numbers, self.world
+        view = View(work.tick, numbers, start=start)
+        movers = work.movers or ((),) * len(work.islands)
+        for members, in_the_way in zip(work.islands, movers, strict=True):
+            bodies = tuple(
+                [
+                    entity
+                    for entity in members
+                    if entity.index in self._rigid and numbers[entity.offsets["quarantined"]] == 0.0
+                ]
+            )
+            if not bodies:
+                continue
+            may_rest = self.rest.may_rest(bodies, in_the_way, numbers, start)
+            drives = world.drives(bodies, view)
+            if may_rest and not any(asked.is_moving for asked in drives):
+                self.rest.keep(bodies, numbers)
+                continue
+            engine.solve(Island(bodies, in_the_way, drives), numbers, start)
+            self.rest.count(bodies, drives, numbers)
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
         """An island with a result that cannot be keeps its edited state; the bad entities are marked.

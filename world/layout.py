@@ -152,6 +152,8 @@ class Layout:
         """The numbers that refer to entities."""
         self.free = tuple([entity for entity in entities if entity.is_free])
         """Free rigid bodies, in name order."""
+        self.couples = any(entity.is_rigid and entity.kind.couples for entity in entities)
+        """Whether it has rigid bodies whose islands need a solve of their own."""
         self._digest = b""
 
     def of(self, model: str) -> tuple[Entity, ...]:

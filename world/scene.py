@@ -185,6 +185,12 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
+def conjugate(orientation: Quaternion) -> Quaternion:
+    """Return the rotation back."""
+    x, y, z, w = orientation
+    return -x, -y, -z, w
+
+
 def rotate(orientation: Quaternion, vector: Vector) -> Vector:
     """Return a vector of a rotated frame in the frame that the unit quaternion is given in."""
     qx, qy, qz, qw = orientation

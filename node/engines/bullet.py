@@ -9,7 +9,7 @@ from foosim.world.forms.registry import engine
 
 if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment
-    from foosim.node.physics.interface import Engine
+    from foosim.node.physics.interface import AnyEngine
     from foosim.world.layout import Layout
 
 
@@ -17,14 +17,22 @@ if TYPE_CHECKING:
 class Bullet:
     """Rigid bodies by the Bullet library, with scenery of any shape."""
 
-    def make(self, deployment: Deployment, layout: Layout) -> Engine:
+    def make(self, deployment: Deployment, layout: Layout) -> AnyEngine:
         """Return an engine, built at once."""
+        if layout.couples:
+            from foosim.node.physics.bullet_islands import BulletIslands
+
+            return BulletIslands(deployment, layout)
         from foosim.node.physics.bullet_engine import BulletEngine
 
         return BulletEngine(deployment, layout)
 
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
         """Build an engine a body at a time."""
+        if layout.couples:
+            from foosim.node.physics.bullet_islands import BulletIslands
+
+            return (yield from BulletIslands.in_steps(deployment, layout))
         from foosim.node.physics.bullet_engine import BulletEngine
 
         return (yield from BulletEngine.in_steps(deployment, layout))

@@ -11,10 +11,35 @@ ones are one link each, a sphere; *jointed* ones are chains of links on a fixed 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias, runtime_checkable
 
 from foosim.deployment.schema import Deployment
+from foosim.world.components.drives import Drives
 from foosim.world.layout import Entity, Layout
+
+
+@dataclass(frozen=True, slots=True)
+class Island:
+    """Bodies that an engine solves together, in name order, what is asked of each, and the movers in their way."""
+
+    bodies: tuple[Entity, ...]
+    movers: tuple[Entity, ...]
+    drives: tuple[Drives, ...]
+
+
+@runtime_checkable
+class IslandEngine(Protocol):
+    """An engine that solves one island after the other, each by itself: for bodies whose joints couple."""
+
+    def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
+        """Write the next state of an island's bodies into `numbers`, which have their present one.
+
+        `start` are the numbers at the start of the tick: movers have the pose and the velocity of these.
+        """
+
+    def close(self) -> None:
+        """Free what the engine holds. It is not used afterwards."""
 
 
 class Engine(Protocol):
@@ -45,14 +70,15 @@ class EngineKind(Protocol):
     Its methods import what the engine needs, so that the registry can tell of it where that is not installed.
     """
 
-    def make(self, deployment: Deployment, layout: Layout) -> Engine:
+    def make(self, deployment: Deployment, layout: Layout) -> Engine | IslandEngine:
         """Return an engine, built at once."""
 
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine | IslandEngine]:
         """Build an engine in steps, each short enough to do between two ticks of another one."""
 
     def prepare_spares(self, count: int) -> None:
         """Get ready what would hold up the ticks when so many more engines are built beside them."""
 
 
+AnyEngine: TypeAlias = Engine | IslandEngine
 EngineFactory = Callable[[Deployment, Layout], Engine]

@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import Engine, EngineKind
+from foosim.node.physics.interface import AnyEngine, EngineKind
 from foosim.world.forms import registry
 from foosim.world.layout import Entity, Layout
 
@@ -45,7 +45,7 @@ def has_rigid(layout: Layout) -> bool:
     return any(entity.is_rigid for entity in layout.entities)
 
 
-def make_engine(deployment: Deployment, layout: Layout) -> Engine:
+def make_engine(deployment: Deployment, layout: Layout) -> AnyEngine:
     """Return the engine of a layout's rigid bodies, built at once."""
     return kind_of(deployment).make(deployment, layout) if has_rigid(layout) else NoEngine()
 
@@ -56,7 +56,7 @@ def prepare_spares(deployment: Deployment, layout: Layout) -> None:
         kind_of(deployment).prepare_spares(SPARES)
 
 
-def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
     """Build the engine of a layout's rigid bodies in steps, each short enough to do between two ticks."""
     if has_rigid(layout):
         return (yield from kind_of(deployment).in_steps(deployment, layout))

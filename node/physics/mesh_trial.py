@@ -20,10 +20,11 @@ from typing import Final
 import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import Engine
+from foosim.node.physics.interface import AnyEngine, Island, IslandEngine
 from foosim.node.physics.making import kind_of
 from foosim.protocol.codec import decode_any, encode
 from foosim.world.assembly.world import build_scene, initial_numbers
+from foosim.world.components.drives import NO_DRIVES
 from foosim.world.layout import Entity, build_layout
 from foosim.world.mesh import AssetError, Mesh
 from foosim.world.scene import Body, Shape, Vector, place, shape_box
@@ -133,14 +134,17 @@ def _inside(shape: Shape, mesh: Mesh) -> Vector:
     return position
 
 
-def _drop(deployment: Deployment, engine: Engine, body: Entity, numbers: list[float], start: Vector) -> None:
+def _drop(deployment: Deployment, engine: AnyEngine, body: Entity, numbers: list[float], start: Vector) -> None:
     """Let a free body, which is at rest in a world's numbers, start from somewhere else."""
     at = body.offsets["position"]
     numbers[at : at + 3] = start
     for _ in range(TICKS // 2):
-        engine.load((body,), numbers)
-        engine.step(deployment.substeps)
-        engine.read((body,), numbers)
+        if isinstance(engine, IslandEngine):
+            engine.solve(Island((body,), (), (NO_DRIVES,)), numbers, numbers)
+        else:
+            engine.load((body,), numbers)
+            engine.step(deployment.substeps)
+            engine.read((body,), numbers)
         if not all(isfinite(number) for number in numbers):
             raise ArithmeticError("a body that touches it is nowhere: its position is not finite")
 

@@ -20,7 +20,7 @@ from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_engine import BulletEngine
 from foosim.node.physics.interface import Engine, EngineFactory
 from foosim.node.physics.pure_engine import PureEngine
-from foosim.world.assembly.islands import Assignment, reach_of
+from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import View
@@ -103,7 +103,7 @@ class Comparison:
         added = [(f"extra{index}", "ball") for index in range(balls - 1)]
         self.layout = build_layout(self.deployment, added)
         self.numbers = initial_numbers(self.deployment, self.layout)
-        self.reach = reach_of(self.deployment, self.layout)
+        self.reach = table_reach_of(self.deployment, self.layout)
         self.actuators = {
             rod.index: fitted.actuator
             for rod in self.layout.of("rod")

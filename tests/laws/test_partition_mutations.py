@@ -19,7 +19,7 @@ from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
+from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
@@ -98,7 +98,7 @@ def solve(stepper: Stepper, numbers: Sequence[float], reach: Reach) -> list[floa
 def test_reach_from_present_speed_is_caught() -> None:
     """A resting ball has no present speed, and reaches the next rod within the tick in which it is kicked."""
     stepper, numbers = kicked_towards_the_next_rod()
-    declared = reach_of(stepper.deployment, stepper.layout)
+    declared = table_reach_of(stepper.deployment, stepper.layout)
     present = replace(declared, ball_m=table_of(stepper.deployment).ball.radius)
     together = list(numbers)
     bodies = tuple(entity for entity in stepper.layout.entities if entity.is_solved)

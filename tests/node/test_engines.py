@@ -9,13 +9,13 @@ import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.physics.interface import Engine
-from foosim.node.physics.making import make_engine
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms.registry import names
 from foosim.world.layout import Layout, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector
 from tests.placing import place_ball
+from tests.shared_engine import make_shared_engine
 
 TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 TABLE = load_deployment(TEXT, "table.yaml")
@@ -28,7 +28,7 @@ OFF = ((0.0, 0.0), (0.0, 0.0))
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
     settings = apply_sets(TEXT, "table.yaml", [f"engine={request.param}", "table.contact_erp=0"])
-    made = make_engine(load_deployment(settings, "table.yaml"), LAYOUT)
+    made = make_shared_engine(load_deployment(settings, "table.yaml"), LAYOUT)
     yield made
     made.close()
 
@@ -143,7 +143,7 @@ def test_balls_meet_with_the_values_of_their_pair(kind: str, restitution: float,
         place_ball(numbers, ball, (0.03 * side, 0.05, 0.1), (-2.0 * side, 0.0, 0.0))
     spin = pair[0].offsets["angular_velocity"]
     numbers[spin : spin + 3] = [0.0, 0.0, 1000.0]
-    engine = make_engine(deployment, layout)
+    engine = make_shared_engine(deployment, layout)
     for _ in range(10):
         engine.load(pair, numbers)
         engine.step(deployment.substeps)
@@ -163,7 +163,7 @@ def test_what_balls_feel_of_one_another_changes_nothing_else(kind: str) -> None:
         deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
         numbers = initial_numbers(deployment, LAYOUT)
         place_ball(numbers, BALL, (0.0, 0.3, 0.03), (1.0, 3.0, 0.0))
-        engine = make_engine(deployment, LAYOUT)
+        engine = make_shared_engine(deployment, LAYOUT)
         for _ in range(40):
             tick(engine, LAYOUT, numbers)
         engine.close()
@@ -190,7 +190,7 @@ def test_balls_bounce_off_cylinders(kind: str, turned: str, start: Vector, veloc
     deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
     numbers = initial_numbers(deployment, LAYOUT)
     place_ball(numbers, BALL, start, velocity)
-    engine = make_engine(deployment, LAYOUT)
+    engine = make_shared_engine(deployment, LAYOUT)
     at, speed = BALL.offsets["position"], BALL.offsets["linear_velocity"]
     for _ in range(25):
         tick(engine, LAYOUT, numbers)

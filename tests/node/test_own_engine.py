@@ -16,7 +16,6 @@ from foosim.cli.components import as_json, chosen, lines
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.physics.making import make_engine
 from foosim.rehearsal.run import rehearse
 from foosim.world.assembly import world
 from foosim.world.assembly.world import initial_numbers
@@ -25,6 +24,7 @@ from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Scene, Sphere, Vector
 from tests.placing import place_ball
+from tests.shared_engine import make_shared_engine
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -121,7 +121,7 @@ def test_an_engine_of_ones_own_computes_a_run() -> None:
 @pytest.mark.usefixtures("site")
 def test_its_class_is_what_a_node_makes() -> None:
     deployment = load_deployment(apply_sets(TEXT, TABLE.name, ["engine=own_still:Still"]), TABLE.name)
-    assert type(make_engine(deployment, build_layout(deployment))).__module__ == "own_still"
+    assert type(make_shared_engine(deployment, build_layout(deployment))).__module__ == "own_still"
 
 
 def test_an_installed_engine_is_known_by_its_name(site: Path) -> None:
@@ -178,7 +178,7 @@ def test_what_is_not_rigid_is_no_engines(monkeypatch: pytest.MonkeyPatch, engine
     strange = Scene({**scene.bodies, "camera": scene.bodies["red.goal"]}, scene.scenery)
     module = {"bullet": "bullet_engine", "pure": "pure_engine"}[engine]
     monkeypatch.setattr(f"foosim.node.physics.{module}.build_scene", lambda *_: strange)
-    made = make_engine(deployment, layout)
+    made = make_shared_engine(deployment, layout)
     numbers = [0.0] * layout.size
     made.load([layout["camera"]], numbers)
     made.step(deployment.substeps)
@@ -202,7 +202,7 @@ def test_free_bodies_have_sizes_of_their_own(monkeypatch: pytest.MonkeyPatch, en
     strange = Scene({**scene.bodies, "large": replace(scene.bodies["large"], links=(heavy,))}, scene.scenery)
     module = {"bullet": "bullet_engine", "pure": "pure_engine"}[engine]
     monkeypatch.setattr(f"foosim.node.physics.{module}.build_scene", lambda *_: strange)
-    made = make_engine(deployment, layout)
+    made = make_shared_engine(deployment, layout)
     both = [layout["ball"], layout["large"]]
 
     def after(places: list[Vector], velocities: list[Vector], ticks: int) -> list[float]:

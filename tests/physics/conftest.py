@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.physics.making import make_engine
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector, inertia_about_axis
 from tests.placing import place_ball
+from tests.shared_engine import make_shared_engine
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 Motors = tuple[tuple[float, float], tuple[float, float]]
@@ -27,7 +27,7 @@ class World:
         self.table = table_of(self.deployment)
         self.layout = build_layout(self.deployment)
         self.scene = build_scene(self.deployment, self.layout)
-        self.engine = make_engine(self.deployment, self.layout)
+        self.engine = make_shared_engine(self.deployment, self.layout)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.ball = self.layout["ball"]
         self.tick_s = self.deployment.tick_ns / 1e9

@@ -13,7 +13,7 @@ from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.assembly.islands import Assignment, reach_of
+from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
 from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacle, obstacles_of
 from foosim.world.clearance.hall_start import start_findings
@@ -149,7 +149,7 @@ def test_rovers_start_where_they_are_declared() -> None:
 
 def test_each_rover_is_an_island_that_its_owner_solves() -> None:
     layout, owners = build_layout(DEPLOYMENT), DEPLOYMENT.owners()
-    shares = Assignment(layout, reach_of(DEPLOYMENT, layout), ["east", "west"], owners).shares([])
+    shares = Assignment(layout, table_reach_of(DEPLOYMENT, layout), ["east", "west"], owners).shares([])
     for node, share in shares.items():
         mine = [entity for entity in layout.entities if owners[entity.name] == node]
         assert share.islands == tuple((entity.index,) for entity in mine if entity.model == "rover")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.assembly.islands import Assignment, islands_of, reach_of, touching_of
+from foosim.world.assembly.islands import Assignment, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.layout import Layout, build_layout
 from foosim.world.models.rod import RodRobot
@@ -49,7 +49,7 @@ def numbers_with(layout: Layout, balls: Mapping[str, Position], deployment: Depl
 
 
 def islands(layout: Layout, balls: Mapping[str, Position], deployment: Deployment = DEPLOYMENT) -> list[set[str]]:
-    numbers, reach = numbers_with(layout, balls, deployment), reach_of(deployment, layout)
+    numbers, reach = numbers_with(layout, balls, deployment), table_reach_of(deployment, layout)
     found = islands_of(numbers, reach, touching_of(numbers, reach))
     return [{layout.entities[index].name for index in island.entities} for island in found]
 
@@ -60,7 +60,7 @@ def with_ball(position: Position, layout: Layout = LAYOUT) -> set[str]:
 
 def assignment(layout: Layout, nodes: Sequence[str], owners: Mapping[str, str] | None = None) -> Assignment:
     owners = owners or {name: nodes[number % len(nodes)] for number, name in enumerate(sorted(DEPLOYMENT.robots))}
-    return Assignment(layout, reach_of(DEPLOYMENT, layout), sorted(nodes), owners)
+    return Assignment(layout, table_reach_of(DEPLOYMENT, layout), sorted(nodes), owners)
 
 
 def solver_of_ball(position: Position, owners: Mapping[str, str]) -> str:
@@ -70,7 +70,7 @@ def solver_of_ball(position: Position, owners: Mapping[str, str]) -> str:
 
 def by_hand(balls: Mapping[str, Position]) -> list[set[str]]:
     """Islands from their definition: whose grown volumes overlap belong together."""
-    reach = reach_of(DEPLOYMENT, THREE)
+    reach = table_reach_of(DEPLOYMENT, THREE)
     groups = [{name} for name in [*balls, *AXES]]
 
     def join(one: str, other: str) -> None:
@@ -128,7 +128,7 @@ def test_over_the_whole_table_it_holds_one_to_three() -> None:
 
 def test_the_tick_makes_the_island_not_the_speed() -> None:
     numbers = numbers_with(LAYOUT, {"ball": (0.1, 0.0, RADIUS)})
-    reach = reach_of(DEPLOYMENT, LAYOUT)
+    reach = table_reach_of(DEPLOYMENT, LAYOUT)
     at_rest = islands_of(numbers, reach, touching_of(numbers, reach))
     start = LAYOUT["ball"].offsets["linear_velocity"]
     numbers[start : start + 3] = [-SPEED, SPEED, 0.0]

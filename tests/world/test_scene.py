@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.world.assembly.islands import reach_of
+from foosim.world.assembly.islands import table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
@@ -106,7 +106,7 @@ def test_a_ramp_rises_from_goal_edge_and_side_wall_to_the_corner(side_x: float, 
 
 
 def test_islands_reach_as_far_as_bodies_do() -> None:
-    reach = reach_of(DEPLOYMENT, LAYOUT)
+    reach = table_reach_of(DEPLOYMENT, LAYOUT)
     for _, name, axis in reach.rods:
         low, high = swept_box(SCENE.bodies[name])
         assert axis - reach.half_width_m <= low[0] and high[0] <= axis + reach.half_width_m

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
+from foosim.world.assembly.volumes import BodyIsland, Volumes, solver_by_name
 from foosim.world.layout import Layout
 from foosim.world.models.rod import RodRobot, line_x_m
 from foosim.world.parameters.table import TABLE, table_of
@@ -49,14 +50,25 @@ class Island:
 
 @dataclass(frozen=True)
 class Share:
-    """What one node computes in a tick: its islands and, ascending, every entity index in its part."""
+    """What one node computes in a tick: its islands and, ascending, every entity index in its part.
+
+    `movers` are those in the way of each island; empty where nothing has any.
+    """
 
     islands: tuple[tuple[int, ...], ...]
     solved: tuple[int, ...]
+    movers: tuple[tuple[int, ...], ...] = ()
 
 
-def reach_of(spec: WorldSpec, layout: Layout) -> Reach:
-    """Return the bounding volumes of a layout's bodies."""
+def reach_of(spec: WorldSpec, layout: Layout) -> Reach | Volumes:
+    """Return the bounding volumes of a layout's bodies: of any bodies, or of rods and balls alone, which is faster."""
+    if layout.couples:
+        return Volumes(spec, layout)
+    return table_reach_of(spec, layout)
+
+
+def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
+    """Return the bounding volumes of rods and balls, and who moves alone."""
     alone = tuple((entity.index, entity.name) for entity in layout.entities if entity.kind.motion)
     if TABLE not in spec.kits:
         return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
@@ -147,7 +159,9 @@ def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tu
 class Assignment:
     """Shares by node, for one layout, roster and owners; with one ball, equal neighbourhoods give equal shares."""
 
-    def __init__(self, layout: Layout, reach: Reach, roster: Sequence[str], owners: Mapping[str, str]) -> None:
+    def __init__(
+        self, layout: Layout, reach: Reach | Volumes, roster: Sequence[str], owners: Mapping[str, str]
+    ) -> None:
         assert roster and list(roster) == sorted(roster), roster
         self.layout = layout
         self.reach = reach
@@ -161,6 +175,8 @@ class Assignment:
 
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers."""
+        if isinstance(self.reach, Volumes):
+            return self._divide_any(self.reach.islands(numbers))
         touching = touching_of(numbers, self.reach)
         if len(self.reach.balls) > 1:
             return self._divide(islands_of(numbers, self.reach, touching))
@@ -176,7 +192,31 @@ class Assignment:
             solver = self.solver_of(island)
             mine[solver].append(island.entities)
             solved[solver].extend(island.entities)
+        self._add_unsolved(solved)
+        return {node: Share(tuple(mine[node]), tuple(sorted(solved[node]))) for node in self.roster}
+
+    def _divide_any(self, islands: Sequence[BodyIsland]) -> dict[str, Share]:
+        mine: dict[str, list[BodyIsland]] = {node: [] for node in self.roster}
+        solved: dict[str, list[int]] = {node: [] for node in self.roster}
+        for island in islands:
+            if island.nearest:
+                solver = self.owners[island.nearest]
+            else:
+                solver = solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
+            mine[solver].append(island)
+            solved[solver].extend(island.entities)
+        self._add_unsolved(solved)
+        return {
+            node: Share(
+                tuple([island.entities for island in mine[node]]),
+                tuple(sorted(solved[node])),
+                tuple([island.movers for island in mine[node]]),
+            )
+            for node in self.roster
+        }
+
+    def _add_unsolved(self, solved: dict[str, list[int]]) -> None:
+        """Add who stays as it is: its owner copies it, the first node what has none."""
         for entity in self.layout.entities:
             if not entity.is_solved:
                 solved[self.owners.get(entity.name, self.roster[0])].append(entity.index)
-        return {node: Share(tuple(mine[node]), tuple(sorted(solved[node]))) for node in self.roster}

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.sections import fixed_shapes, kits_of
+from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import (
     EntityRule,
     Marked,
@@ -181,6 +182,7 @@ class World:
         self._spec, self._layout = spec, layout
         self.models = models_of(spec, layout)
         self._rules = rules_of(spec, layout)
+        self.has_rules = bool(self._rules)
         fitted = {robot.index: actuators_of(spec, layout, robot) for robot in layout.robots}
         self.actuators: Mapping[int, tuple[FittedActuator, ...]] = {
             index: actuators for index, actuators in fitted.items() if actuators
@@ -232,6 +234,28 @@ class World:
             except Exception as error:
                 raise one.failed(view.tick, error) from error
         return found
+
+    def drives(self, entities: Iterable[Entity], view: View) -> tuple[Drives, ...]:
+        """Return what the actuators of each of these rigid bodies ask of its motors and of its base."""
+        return tuple([self._drives(entity, view) for entity in entities])
+
+    def _drives(self, entity: Entity, view: View) -> Drives:
+        fitted = self.actuators.get(entity.index)
+        if fitted is None:
+            return NO_DRIVES
+        motors = [FREE] * entity.counts.get("joint_positions", 0)
+        wrench: Wrench | None = None
+        for one in fitted:
+            try:
+                asked = one.actuator.command(view)
+                joints = getattr(one.actuator, "joints", None) or range(len(asked))
+                for joint, motor in zip(joints, asked, strict=True):
+                    motors[joint] = Motor(*motor)
+                if hasattr(one.actuator, "wrench"):
+                    wrench = added(wrench, one.actuator.wrench(view))
+            except Exception as error:
+                raise one.failed(view.tick, error) from error
+        return Drives(tuple(motors), wrench)
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
         asked = NO_MOTORS

@@ -47,6 +47,15 @@ joint's motor applied in the last substep."""
 CONTACTS: Final[Mapping[str, int]] = MappingProxyType({"contacts": 3})
 """The contact log of a rigid body in the last tick: count of touches that began, impulse (N s), last substep or -1."""
 
+PARTNERS_MAX: Final = 4
+PARTNERS: Final[Mapping[str, int]] = MappingProxyType(
+    {"partners": References(PARTNERS_MAX), "partner_impulses": PARTNERS_MAX}
+)
+"""Whom a rigid body touched in the last tick, of at most four entities with the greatest impulses, in name order; and
+these impulses (N s)."""
+RESTING: Final[Mapping[str, int]] = MappingProxyType({"slow_ticks": 1})
+"""How many ticks a rigid body has been slow: bodies of an island that all have been for long are at rest."""
+
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
@@ -168,6 +177,8 @@ class Model(Form):
     has_body: bool = True
     """Whether it is somewhere, with an antenna; else only a place of the network can say where."""
     is_rigid: bool = False
+    couples: bool = True
+    """Whether something in it couples its parts, as the motors of an arm do: its island has a solve of its own."""
     motion: str = ""
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

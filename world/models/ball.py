@@ -24,6 +24,7 @@ ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
     slots={**BODY, "quarantined": 1, **CONTACTS},
     is_robot=False,
     is_rigid=True,
+    couples=False,
     kit="table",
 )
 class Ball:

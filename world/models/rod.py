@@ -51,6 +51,7 @@ def line_x_m(spec: WorldSpec, robot: RodRobot) -> float:
         "refused": 1,
     },
     is_rigid=True,
+    couples=False,
     kit="table",
     actuators={"position": {"kind": "joint_position"}},
     units={"joint_positions": ("m", "rad"), "joint_velocities": ("m/s", "rad/s"), "joint_efforts": ("N", "N m")},

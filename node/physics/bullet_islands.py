@@ -1,0 +1,457 @@
+"""Rigid bodies of any kind in Bullet: one island at a time, in an engine that holds that island's bodies and no others.
+
+Bullet sorts the constraints of all islands of a solve by island, unstably, so that what couples inside of a body (the
+motors of an arm) would depend on who else is solved beside it. Therefore an island has a solve of its own. An engine is
+made for a *composition*: the bodies of an island without their names, in name order, and the movers that stand in
+their way. It serves each island of that composition in turn; before each load all that is in it is parked far apart,
+which ends all of Bullet's memory of pairs. tests/laws/test_island_engines.py compares these with engines that hold
+everything, and breaks each rule in turn.
+
+A *mover* has no rigid-body dynamics: it is a multibody without a mass, at the pose and with the velocity that it has at
+the start of the tick, so that others are pushed by it. (Nothing is pushed by a rigid static with a velocity.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from math import fsum, sqrt
+from typing import Any, Final
+
+from foosim.deployment.schema import Deployment
+from foosim.node.physics.bullet_client import (
+    JOINT_TYPES,
+    give_client,
+    make_dynamics,
+    make_shape,
+    make_surface,
+    p,
+    settings_of,
+    start_client,
+)
+from foosim.node.physics.interface import Island
+from foosim.world.assembly.sections import physics_of
+from foosim.world.assembly.volumes import is_felt
+from foosim.world.assembly.world import build_scene
+from foosim.world.components.drives import Motor
+from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
+from foosim.world.kinematics import twist
+from foosim.world.layout import Entity, Layout
+from foosim.world.mesh import Mesh
+from foosim.world.physics import Physics
+from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Hull, Link, Shape, Vector, in_pieces, swept_box
+
+BODIES: Final = 1
+SCENERY: Final = 2
+"""Collision groups: bodies meet everything, what stands meets bodies alone."""
+ENGINES_MAX: Final = 8
+"""Engines that a node keeps: those that were used last."""
+MESH_PIECE: Final = 4096
+"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
+PARKING_Z_M: Final = 1000.0
+PARKING_GAP_M: Final = 10.0
+"""Between parked bodies, beyond what they reach."""
+NO_CONTACT: Final = (0.0, 0.0, -1.0)
+
+Composition = tuple[tuple[int, ...], tuple[int, ...]]
+"""The kinds of an island's bodies, in name order, and those of the movers in their way."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A body in an engine: its id, its joints that move, and where it is parked.
+
+    `joints` are indices of Bullet; `is_free` says that the base moves.
+    """
+
+    id: int
+    body: Body
+    joints: tuple[int, ...]
+    zeros: tuple[float, ...]
+    is_free: bool
+    parking: Vector
+
+
+class BulletIslands:
+    """The rigid bodies of one layout, island by island."""
+
+    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+        self._physics = physics_of(deployment)
+        self._substeps = deployment.substeps
+        self._dt = deployment.tick_ns / 1e9 / deployment.substeps
+        scene = build_scene(deployment, layout)
+        felt = [shape for shape in scene.scenery if shape.surface in self._physics.sides]
+        self._scenery = tuple(in_pieces(felt, MESH_PIECE))
+        self._bodies: dict[int, Body] = {}
+        self._kinds: dict[int, int] = {}
+        """Of each entity with a body: the number of its kind. Entities of one kind differ in name and place alone."""
+        self._unnamed: list[Body] = []
+        known: dict[Body, int] = {}
+        for entity in layout.entities:
+            body = scene.bodies.get(entity.name)
+            if body is not None and is_felt(body, self._physics):
+                unnamed = _without_names(body, is_mover=not entity.is_rigid)
+                self._bodies[entity.index] = body
+                self._kinds[entity.index] = known.setdefault(unnamed, len(known))
+        self._unnamed = list(known)
+        self._engines: dict[Composition, CompositionEngine] = {}
+        """The one that was used last at the end."""
+        self.missed = 0
+        """How many engines were built in the middle of a tick."""
+
+    @classmethod
+    def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletIslands]:
+        """Make one with the engines of single bodies, an engine at a time."""
+        made = cls(deployment, layout)
+        for composition in made.compositions_alone():
+            yield
+            made.build(composition)
+        return made
+
+    def compositions_alone(self) -> list[Composition]:
+        """Return the compositions of single bodies, in the order of their kinds: those that are needed first."""
+        alone: list[Composition] = [((kind,), ()) for kind, body in enumerate(self._unnamed) if not _is_mover(body)]
+        return alone[:ENGINES_MAX]
+
+    def build(self, composition: Composition) -> CompositionEngine:
+        """Build and keep the engine of a composition; the one that was not used for longest goes."""
+        while len(self._engines) >= ENGINES_MAX:
+            self._engines.pop(next(iter(self._engines))).close()
+        bodies = [self._unnamed[kind] for kind in composition[0]]
+        movers = [self._unnamed[kind] for kind in composition[1]]
+        engine = CompositionEngine(self._physics, self._dt, self._substeps, self._scenery, bodies, movers)
+        self._engines[composition] = engine
+        return engine
+
+    def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
+        """Write the next state of an island's bodies into the numbers, which have its present one.
+
+        `start` are the numbers of the tick's start, at which movers are.
+        """
+        kinds = self._kinds
+        composition = (
+            tuple([kinds[entity.index] for entity in island.bodies]),
+            tuple([kinds[entity.index] for entity in island.movers]),
+        )
+        engine = self._engines.pop(composition, None)
+        if engine is None:
+            engine = self.build(composition)
+            self.missed += 1
+        else:
+            self._engines[composition] = engine
+        engine.load(island, [self._bodies[entity.index] for entity in (*island.bodies, *island.movers)], numbers, start)
+        engine.step(island)
+        engine.read(island, numbers)
+
+    def close(self) -> None:
+        """Free all engines."""
+        for engine in self._engines.values():
+            engine.close()
+        self._engines.clear()
+
+
+def _without_names(body: Body, *, is_mover: bool) -> Body:
+    """Return what an engine builds of a body: links without names and looks; a mover has no masses."""
+    links = []
+    for link in body.links:
+        shapes = tuple([_felt(shape) for shape in link.shapes])
+        own = replace(link, mass=0.0, inertia=ORIGIN, centre_of_mass=ORIGIN, principal=UPRIGHT) if is_mover else link
+        links.append(replace(own, name="", shapes=shapes))
+    return Body("", "", ORIGIN, tuple(links))
+
+
+def _felt(shape: Shape) -> Shape:
+    return Shape(shape.geometry, shape.surface, (0.0, 0.0, 0.0, 1.0), shape.position, shape.orientation)
+
+
+def _is_mover(body: Body) -> bool:
+    return all(link.mass == 0.0 for link in body.links)
+
+
+def _as_built(body: Body) -> tuple[Link | None, list[Link]]:
+    """Return a body as Bullet has it: the base of a free body, and links whose parents are Bullet's indices.
+
+    Bullet has no compound of convex hulls: all but one shape of a link with hulls hang on it as links without a mass.
+    """
+    base = body.links[0] if body.is_free else None
+    shift = 0 if base is None else 1
+    links, more = [], []
+    for index, link in enumerate(body.links):
+        first, others = _of_one(link)
+        own = index - shift
+        if own >= 0:
+            links.append(replace(link, shapes=first, parent=link.parent - shift))
+        else:
+            base = replace(link, shapes=first)
+        more += [Link("", "fixed", (shape,), 0.0, ORIGIN, parent=own) for shape in others]
+    return base, [*links, *more]
+
+
+def _of_one(link: Link) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
+    """Return the shapes of a link that Bullet can have as one, and those that it cannot."""
+    hulls = [shape for shape in link.shapes if isinstance(shape.geometry, Hull | Mesh)]
+    others = tuple([shape for shape in link.shapes if shape not in hulls])
+    return (others, tuple(hulls)) if others else (tuple(hulls[:1]), tuple(hulls[1:]))
+
+
+def _reach(body: Body) -> float:
+    """Return how far a body reaches from its base over all its joints' positions (m)."""
+    low, high = swept_box(body)
+    sides = [max(abs(a), abs(b)) for a, b in zip(low, high, strict=True)]
+    return sqrt(sum(side * side for side in sides))
+
+
+class CompositionEngine:
+    """A physics client with scenery and the bodies of one composition, all of them parked between two loads."""
+
+    def __init__(
+        self,
+        physics: Physics,
+        substep_s: float,
+        substeps: int,
+        scenery: Sequence[Shape],
+        bodies: Sequence[Body],
+        movers: Sequence[Body],
+    ) -> None:
+        self._physics, self._dt, self._substeps = physics, substep_s, substeps
+        self._client = start_client(self._settings(), physics.gravity)
+        self._silent: set[int] = set()
+        for shape in scenery:
+            self._make_scenery(shape)
+        self._made: list[_Made] = []
+        at = PARKING_Z_M
+        for body in (*bodies, *movers):
+            reach = _reach(body)
+            at += reach
+            self._made.append(self._make(body, (0.0, 0.0, at)))
+            at += reach + PARKING_GAP_M
+        self._count = len(bodies)
+        self._place = {made.id: place for place, made in enumerate(self._made)}
+        """Of the bodies by their ids: the place in the island, movers behind."""
+        self._touching: set[int] = set()
+        self._impulses: dict[int, dict[int, list[float]]] = {}
+        self._logs: dict[int, tuple[float, float, float]] = {}
+        for made in self._made:
+            self._park(made)
+
+    def _settings(self) -> dict[str, Any]:
+        return settings_of(self._physics, self._dt)
+
+    # --- building ----------------------------------------------------------------------------------------------------
+
+    def _make_scenery(self, shape: Shape) -> None:
+        """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
+        side = self._physics.sides[shape.surface]
+        body: int = p.createMultiBody(
+            baseMass=0.0,
+            baseCollisionShapeIndex=make_shape(self._client, (shape,), placed=False),
+            basePosition=shape.position,
+            baseOrientation=shape.orientation,
+            useMaximalCoordinates=True,
+            physicsClientId=self._client,
+        )
+        p.setCollisionFilterGroupMask(body, -1, SCENERY, BODIES, physicsClientId=self._client)
+        make_surface(self._client, body, -1, side)
+        if side.silent:
+            self._silent.add(body)
+
+    def _make(self, body: Body, parking: Vector) -> _Made:
+        """Make a body as a multibody: a rigid body's world inertia tensor is not reloaded with its pose."""
+        client, (base, links) = self._client, _as_built(body)
+        mass = 0.0 if base is None else base.mass
+        made: int = p.createMultiBody(
+            baseMass=mass,
+            baseCollisionShapeIndex=-1 if base is None else make_shape(client, base.shapes, placed=True),
+            baseInertialFramePosition=ORIGIN if base is None else base.centre_of_mass,
+            baseInertialFrameOrientation=UPRIGHT if base is None else base.principal,
+            linkMasses=[link.mass for link in links],
+            linkCollisionShapeIndices=[make_shape(client, link.shapes, placed=True) for link in links],
+            linkVisualShapeIndices=[-1] * len(links),
+            linkPositions=[link.position for link in links],
+            linkOrientations=[link.orientation for link in links],
+            linkInertialFramePositions=[link.centre_of_mass for link in links],
+            linkInertialFrameOrientations=[link.principal for link in links],
+            linkParentIndices=[link.parent + 1 for link in links],
+            linkJointTypes=[JOINT_TYPES[link.joint] for link in links],
+            linkJointAxis=[link.axis for link in links],
+            useMaximalCoordinates=False,
+            physicsClientId=client,
+        )
+        if base is not None:
+            self._finish(made, -1, base)
+        for index, link in enumerate(links):
+            self._finish(made, index, link)
+        p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
+        joints = tuple([index for index, link in enumerate(links) if link.joint in MOVING])
+        zeros = (0.0,) * len(joints)
+        if joints:
+            p.setJointMotorControlArray(
+                made, joints, p.VELOCITY_CONTROL, targetVelocities=zeros, forces=zeros, physicsClientId=client
+            )
+        return _Made(made, body, joints, zeros, base is not None, parking)
+
+    def _finish(self, made: int, index: int, link: Link) -> None:
+        """Set what a link that was made weighs, and what others feel of it."""
+        client = self._client
+        p.setCollisionFilterGroupMask(made, index, BODIES, BODIES | SCENERY, physicsClientId=client)
+        if link.mass > 0.0:
+            make_dynamics(client, made, index, link.mass, link.inertia)
+        if link.shapes:
+            make_surface(client, made, index, self._physics.sides[link.shapes[0].surface])
+        if link.damping > 0.0:
+            p.changeDynamics(made, index, jointDamping=link.damping, physicsClientId=client)
+        if link.joint in ("prismatic", "revolute"):
+            low, high = link.limits
+            p.changeDynamics(made, index, jointLowerLimit=low, jointUpperLimit=high, physicsClientId=client)
+
+    # --- the tick ----------------------------------------------------------------------------------------------------
+
+    def _park(self, made: _Made) -> None:
+        """Put a body out of the way of all others."""
+        p.resetBasePositionAndOrientation(made.id, made.parking, UPRIGHT, self._client)
+
+    def _wipe(self) -> None:
+        """Forget all contacts: parked, no body is near another or the scenery, which ends each pair."""
+        for made in self._made:
+            self._park(made)
+        p.performCollisionDetection(physicsClientId=self._client)
+
+    def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
+        """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
+        self._wipe()
+        client, reset = self._client, p.resetJointState
+        last = self._substeps - 1.0
+        self._touching = set()
+        for place, (entity, made, body) in enumerate(
+            zip(island.bodies, self._made, bodies[: self._count], strict=False)
+        ):
+            offsets = entity.offsets
+            if made.is_free:
+                at, turned = offsets["position"], offsets["orientation"]
+                speed, spin = offsets["linear_velocity"], offsets["angular_velocity"]
+                p.resetBasePositionAndOrientation(made.id, numbers[at : at + 3], numbers[turned : turned + 4], client)
+                p.resetBaseVelocity(made.id, numbers[speed : speed + 3], numbers[spin : spin + 3], client)
+            else:
+                p.resetBasePositionAndOrientation(made.id, body.position, body.orientation, client)
+            if made.joints:
+                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
+                for number, joint in enumerate(made.joints):
+                    reset(made.id, joint, numbers[at + number], numbers[speed + number], client)
+            if numbers[offsets["contacts"] + 2] == last:
+                self._touching.add(place)
+        for entity, made, body in zip(island.movers, self._made[self._count :], bodies[self._count :], strict=True):
+            self._load_mover(entity, made, body, start)
+        self._command(island)
+
+    def _load_mover(self, entity: Entity, made: _Made, body: Body, start: Sequence[float]) -> None:
+        at, turned = entity.offsets["position"], entity.offsets["orientation"]
+        p.resetBasePositionAndOrientation(made.id, start[at : at + 3], start[turned : turned + 4], self._client)
+        linear, angular = twist(body, entity, start, 0)
+        p.resetBaseVelocity(made.id, linear, angular, self._client)
+
+    def _command(self, island: Island) -> None:
+        """Set the motors of joints: speeds, and the greatest forces with which they are reached."""
+        for made, drives in zip(self._made, island.drives, strict=False):
+            if made.joints:
+                motors = drives.motors
+                speeds = [motor.speed for motor in motors] if motors else made.zeros
+                forces = [motor.force for motor in motors] if motors else made.zeros
+                p.setJointMotorControlArray(
+                    made.id,
+                    made.joints,
+                    p.VELOCITY_CONTROL,
+                    targetVelocities=speeds,
+                    forces=forces,
+                    physicsClientId=self._client,
+                )
+
+    def _push(self, island: Island) -> None:
+        """Apply the efforts of joints and the forces on bases, which Bullet forgets after each substep."""
+        for made, drives in zip(self._made, island.drives, strict=False):
+            efforts = [motor.effort for motor in drives.motors]
+            if any(efforts):
+                p.setJointMotorControlArray(
+                    made.id, made.joints, p.TORQUE_CONTROL, forces=efforts, physicsClientId=self._client
+                )
+            if drives.wrench is not None:
+                force, torque = drives.wrench
+                p.applyExternalForce(made.id, -1, force, ORIGIN, p.LINK_FRAME, physicsClientId=self._client)
+                p.applyExternalTorque(made.id, -1, torque, p.LINK_FRAME, physicsClientId=self._client)
+
+    def step(self, island: Island) -> None:
+        """Advance by the substeps of a tick and log the contacts."""
+        self._impulses, self._logs = {}, {}
+        pushed = [made for made, drives in zip(self._made, island.drives, strict=False) if drives.is_pushed]
+        for substep in range(self._substeps):
+            if pushed:
+                self._push(island)
+            p.stepSimulation(self._client)
+            self._log_contacts(substep)
+
+    def _log_contacts(self, substep: int) -> None:
+        """Count touches that begin, add up impulses by partner, note the last substep.
+
+        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
+        """
+        touched: set[int] = set()
+        places, dt, silent = self._place, self._dt, self._silent
+        for point in p.getContactPoints(physicsClientId=self._client):
+            force = point[9]
+            if force <= 0.0 or point[1] in silent or point[2] in silent:
+                continue
+            one, other = places.get(point[1], -1), places.get(point[2], -1)
+            for place, partner in ((one, other), (other, one)):
+                if 0 <= place < self._count:
+                    touched.add(place)
+                    self._impulses.setdefault(place, {}).setdefault(partner, []).append(force * dt)
+        for place in touched:
+            count, _, _ = self._logs.get(place, NO_CONTACT)
+            self._logs[place] = (count + (place not in self._touching), 0.0, float(substep))
+        self._touching = touched
+
+    def read(self, island: Island, numbers: list[float]) -> None:
+        """Write the state of the island's bodies, and what they touched, into the numbers."""
+        client = self._client
+        everybody = (*island.bodies, *island.movers)
+        for place, (entity, made) in enumerate(zip(island.bodies, self._made, strict=False)):
+            offsets = entity.offsets
+            if made.is_free:
+                position, orientation = p.getBasePositionAndOrientation(made.id, client)
+                velocity, spin = p.getBaseVelocity(made.id, client)
+                at, turned = offsets["position"], offsets["orientation"]
+                numbers[at : at + 3], numbers[turned : turned + 4] = position, orientation
+                at, turned = offsets["linear_velocity"], offsets["angular_velocity"]
+                numbers[at : at + 3], numbers[turned : turned + 3] = velocity, spin
+            if made.joints:
+                self._read_joints(made, entity, numbers, island.drives[place].motors)
+            self._read_log(place, entity, everybody, numbers)
+
+    def _read_joints(self, made: _Made, entity: Entity, numbers: list[float], motors: Sequence[Motor]) -> None:
+        states = p.getJointStates(made.id, made.joints, self._client)
+        offsets = entity.offsets
+        at, speed, effort = offsets["joint_positions"], offsets["joint_velocities"], offsets["joint_efforts"]
+        for number, (position, velocity, _, applied) in enumerate(states):
+            numbers[at + number], numbers[speed + number] = position, velocity
+            # Without a force Bullet keeps what a motor applied last.
+            of_motor = applied if motors and motors[number].force > 0.0 else 0.0
+            numbers[effort + number] = of_motor + (motors[number].effort if motors else 0.0)
+
+    def _read_log(self, place: int, entity: Entity, everybody: Sequence[Entity], numbers: list[float]) -> None:
+        at = entity.offsets["contacts"]
+        count, _, last = self._logs.get(place, NO_CONTACT)
+        by_partner = {partner: fsum(parts) for partner, parts in self._impulses.get(place, {}).items()}
+        numbers[at : at + 3] = count, fsum(by_partner.values()), last
+        if "partners" not in entity.offsets:
+            return
+        met = sorted((-impulse, partner) for partner, impulse in by_partner.items() if partner >= 0)[:PARTNERS_MAX]
+        found = sorted((float(everybody[partner].index), -impulse) for impulse, partner in met)
+        missing = PARTNERS_MAX - len(found)
+        at, impulses = entity.offsets["partners"], entity.offsets["partner_impulses"]
+        numbers[at : at + PARTNERS_MAX] = [index for index, _ in found] + [NO_ENTITY] * missing
+        numbers[impulses : impulses + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing
+
+    def close(self) -> None:
+        """Empty the physics client and keep it for the next engine."""
+        if self._client >= 0:
+            give_client(self._client)
+            self._client = -1

@@ -1,0 +1,211 @@
+"""Bounding volumes of rigid bodies of any kind, and the islands that follow from them.
+
+The volume of a body is the box around its shapes, grown by its declared speed limit x tick; that of a body on a fixed
+base is the box around all that its joints let it reach. Bodies whose volumes overlap are an island. Movers (bodies that
+go on by a motion) are in no island: each island has those in whose way it is. Everything follows from the frame; only
++ - x / sqrt and comparisons, element by element, so that all CPUs agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.world.assembly.sections import physics_of
+from foosim.world.assembly.world import build_scene
+from foosim.world.layout import Entity, Layout
+from foosim.world.physics import Physics
+from foosim.world.scene import UPRIGHT, Body, Vector, conjugate, moved, rotate, swept_box
+from foosim.world.spec import WorldSpec
+
+Numbers: TypeAlias = NDArray[np.float64]
+
+MARGIN_M: Final = 0.001
+"""Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyIsland:
+    """Bodies that could touch one another within the tick, the movers that could touch them, and the robot whose owner
+    solves them (its name; empty without one). Indices of entities, ascending."""
+
+    entities: tuple[int, ...]
+    movers: tuple[int, ...]
+    nearest: str
+
+
+def is_felt(body: Body, physics: Physics) -> bool:
+    """Whether rigid bodies feel a body: it has a shape, and all of its shapes have surfaces that they know."""
+    surfaces = [shape.surface for link in body.links for shape in link.shapes]
+    return bool(surfaces) and all(surface in physics.sides for surface in surfaces)
+
+
+class Volumes:
+    """The volumes of the rigid bodies and movers of one layout."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        physics, tick_s = physics_of(spec), spec.tick_ns / 1e9
+        bodies = build_scene(spec, layout).bodies
+        felt = [
+            (entity, bodies[entity.name])
+            for entity in layout.entities
+            if entity.is_solved and entity.name in bodies and is_felt(bodies[entity.name], physics)
+        ]
+        self._layout = layout
+        self._entities = [entity for entity, _ in felt]
+        self._is_mover = [not entity.is_rigid for entity in self._entities]
+        free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
+        self._free = np.array([row for row, _, _ in free], np.intp)
+        self._positions = np.array([entity.offsets["position"] for _, entity, _ in free], np.intp)
+        self._orientations = np.array([entity.offsets["orientation"] for _, entity, _ in free], np.intp)
+        self._position_of = {entity.index: entity.offsets["position"] for _, entity, _ in free}
+        middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
+        self._middles = np.array(middles).reshape(-1, 3)
+        self._halves = np.array(halves).reshape(-1, 3)
+        self._grown = np.array([body.speed_limit * tick_s + MARGIN_M for _, _, body in free])
+        self._boxes = np.zeros((len(felt), 2, 3))
+        for row, (_, body) in enumerate(felt):
+            if not body.is_free:
+                low, high = swept_box(body)
+                self._boxes[row] = [[side - MARGIN_M for side in low], [side + MARGIN_M for side in high]]
+        self._fixed = {entity.index: body.position for entity, body in felt if not body.is_free}
+        self._alone = [
+            (entity.index, entity.name if entity.is_robot else "")
+            for entity in layout.entities
+            if entity.is_solved and not entity.is_rigid
+        ]
+        """Movers and others that touch nobody: each is solved by itself."""
+
+    def islands(self, numbers: Sequence[float]) -> list[BodyIsland]:
+        """Return the islands of an edited frame, and those that move alone, in the order of their first entities."""
+        boxes = self._boxes_at(numbers)
+        pairs = overlapping(boxes)
+        group = list(range(len(self._entities)))
+        movers: list[tuple[int, int]] = []
+        for one, other in pairs:
+            if self._is_mover[one] or self._is_mover[other]:
+                if not (self._is_mover[one] and self._is_mover[other]):
+                    movers.append((one, other) if self._is_mover[one] else (other, one))
+                continue
+            _join(group, one, other)
+        members: dict[int, list[int]] = {}
+        for row, is_mover in enumerate(self._is_mover):
+            if not is_mover:
+                members.setdefault(_root(group, row), []).append(row)
+        in_the_way: dict[int, set[int]] = {}
+        for mover, row in movers:
+            in_the_way.setdefault(_root(group, row), set()).add(self._entities[mover].index)
+        found = []
+        for root, rows in members.items():
+            entities = [self._entities[row] for row in rows]
+            near = tuple(sorted(in_the_way.get(root, ())))
+            indices = tuple([entity.index for entity in entities])
+            found.append(BodyIsland(indices, near, self._nearest(entities, numbers)))
+        found += [BodyIsland((index,), (), name) for index, name in self._alone]
+        return sorted(found, key=lambda island: island.entities)
+
+    def _boxes_at(self, numbers: Sequence[float]) -> Numbers:
+        """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
+        boxes = self._boxes.copy()
+        if len(self._free):
+            values = np.array(numbers)
+            x, y, z, w = (values[self._orientations + part] for part in range(4))
+            rows = _rotation(x, y, z, w)
+            middle = np.stack([values[self._positions + axis] for axis in range(3)])
+            half = np.zeros_like(middle)
+            for axis in range(3):
+                for part in range(3):
+                    middle[axis] += rows[axis][part] * self._middles[:, part]
+                    half[axis] += np.abs(rows[axis][part]) * self._halves[:, part]
+            half += self._grown
+            boxes[self._free, 0] = (middle - half).T
+            boxes[self._free, 1] = (middle + half).T
+        return boxes
+
+    def _nearest(self, entities: Sequence[Entity], numbers: Sequence[float]) -> str:
+        """Return the robot nearest to an object of an island, ties by name; the first robot without an object."""
+        robots = [entity for entity in entities if entity.is_robot]
+        objects = [entity for entity in entities if not entity.is_robot]
+        if len(robots) <= 1 or not objects:
+            return robots[0].name if robots else ""
+        places = [self._place(entity, numbers) for entity in objects]
+        distances = []
+        for robot in robots:
+            x, y, z = self._place(robot, numbers)
+            squares = [(x - a) * (x - a) + (y - b) * (y - b) + (z - c) * (z - c) for a, b, c in places]
+            distances.append((min(squares), robot.name))
+        return min(distances)[1]
+
+    def _place(self, entity: Entity, numbers: Sequence[float]) -> Vector:
+        at = self._position_of.get(entity.index)
+        return self._fixed[entity.index] if at is None else (numbers[at], numbers[at + 1], numbers[at + 2])
+
+
+def solver_by_name(first: str, roster: Sequence[str]) -> str:
+    """Return the node that solves an island without a robot: it follows from the name of its first entity, so that
+    loose objects spread over the nodes."""
+    return roster[int.from_bytes(blake2b(first.encode(), digest_size=8).digest(), "little") % len(roster)]
+
+
+def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
+    """Return the pairs of boxes (n, 2, 3) that overlap, each with the lower row first, in order.
+
+    Boxes are swept along x, those of one least x by their rows.
+    """
+    order = np.argsort(boxes[:, 0, 0], kind="stable")
+    low, high = boxes[order, 0], boxes[order, 1]
+    ends = np.searchsorted(low[:, 0], high[:, 0], side="right")
+    rows = order.tolist()
+    pairs: list[tuple[int, int]] = []
+    for place, end in enumerate(ends.tolist()):
+        if end <= place + 1:
+            continue
+        others = slice(place + 1, end)
+        near = (low[others, 1] <= high[place, 1]) & (high[others, 1] >= low[place, 1])
+        near &= (low[others, 2] <= high[place, 2]) & (high[others, 2] >= low[place, 2])
+        for other in near.nonzero()[0].tolist():
+            one, two = rows[place], rows[place + 1 + other]
+            pairs.append((one, two) if one < two else (two, one))
+    return sorted(pairs)
+
+
+def _own_box(body: Body) -> tuple[Vector, Vector]:
+    """Return the middle of the box around a free body, from its centre of mass in its principal axes, and half of its
+    sides. That of a body with joints is around all that these reach."""
+    base = body.links[0]
+    low, high = swept_box(body)
+    back = conjugate(base.principal)
+    half = (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2
+    middle = rotate(back, moved(moved(low, half, 1.0), base.centre_of_mass, -1.0))
+    if base.principal == UPRIGHT:
+        return middle, half
+    sides = [rotate(back, side) for side in ((half[0], 0.0, 0.0), (0.0, half[1], 0.0), (0.0, 0.0, half[2]))]
+    x, y, z = (sum(abs(side[axis]) for side in sides) for axis in range(3))
+    return middle, (x, y, z)
+
+
+def _rotation(x: Numbers, y: Numbers, z: Numbers, w: Numbers) -> list[list[Numbers]]:
+    """Return the rows of the rotation matrices of unit quaternions."""
+    return [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+
+
+def _root(group: list[int], row: int) -> int:
+    while group[row] != row:
+        group[row] = group[group[row]]
+        row = group[row]
+    return row
+
+
+def _join(group: list[int], one: int, other: int) -> None:
+    """Make two rows be of one group, whose root is its lowest row."""
+    low, high = sorted((_root(group, one), _root(group, other)))
+    group[high] = low

@@ -1,0 +1,55 @@
+"""What is asked of a rigid body in a tick: of its motors, and what acts on its base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
+
+from foosim.world.scene import Vector, moved
+
+
+class Motor(NamedTuple):
+    """What is asked of the motor of a joint: a speed, the greatest force with which it is reached, an effort beside it.
+
+    SI units: m/s or rad/s, N or N m. The effort acts throughout the tick.
+    """
+
+    speed: float
+    force: float
+    effort: float = 0.0
+
+
+Wrench: TypeAlias = tuple[Vector, Vector]
+"""A force (N) at the centre of mass of a free base, and a torque (N m)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drives:
+    """What is asked of a body: of its motors, in the order of its joints, and what acts on its base, in the principal
+    axes of the base. Motors of a body without any actuator are free."""
+
+    motors: tuple[Motor, ...] = ()
+    wrench: Wrench | None = None
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether something has to be applied again in each substep."""
+        return self.wrench is not None or any(motor.effort != 0.0 for motor in self.motors)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether something is asked that moves a body: what holds its joints in place does not."""
+        return self.is_pushed or any(motor.speed != 0.0 and motor.force != 0.0 for motor in self.motors)
+
+
+FREE: Final = Motor(0.0, 0.0)
+"""What is asked of a joint that nothing drives."""
+NO_DRIVES: Final = Drives()
+
+
+def added(one: Wrench | None, other: Wrench) -> Wrench:
+    """Return both together."""
+    if one is None:
+        return other
+    (force, torque), (more, turning) = one, other
+    return moved(force, more, 1.0), moved(torque, turning, 1.0)
