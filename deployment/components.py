@@ -15,11 +15,11 @@ from foosim.common.spec_base import SpecBase
 from foosim.common.units import parse_ns, period_ticks
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule
+from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule, with_article
 from foosim.world.forms.misfits import (
     component_problems,
     model_problems,
-    models_of_robots,
+    models_of,
     needs_kit,
     rule_problems,
 )
@@ -36,6 +36,7 @@ from foosim.world.spec import KITS
 
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
+ROBOTS: Final = "robots"
 OF_MODEL: Final = ("actuators", "rules")
 """The sections of which a robot that says nothing has those of its model."""
 
@@ -57,7 +58,10 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
     reader.kits = {*read[KITS]}
     robots = data.get("robots")
     if isinstance(robots, dict):
-        read["robots"] = {name: reader.robot(("robots", name), robot) for name, robot in robots.items()}
+        read["robots"] = {name: reader.entity(("robots", name), robot) for name, robot in robots.items()}
+    objects = data.get("objects")
+    if isinstance(objects, dict):
+        read["objects"] = {name: reader.entity(("objects", name), one) for name, one in objects.items()}
     rules = data.get("rules")
     if isinstance(rules, dict):
         read["rules"] = {
@@ -113,8 +117,8 @@ class _Reader:
             self.findings += settings_findings(error, settings, (name,))
             return SpecBase.model_construct()
 
-    def robot(self, location: Location, robot: Any) -> Any:
-        """Return the settings of a robot; in place of what is refused, settings that say its model alone."""
+    def entity(self, location: Location, robot: Any) -> Any:
+        """Return the settings of a robot or an object; in place of what is refused, settings of its model alone."""
         if not isinstance(robot, dict):
             return robot
         name = robot.get("model")
@@ -126,24 +130,26 @@ class _Reader:
         try:
             model = registry.find_model(name)
         except UnknownName as error:
-            choices = [other.name for other in models_of_robots()]
+            choices = [other.name for other in models_of(robots=location[0] == ROBOTS)]
             refused = error if ":" in name else registry.unknown("model", name, choices)
             self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
         except Refused as error:
             self.findings.append(Finding((*location, "model"), error.what, name))
         else:
-            return self._robot_of(model, location, robot)
+            return self._entity_of(model, location, robot)
         self._components_of(None, location, robot)
         return RobotSettings.model_construct(model=name)
 
-    def _robot_of(self, model: Model, location: Location, robot: Mapping[str, Any]) -> Any:
-        if not model.is_robot:
-            what = f"no model of robots: {model.name} is there without an owner"
+    def _entity_of(self, model: Model, location: Location, robot: Mapping[str, Any]) -> Any:
+        noun = "robot" if location[0] == ROBOTS else "object"
+        if model.is_robot != (noun == "robot"):
+            other = "is there without an owner" if noun == "robot" else "has an owner, and stands in robots"
+            what = f"no model of {noun}s: {model.name} {other}"
             self.findings.append(Finding((*location, "model"), what, robot["model"]))
             return RobotSettings.model_construct(model=model.name)
-        for what in (*needs_kit(model, self.kits, "a robot"), *model_problems(model, self.kits)):
+        for what in (*needs_kit(model, self.kits, f"{with_article(noun)}"), *model_problems(model, self.kits)):
             self.findings.append(Finding((*location, "model"), what, robot["model"]))
-        for section in OF_MODEL:
+        for section in OF_MODEL if noun == "robot" else ():
             if robot.get(section) is None:
                 robot = {**robot, section: dict(getattr(model, section))}
         found = self._components_of(model, location, robot)

@@ -16,7 +16,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.players.ball_filter import Ball, BallTrack, moved
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.models.rod import RodRobot
 from foosim.world.parameters.table import TEAMS, table_of
 from foosim.world.sensors.ball import BallPosition, BallSettings

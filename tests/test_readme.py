@@ -28,7 +28,7 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
 
 ROOT: Final = Path(__file__).parents[1]
@@ -134,7 +134,7 @@ def test_the_readmes_player_plays(house: Path) -> None:
     sent = capture.packets.where(capture.packets.source == "player-red")
     rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
     assert set(sent.destination) == set(rods)
-    commands: list[Command] = [codec_of("joint_position", "actuator").decode(payload) for payload in sent.payload]
+    commands: list[Command] = [codec_of("rod_position", "actuator").decode(payload) for payload in sent.payload]
     assert {command.spin for command in commands} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
     assert len(capture.frame_blocks) == 3, "something was added, and removed again"

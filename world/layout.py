@@ -211,7 +211,7 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     memory, of_world = _memory(spec)
     if of_world:
         models[WORLD] = WORLD
-    models |= {name: robot.model for name, robot in spec.robots.items()}
+    models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
@@ -302,10 +302,11 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
     place: Location = ("robots", name)
     model = _model(robot.model)
+    joints = model.slots.get("joint_positions", 0)
     yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
-        slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns))
+        slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
@@ -314,7 +315,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     for label, sensor in sorted(robot.sensors.items()):
         component = registry.find_component("sensor", sensor.kind)
         period_ns = least_period_ns(spec, component, sensor)
-        slots = _slots(label, component, sensor, Carrier(0, period_ns))
+        slots = _slots(label, component, sensor, Carrier(0, period_ns, joints))
         slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor), period_ns)
         slots[f"{label}.{SAMPLES}"] = 1
         yield Declaring(f"sensor {label}", (*place, "sensors", label), slots, is_owners=True)

@@ -1,9 +1,14 @@
 """What the rigid bodies of a world feel: gravity, and what free bodies feel of each surface."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from foosim.common import units
+from foosim.common.spec_base import Coefficient, Gravity, Restitution, SpecBase, default
+from foosim.common.units import Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,3 +53,46 @@ class Physics:
     solver_iterations: int
     contact_erp: float
     sides: Mapping[str, Side] = field(default_factory=dict)
+
+
+RollingLength = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
+
+
+class SurfaceSettings(SpecBase):
+    """What a surface brings to its contacts: `friction` and `restitution` of a pair are the products of both sides'.
+
+    `rolling_friction` is a length: the moment that brakes a body that rolls is this times the normal force, times the
+    other side's friction.
+    """
+
+    friction: Coefficient = 0.8
+    restitution: Restitution = 0.0
+    rolling_friction: RollingLength = default("0 m")
+
+
+class PhysicsSettings(SpecBase):
+    """What all rigid bodies of a world feel: gravity (standard gravity by default, ISO 80000-3), and how often the
+    solver iterates over the contacts and joints of a substep. `contact_erp` is the share of an overlap that a substep
+    corrects.
+    """
+
+    gravity: Gravity = default("9.80665 m/s2")
+    solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
+    contact_erp: Annotated[float, Field(ge=0, le=1)] = 0.05
+
+
+DEFAULT: Final = "default"
+BASIC: Final = (DEFAULT, "floor", "walls")
+"""Surfaces that each world has; those of these names in a deployment replace them."""
+
+
+def physics_from(settings: PhysicsSettings | None, surfaces: Mapping[str, SurfaceSettings]) -> Physics:
+    """Return what rigid bodies feel in a world without a kit that says it."""
+    felt = PhysicsSettings.model_validate({}) if settings is None else settings
+    plain = SurfaceSettings.model_validate({})
+    sides = {
+        name: Side(one.restitution, one.friction, one.rolling_friction)
+        for name, one in {**dict.fromkeys(BASIC, plain), **surfaces}.items()
+    }
+    nothing = Contact(0.0, 0.0)
+    return Physics(felt.gravity, {}, nothing, felt.solver_iterations, felt.contact_erp, sides)

@@ -9,8 +9,9 @@ from pydantic import Field, PrivateAttr, SerializeAsAny
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
-from foosim.world.forms.settings import RobotSettings, RuleSettings, SceneSettings
+from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.mesh import Mesh
+from foosim.world.physics import PhysicsSettings, SurfaceSettings
 from foosim.world.scene import Shape
 from foosim.world.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, open_meshes, scenery_shape
 
@@ -18,6 +19,7 @@ KITS: Final = "kits"
 """The field of kits' sections, which in a file stand each under the name of its kit."""
 KITS_MAX: Final = 16
 RULES_MAX: Final = 64
+SURFACES_MAX: Final = 64
 
 Section = TypeVar("Section", bound=SpecBase)
 
@@ -47,6 +49,9 @@ class WorldSpec(SpecBase):
     scene: SerializeAsAny[SceneSettings] | None = None
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
+    physics: PhysicsSettings | None = None
+    surfaces: dict[Name, SurfaceSettings] = Field(default={}, max_length=SURFACES_MAX)
+    objects: dict[RobotName, SerializeAsAny[EntitySettings]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     _contents: Contents = PrivateAttr(default_factory=Contents)
 
@@ -55,6 +60,10 @@ class WorldSpec(SpecBase):
         found = self.kits[kit]
         assert isinstance(found, kind), found
         return found
+
+    def settings_of(self, name: str) -> EntitySettings | None:
+        """Return the settings of a robot or an object; None of an entity that a kit brings, or that was added."""
+        return self.robots.get(name) or self.objects.get(name)
 
     def with_contents(self, contents: Contents) -> Self:
         """The same with what is in the files that it names."""

@@ -29,7 +29,11 @@ from foosim.world.scenery import SCENERY_MAX
 
 REST: Final = "rest"
 ROBOTS: Final = "robots"
-FLEETS: Final[Mapping[str, int]] = {ROBOTS: limits.ENTITIES_MAX, "scenery": SCENERY_MAX}
+FLEETS: Final[Mapping[str, int]] = {
+    ROBOTS: limits.ENTITIES_MAX,
+    "objects": limits.ENTITIES_MAX,
+    "scenery": SCENERY_MAX,
+}
 """Sections whose entries may have a count, and how many entries there are at most."""
 FOR_ROBOTS: Final[Mapping[str, int]] = {"players": limits.CLIENTS_MAX, "clients": limits.CLIENTS_MAX}
 """The same of those whose entries may be for each robot."""

@@ -21,6 +21,8 @@ from foosim.deployment.text.yaml import Fields, Leaf, Place, Scalar, Tree, plain
 COUNT: Final = "count"
 SPACING: Final = "spacing"
 AXES: Final = ("x", "y", "z")
+AT: Final = "at"
+"""The pose of an entry that has one: what is spaced stands there."""
 
 _MEMBER: Final = re.compile(r"(?P<fleet>.+)-(?P<number>[1-9][0-9]{0,8})")
 _UNIT: Final = re.compile(r"[A-Za-z]+ *$")
@@ -144,6 +146,8 @@ def member(fleet: Fleet, number: int, own: Tree | None, templates: Templates) ->
     raw = fleet.raw if own is None else merged(fleet.raw, own)
     entry = templates.applied(raw, (fleet.path[0], f"{fleet.path[1]}-{number}"))
     placed = own.values if isinstance(own, Fields) else {}
+    if isinstance(placed.get(AT), Fields):
+        placed = placed[AT].values  # type: ignore[union-attr]
     return _moved(entry, {axis: step for axis, step in fleet.spacing.items() if axis not in placed}, number - 1)
 
 
@@ -151,6 +155,9 @@ def _moved(entry: Tree, spacing: Mapping[str, Step], steps: int) -> Tree:
     """Return an entry further along the axes, by a number of steps."""
     if steps == 0 or not spacing or not isinstance(entry, Fields):
         return entry
+    there = entry.values.get(AT)
+    if isinstance(there, Fields):
+        return Fields(entry.place, {**entry.values, AT: _moved(there, spacing, steps)}, entry.keys)
     moved = Fields(entry.place, dict(entry.values), dict(entry.keys))
     for axis, step in spacing.items():
         there = entry.values.get(axis)

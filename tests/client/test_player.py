@@ -20,7 +20,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.encoder import RodPosition
 from tests.turns import BY_PERIOD
@@ -159,7 +159,7 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
         ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a command"),
-        ({"red.goal": Command(0.0, "up")}, "joint_position.spin is not a number, 'up'"),  # type: ignore[arg-type]
+        ({"red.goal": Command(0.0, "up")}, "rod_position.spin is not a number, 'up'"),  # type: ignore[arg-type]
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
         (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),

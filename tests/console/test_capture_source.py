@@ -186,7 +186,7 @@ def test_what_a_branch_says_is_what_up_takes(run: Path, tmp_path: Path, monkeypa
     (tmp_path / "table.yaml").write_text(Recording(run).about.deployment_text)
     text, _ = asyncio.run(ask(0))
     assert "#" not in text
-    for one in ("robots.camera.sensors.ball.modifiers=[]", "robots.red.goal.actuators={loop: {kind: joint_position}}"):
+    for one in ("robots.camera.sensors.ball.modifiers=[]", "robots.red.goal.actuators={loop: {kind: rod_position}}"):
         (tmp_path / "table.yaml").write_text(apply_sets(Recording(run).about.deployment_text, "table.yaml", [one]))
         text, _ = asyncio.run(ask(0))
         assert "is not what the run had" in text, one

@@ -63,7 +63,7 @@ def driver(robots: Sequence[str], kind: str, bounds: Sequence[float], rate: str)
 def _table() -> dict[str, Any]:
     data: dict[str, Any] = yaml.safe_load((DEPLOY / "table.yaml").read_text())
     data["robots"] = {rod: {**data["robots"][rod], "sensors": {}} for rod in RODS} | {"camera": {"model": "camera"}}
-    data["players"] = driver(RODS, "joint_position", (0.1, 20.0), "50 Hz")
+    data["players"] = driver(RODS, "rod_position", (0.1, 20.0), "50 Hz")
     data["table"]["rules"] |= {"kickoff_delay": "20 ms", "kickoff_speed": "4 m/s"}
     return data | {"engine": "pure", "substeps": 1, "nodes": {"n": {"robots": ["*"]}}, "network": {"links": [LINK]}}
 
@@ -151,7 +151,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "odometry"): sensor(HALL, ROVERS, "odometry"),
     ("sensor", "pose"): sensor(HALL, ROVERS, "pose"),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
-    ("actuator", "joint_position"): TABLE,
+    ("actuator", "rod_position"): TABLE,
     ("actuator", "wheel_speeds"): HALL,
     ("modifier", "bias_walk"): modifier("bias_walk", {"walk": {"position": "1 mm"}}, {"initial": "10 mm/s"}),
     ("modifier", "clip"): modifier("clip", {"high": {"position": "1 m"}}, {"low": "-1 m/s", "high": "500 mm/s"}),

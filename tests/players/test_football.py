@@ -11,7 +11,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.players.football import Team
 from foosim.rehearsal.run import rehearse
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.parameters.table import LINE_NAMES, table_of
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.encoder import RodPosition

@@ -155,7 +155,7 @@ def refusals(captured: Captured, tmp_path: Path) -> Iterator[tuple[str, str, str
     yield __file__, "", "no MCAP file"
     yield f"{alone}@0.1s", "tick=1 ms", "the capture has ticks of 2 ms, the deployment of 1 ms"
     yield f"{alone}@0.1s", camera, "does not fit the capture: components of camera are ball in the capture, eye in the"
-    loop = "robots.red.goal.actuators={loop: {kind: joint_position}}"
+    loop = "robots.red.goal.actuators={loop: {kind: rod_position}}"
     have, want = "encoder, position in the capture", "encoder, loop in the deployment"
     yield f"{alone}@0.1s", loop, f"does not fit the capture: components of red.goal are {have}, {want}"
 

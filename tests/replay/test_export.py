@@ -18,14 +18,14 @@ from foosim.analysis.export import export_capture
 from foosim.analysis.tables import table_names
 from foosim.capture.reader import open_capture
 from foosim.common.errors import BadValue, Failed
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
 from tests.replay.conftest import TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 KINDS: Final = {
     "ball": ("ball", "sensor"),
     "encoder": ("encoder", "sensor"),
-    "position": ("joint_position", "actuator"),
+    "position": ("rod_position", "actuator"),
 }
 """What the table's channels carry."""
 

@@ -50,8 +50,8 @@ def problems(text: str, *sets: str) -> list[str]:
          "proximity, or any module:Class), 'pos', nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
-        ("robots.rover01.actuators={drive: {kind: joint_position}}",
-         "robots.rover01.actuators.drive.kind: actuator of a table in a world without one, 'joint_position'"),
+        ("robots.rover01.actuators={drive: {kind: rod_position}}",
+         "robots.rover01.actuators.drive.kind: actuator of a table in a world without one, 'rod_position'"),
         ("robots.base.sensors={cells: {kind: battery, rate: 1 Hz}}",
          "robots.base.sensors.cells.kind: sensor that a station cannot carry, which has no charge (valid on: rover), "
          "'battery'"),

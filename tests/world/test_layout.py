@@ -90,7 +90,7 @@ def test_what_an_actuator_remembers_is_the_solvers() -> None:
 
 
 SENSOR: Final = "{kind: encoder, rate: 100 Hz}"
-SLIDE: Final = "{kind: joint_position}"
+SLIDE: Final = "{kind: rod_position}"
 
 
 def laid_out(*sets: str) -> Layout:

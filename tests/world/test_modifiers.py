@@ -41,7 +41,7 @@ class Rod:
     def __init__(self, modifiers: str, of: str = "sensor") -> None:
         sets = [f"{ENCODER}.modifiers={modifiers}"]
         if of == "actuator":
-            sets = [f"robots.red.goal.actuators={{position: {{kind: joint_position, modifiers: {modifiers}}}}}"]
+            sets = [f"robots.red.goal.actuators={{position: {{kind: rod_position, modifiers: {modifiers}}}}}"]
         self.deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
         self.layout = build_layout(self.deployment)
         self.entity = self.layout["red.goal"]
@@ -187,7 +187,7 @@ MODIFIED: Final = (
     "{kind: delay, time: 25 ms}, {kind: drop_out, probability: 10 %}, {kind: quantise, step: {slide: 0.1 mm}}, "
     "{kind: clip, high: {slide: 5 cm}}, {kind: gaussian_noise, std: {slide: 0.2 mm, spin: 1 deg}}]",
     "robots.camera.sensors.ball.modifiers=[{kind: frame_change, yaw: 10 deg}, {kind: delay, time: 10 ms}]",
-    "robots.blue.goal.actuators={position: {kind: joint_position, modifiers: [{kind: delay, time: 15 ms}, "
+    "robots.blue.goal.actuators={position: {kind: rod_position, modifiers: [{kind: delay, time: 15 ms}, "
     "{kind: drop_out, probability: 5 %}, {kind: gaussian_noise, std: {spin: 1 deg}}]}}",
     "table.rules.kickoff_delay=20 ms",
 )

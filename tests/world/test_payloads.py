@@ -16,7 +16,7 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
-from foosim.world.actuators.joint_position import Command
+from foosim.world.actuators.rod_position import Command
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
@@ -34,7 +34,7 @@ ENCODER = CommandEncoder(DEPLOYMENT)
 VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "encoder": (RodPosition(0.1, -2.5), [0.1, -2.5], ["m", "rad"]),
     "ball": (BallPosition(1 / 3, -0.0, 1e-300), [1 / 3, -0.0, 1e-300], ["m", "m", "m"]),
-    "joint_position": (Command(-0.12, 1.5), [-0.12, 1.5], ["m", "rad"]),
+    "rod_position": (Command(-0.12, 1.5), [-0.12, 1.5], ["m", "rad"]),
     "pose": (Pose(1 / 3, -7.5, 3.1), [1 / 3, -7.5, 3.1], ["m", "m", "rad"]),
     "odometry": (WheelTravel(12.5, -0.25), [12.5, -0.25], ["m", "m"]),
     "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
@@ -42,7 +42,7 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
 }
 """A value of each kind, its numbers, and the units of its fields."""
-SIZES = {"encoder": 16, "ball": 24, "joint_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
+SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 """In bytes, of the kinds that have as many numbers always."""
 
 
@@ -117,7 +117,7 @@ def test_what_does_not_fit_says_why(payload: bytes, text: str) -> None:
 def test_the_codec_of_each_channel() -> None:
     for robot, channel, kind, value in (
         ("red.goal", "encoder", "encoder", RodPosition),
-        ("red.goal", "position", "joint_position", Command),
+        ("red.goal", "position", "rod_position", Command),
         ("camera", "ball", "ball", BallPosition),
     ):
         found = channel_codec(DEPLOYMENT, robot, channel)
@@ -151,11 +151,11 @@ def test_an_unknown_robot_names_the_nearest() -> None:
         (Command(0.1231, 0.0), "slide of red.goal is not within -0.123 to 0.123 m, 0.1231"),
         (Command(-0.1231, 0.0), "slide of red.goal is not within -0.123 to 0.123 m, -0.1231"),
         (Command(0.0, 1000.1), "spin of red.goal is not within -1000.0 to 1000.0 rad, 1000.1"),
-        (Command(nan, 0.0), "joint_position.slide is not finite, nan"),
-        (Command(0.0, -inf), "joint_position.spin is not finite, -inf"),
-        (Command(10**400, 0.0), f"joint_position.slide is not finite, 1{'0' * 43}...0"),
-        (Command("left", 0.0), "joint_position.slide is not a number, 'left'"),  # type: ignore[arg-type]
-        (Command(0.0, None), "joint_position.spin is not a number, null"),  # type: ignore[arg-type]
+        (Command(nan, 0.0), "rod_position.slide is not finite, nan"),
+        (Command(0.0, -inf), "rod_position.spin is not finite, -inf"),
+        (Command(10**400, 0.0), f"rod_position.slide is not finite, 1{'0' * 43}...0"),
+        (Command("left", 0.0), "rod_position.slide is not a number, 'left'"),  # type: ignore[arg-type]
+        (Command(0.0, None), "rod_position.spin is not a number, null"),  # type: ignore[arg-type]
     ],
 )
 def test_a_command_out_of_reach_is_told_to_the_sender(command: Command, text: str) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
-from foosim.world.actuators.joint_position import ANGLE_RAD_MAX, Command, PositionActuator
+from foosim.world.actuators.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import View, WritableView

@@ -236,7 +236,7 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     assert names("sensor") == ["ball", "battery", "encoder", "odometry", "pose", "proximity"]
-    assert names("actuator") == ["joint_position", "wheel_speeds"]
+    assert names("actuator") == ["rod_position", "wheel_speeds"]
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]
@@ -269,7 +269,7 @@ print(json.dumps([found, [name for name in sys.modules if name.startswith(folder
     [
         ("sensor", "encodr", ", nearest is 'encoder'"),
         ("sensor", "Pose", ", nearest is 'pose'"),
-        ("sensor", "joint_position", ""),
+        ("sensor", "rod_position", ""),
         ("sensor", "", ""),
         ("sensor", "..", ""),
         ("sensor", "pose.PoseTracker", ""),
@@ -408,7 +408,7 @@ def test_a_package_gives_its_components_by_name(site: Path) -> None:
     assert find("sensor", "reach").module == "own_gauges"
     assert find("actuator", "winch").module == "own_winch"
     assert {"reach", "encoder"} < set(names("sensor"))
-    assert names("actuator") == ["joint_position", "wheel_speeds", "winch"]
+    assert names("actuator") == ["rod_position", "wheel_speeds", "winch"]
 
 
 def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
@@ -634,7 +634,7 @@ def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
     )
 
 
-LOOP: Final = "{kind: joint_position}"
+LOOP: Final = "{kind: rod_position}"
 
 
 @pytest.mark.parametrize("actuators", ["{}", "null", f"{{loop: {LOOP}}}", f"{{one: {LOOP}, two: {LOOP}}}"])

@@ -1,86 +1,75 @@
-"""The rod's position actuator: a proportional loop from set-points of position and angle to motor speeds, limited.
-
-Target speed = gain x error, at most the drive's speed; the motor reaches it with at most the drive's force. The loop is
-the one of the original table (`docs/reference/table.md`); its gains and limits are in the deployment.
-"""
+"""Joints to positions: a proportional loop from set-points to the speeds of the joints' motors."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Annotated
 
 from msgspec import Struct
 
+from foosim.common import units
+from foosim.common.errors import BadValue
+from foosim.common.spec_base import default
+from foosim.common.units import Quantity
+from foosim.world.components.drives import Motor
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.forms import Carrier
 from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.models.rod import RodRobot
-from foosim.world.parameters.table import table_of
+from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
 
-ANGLE_RAD_MAX: Final = 1000.0
-"""The greatest angle that a rod's actuator accepts."""
+Gain = Annotated[float, Quantity(units.FREQUENCY, "1 mHz", "100 kHz")]
 
 
-class JointPositionSettings(ActuatorSettings):
-    """Moves a rod to a slide and a spin; gains and limits are the table's."""
+class JointPositionSettings(JointSettings):
+    """Moves joints to positions: the speed of each is `gain` times its error, at most that of the joint.
+
+    The loop runs once a tick, so the gain is at most the inverse of a tick: a greater one overshoots.
+    """
+
+    gain: Gain = default("20 Hz")
 
 
-class Command(Struct, frozen=True):
-    """The set-point of a rod: `slide` along world +y from its middle, `spin` about +y."""
+class JointPositions(Struct, frozen=True):
+    """The set-points of joints, in their order (m or rad)."""
 
-    slide: Metres
-    spin: Radians
+    positions: Many
 
 
-@actuator(
-    "joint_position",
-    JointPositionSettings,
-    Command,
-    slots={"set_point": 2},
-    needs=("joint_positions",),
-    kit="table",
-)
-class PositionActuator:
-    """A proportional loop from a rod's set-point to the speeds of its motors."""
+def _slots(settings: JointPositionSettings, carrier: Carrier) -> Mapping[str, int]:
+    most = 1e9 / carrier.period_ns
+    if settings.gain > most:
+        raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
+    return set_points(settings, carrier)
+
+
+@actuator("joint_position", JointPositionSettings, JointPositions, slots=_slots, needs=("joint_positions",))
+class JointPositionActuator:
+    """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
 
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
-        robot = at.spec.robots[at.robot.name]
-        assert isinstance(robot, RodRobot)
-        drive = table_of(at.spec).drive
-        self._slide_m_max = table_of(at.spec).lines[robot.line].half_stroke
-        self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
-        self._set_point_at, self._joints_at = self._set_point.at, self._joints.at
-        self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
-        self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)
+        self._group = JointGroup(settings, at)
+        self._gain = settings.gain
+        self.joints = self._group.indices
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest slide (m) and spin (rad) that are accepted."""
-        return {"slide": (-self._slide_m_max, self._slide_m_max), "spin": (-ANGLE_RAD_MAX, ANGLE_RAD_MAX)}
+        """Return no bounds that are common to all joints: each has its own."""
+        return {}
 
-    def accept(self, command: Command, view: WritableView) -> bool:
-        """Take a set-point; one that is out of its limits is refused."""
-        if abs(command.slide) > self._slide_m_max or abs(command.spin) > ANGLE_RAD_MAX:
-            return False
-        view.write(self._set_point, command.slide, command.spin)
-        return True
+    def accept(self, command: JointPositions, view: WritableView) -> bool:
+        """Take the set-points of all joints; one beyond its joint's limits refuses them."""
+        return self._group.take(command.positions, self._group.lows, self._group.highs, view)
 
     def hold(self, view: WritableView) -> None:
-        """Make the present position the set-point."""
-        view.write(self._set_point, *view.read(self._joints))
+        """Make the present positions the set-points."""
+        view.write(self._group.set_point, *self._group.positions(view))
 
     def stir(self, view: WritableView) -> None:
-        """Turn, for the small run that tells engines apart."""
-        view.write(self._set_point, 0.0, 1.0)
+        """Move each joint by a little, for the small run that tells engines apart."""
+        view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
-    def command(self, view: View) -> tuple[tuple[float, float], ...]:
-        """Return (target speed, greatest force) of slide and spin, in SI units."""
-        numbers, set_point, joints = view.numbers, self._set_point_at, self._joints_at
-        gain, speed, force = self._slide
-        slide = gain * (numbers[set_point] - numbers[joints])
-        if not -speed <= slide <= speed:
-            slide = speed if slide > speed else -speed
-        gain, speed, torque = self._spin
-        spin = gain * (numbers[set_point + 1] - numbers[joints + 1])
-        if not -speed <= spin <= speed:
-            spin = speed if spin > speed else -speed
-        return (slide, force), (spin, torque)
+    def command(self, view: View) -> tuple[Motor, ...]:
+        """Return speed and greatest force of each motor."""
+        group, gain = self._group, self._gain
+        wanted = view.read(group.set_point)
+        drives = zip(wanted, group.positions(view), group.speeds, group.forces, strict=True)
+        return tuple([Motor(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])

@@ -9,7 +9,7 @@ from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.world.forms import registry
-from foosim.world.physics import Physics
+from foosim.world.physics import Physics, physics_from
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
@@ -32,10 +32,10 @@ def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
 
 
 def physics_of(spec: WorldSpec) -> Physics:
-    """Return what rigid bodies feel: of the one kit that says so, which the check of a deployment makes sure of."""
+    """Return what rigid bodies feel: as the kit says that says so, else as the deployment's physics and surfaces do."""
     found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]  # type: ignore[attr-defined]
-    assert len(found) == 1, f"{len(found)} kits say what rigid bodies feel"
-    return found[0]  # type: ignore[no-any-return]
+    assert len(found) <= 1, f"{len(found)} kits say what rigid bodies feel"
+    return found[0] if found else physics_from(spec.physics, spec.surfaces)
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:
@@ -46,13 +46,18 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
     felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]  # type: ignore[attr-defined]
     for name in felt[1:]:
         yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
-    for name, robot in spec.robots.items():
-        if not felt and registry.find_model(robot.model).is_rigid:
-            yield Finding(("robots", name, "model"), "a rigid body, in a world without a kit for such", robot.model)
-    if len(felt) == 1:
+    if felt:
+        for key in ("physics", "surfaces"):
+            if getattr(spec, key):
+                yield Finding((key,), f"what rigid bodies feel, which {felt[0]} says already", key, at="key")
+    if len(felt) == 1 or _has_rigid(spec):
         yield from _unfelt(spec)
     for _, kit in kits_of(spec):
         yield from kit.findings()  # type: ignore[attr-defined]
+
+
+def _has_rigid(spec: WorldSpec) -> bool:
+    return any(registry.find_model(one.model).is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
 
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:

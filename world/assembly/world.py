@@ -37,7 +37,7 @@ NO_TEXT: Final = "no text of"
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
     """Return an entity as its model. Raises ComponentError."""
     try:
-        model: Model = entity.kind.made(spec.robots.get(entity.name), mounting_of(spec, layout, entity))
+        model: Model = entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
     except Exception as error:
         raise ComponentError(f"model {entity.model} of {entity.name}", 0, error) from error
     return model

@@ -26,7 +26,7 @@ Wrench: TypeAlias = tuple[Vector, Vector]
 @dataclass(frozen=True, slots=True)
 class Drives:
     """What is asked of a body: of its motors, in the order of its joints, and what acts on its base, in the principal
-    axes of the base. Motors of a body without any actuator are free."""
+    axes of the base. The motors of a body without any actuator are free."""
 
     motors: tuple[Motor, ...] = ()
     wrench: Wrench | None = None

@@ -19,12 +19,8 @@ class Mounted:
     def __init__(self, at: Mounting, where: MountedAt) -> None:
         """Raises BadValue for a link that the robot does not have."""
         self._entity = at.robot
-        body: Body | None = at.robot.kind.made(
-            at.spec.robots.get(at.robot.name), mounting_of(at.spec, at.layout, at.robot)
-        ).body()
-        assert body is not None, f"{at.robot.name} has no body"
-        self._body = body
-        self.link = link_index(body, where.link)
+        self._body = body_on(at)
+        self.link = link_index(self._body, where.link)
         self._position, self._orientation = where.position, where.orientation
 
     def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
@@ -36,6 +32,14 @@ class Mounted:
         """Return the velocity of the mount (m/s) and how fast it turns (rad/s), both in the world frame."""
         place, _ = self.pose(numbers)
         return twist(self._body, self._entity, numbers, self.link, place)
+
+
+def body_on(at: Mounting) -> Body:
+    """Return the body of the robot that a component is on; it has one."""
+    mounting = mounting_of(at.spec, at.layout, at.robot)
+    body: Body | None = at.robot.kind.made(at.spec.settings_of(at.robot.name), mounting).body()
+    assert body is not None, f"{at.robot.name} has no body"
+    return body
 
 
 def link_index(body: Body, name: str | None) -> int:

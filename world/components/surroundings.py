@@ -35,7 +35,7 @@ class Surroundings:
 
     def tags(self, entity: Entity) -> frozenset[str]:
         """Return the tags of an entity: those of its model, and those that its settings add."""
-        settings = self._spec.robots.get(entity.name)
+        settings = self._spec.settings_of(entity.name)
         return frozenset((*entity.kind.tags, *(() if settings is None else settings.tags)))
 
     def tagged(self, tag: str) -> list[Entity]:
@@ -77,5 +77,5 @@ class Surroundings:
             return None
         if entity.name not in self._bodies:
             at = mounting_of(self._spec, self._layout, entity)
-            self._bodies[entity.name] = entity.kind.made(self._spec.robots.get(entity.name), at).body()
+            self._bodies[entity.name] = entity.kind.made(self._spec.settings_of(entity.name), at).body()
         return self._bodies[entity.name]

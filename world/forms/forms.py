@@ -59,13 +59,15 @@ RESTING: Final[Mapping[str, int]] = MappingProxyType({"slow_ticks": 1})
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """What a modifier is on: how many numbers a value has, and in which time they come one after the other (ns).
+    """What a component is on: how many numbers a value has, and in which time they come one after the other (ns); how
+    many joints its robot has.
 
-    Commands come in a tick's time at the earliest.
+    Commands come in a tick's time at the earliest. A sensor or actuator is on no numbers, a modifier on no robot.
     """
 
     size: int
     period_ns: int
+    joints: int = 0
 
 
 def word_of(form: str) -> str:

@@ -25,7 +25,7 @@ from foosim.world.forms.forms import (
 )
 
 REACHED: Final = ("rod", "ball")
-"""The rigid models whose reach islands know (`assembly.islands.reach_of`)."""
+"""The rigid models that may share a solve (`assembly.islands.table_reach_of`)."""
 PLACED_BY: Final = ("check_place", "place_at")
 """The methods of a model of which a running world can have more."""
 
@@ -40,10 +40,10 @@ def find_kit_model(name: str) -> Model | None:
     return found
 
 
-def models_of_robots() -> list[Model]:
-    """Return the models of robots that are installed here, in name order."""
+def models_of(*, robots: bool) -> list[Model]:
+    """Return the models of robots, or of objects, that are installed here, in name order."""
     found = map(registry.find_model, registry.names("model"))
-    return [model for model in found if model.is_robot]
+    return [model for model in found if model.is_robot == robots]
 
 
 def needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str]:
@@ -54,9 +54,8 @@ def needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str
 
 def model_problems(model: Model, kits: Collection[str]) -> Iterator[str]:
     """Yield why entities of a model would not be solved in a world with these kits."""
-    if model.is_rigid and model.name not in REACHED:
-        valid = f"valid are {', '.join(REACHED)}, and models with a motion"
-        yield f"a rigid model whose reach the islands do not know; {valid}"
+    if model.is_rigid and not model.couples and model.name not in REACHED:
+        yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
     if not model.motion:
         return
     try:
@@ -82,7 +81,7 @@ def component_problems(form: Form, model: Model) -> Iterator[str]:
         needs = (*needs, form.speaks)
     missing = [field for field in needs if field not in model.slots]
     if missing:
-        fitting = ", ".join(other.name for other in models_of_robots() if {*needs} <= {*other.slots})
+        fitting = ", ".join(other.name for other in models_of(robots=True) if {*needs} <= {*other.slots})
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing)}")
         yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
     if not isinstance(form, EntityRule):

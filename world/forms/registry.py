@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from msgspec import Struct
 
     from foosim.common.spec_base import SpecBase
-    from foosim.world.forms.settings import RobotSettings
+    from foosim.world.forms.settings import EntitySettings
 
 GROUP: Final = "foosim.world"
 FOLDERS: Final[Mapping[str, str]] = {
@@ -150,7 +150,7 @@ def modifier(
     )
 
 
-def model(name: str, settings: type[RobotSettings], **about: Any) -> Callable[[Made], Made]:
+def model(name: str, settings: type[EntitySettings], **about: Any) -> Callable[[Made], Made]:
     """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`.
 
     The fields that foosim itself needs, and that it does not declare, come after those that it does.

@@ -52,19 +52,25 @@ class SceneSettings(ComponentSettings):
     """What the settings of each scene have."""
 
 
-class RobotSettings(SpecBase):
-    """What the settings of every robot have: its model, a registered name or `module:Class`; its sensors and actuators
-    by the names of their channels, its rules by name.
+class EntitySettings(SpecBase):
+    """What the settings of every entity have: its model, a registered name or `module:Class`.
 
-    A robot that says nothing of its actuators, or of its rules, has those of its model. `tags` are for those who look
-    for robots of a kind, beside the tags of its model.
+    `tags` are for those who look for entities of a kind, beside the tags of its model.
     """
 
     model: str
+    tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
+
+
+class RobotSettings(EntitySettings):
+    """What the settings of every robot have: sensors and actuators by the names of their channels, rules by name.
+
+    A robot that says nothing of its actuators, or of its rules, has those of its model.
+    """
+
     sensors: dict[Name, SerializeAsAny[SensorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     actuators: dict[Name, SerializeAsAny[ActuatorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     rules: dict[Name, SerializeAsAny[EntityRuleSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
-    tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
 
 
 BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
@@ -75,7 +81,7 @@ BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
         "entity_rule": EntityRuleSettings,
         "rule": RuleSettings,
         "scene": SceneSettings,
-        "model": RobotSettings,
+        "model": EntitySettings,
     }
 )
 """What the settings of a form have in common with all others of it; settings of kits are any."""

@@ -28,7 +28,7 @@ STOP_DEPTH_M: Final = 0.01
 
 
 class RodRobot(RobotSettings):
-    """A motorised rod with its figures. Its usual actuator is `position`, of the kind `joint_position`."""
+    """A motorised rod with its figures. Its usual actuator is `position`, of the kind `rod_position`."""
 
     team: Team
     line: LineName
@@ -53,7 +53,7 @@ def line_x_m(spec: WorldSpec, robot: RodRobot) -> float:
     is_rigid=True,
     couples=False,
     kit="table",
-    actuators={"position": {"kind": "joint_position"}},
+    actuators={"position": {"kind": "rod_position"}},
     units={"joint_positions": ("m", "rad"), "joint_velocities": ("m/s", "rad/s"), "joint_efforts": ("N", "N m")},
 )
 class Rod:

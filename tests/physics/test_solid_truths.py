@@ -1,0 +1,328 @@
+"""Rigid bodies of any kind against closed forms, at speeds, angles and masses drawn by a fixed seed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import cos, pi, sin, sqrt
+from typing import Final
+
+import pytest
+
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.world.components.drives import Drives, Motor
+from foosim.world.kinematics import forward_kinematics, twist
+from foosim.world.mesh import Mesh
+from foosim.world.physics import Side
+from foosim.world.scene import ORIGIN, Body, Box, Capsule, Cylinder, Hull, Link, Sphere, Vector, rotate, turn
+from tests.solids import GRAVITY, TICK_S, Solids, ball, box, physics, shape
+
+SEED: Final = 17
+KEY: Final = draw_key(SEED, "solids")
+Y: Final = (0.0, 1.0, 0.0)
+Z: Final = (0.0, 0.0, 1.0)
+
+
+def draw(number: int, low: float, high: float) -> float:
+    return low + (high - low) * unit_interval(draw_words(KEY, number)[0])
+
+
+@contextmanager
+def solids(*bodies: Body, **options: object) -> Iterator[Solids]:
+    made = Solids(bodies, **options)  # type: ignore[arg-type]
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_free_fall(case: int) -> None:
+    """After n steps of h: v = g n h, and the way of the semi-implicit rule, g h^2 n (n + 1) / 2. Spin stays."""
+    speed, rate = draw(case, -3.0, 3.0), draw(10 + case, -5.0, 5.0)
+    with solids(ball("a", 0.1, draw(20 + case, 0.1, 9.0)), scenery=()) as one:
+        one.put("a", (0.0, 0.0, 5.0), velocity=(speed, 0.0, 0.0), spin=(0.0, 0.0, rate))
+        one.run(50)
+        steps, h = 200, TICK_S / 4
+        assert one.get("a", "linear_velocity") == pytest.approx([speed, 0.0, -GRAVITY * steps * h], abs=1e-9)
+        z = 5.0 - GRAVITY * h * h * steps * (steps + 1) / 2
+        assert one.get("a", "position") == pytest.approx([speed * 0.5, 0.0, z], abs=1e-9)
+        assert one.get("a", "angular_velocity")[2] == pytest.approx(rate, rel=1e-9)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_sliding_with_friction(case: int) -> None:
+    """A box that slides is slowed by mu g, and stops after v^2 / (2 mu g)."""
+    mu, speed = draw(30 + case, 0.2, 0.8), draw(40 + case, 1.0, 4.0)
+    feel = physics(floor=Side(0.0, mu), box=Side(0.0, 1.0))
+    with solids(box("a", (0.3, 0.3, 0.05), 2.0, surface="box"), feel=feel) as one:
+        one.put("a", (0.0, 0.0, 0.05), velocity=(speed, 0.0, 0.0))
+        one.run(20)
+        assert one.get("a", "linear_velocity")[0] == pytest.approx(speed - mu * GRAVITY * 0.2, rel=0.03)
+        one.run(300)
+        assert one.get("a", "position")[0] == pytest.approx(speed * speed / (2 * mu * GRAVITY), rel=0.03)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_rolling_down_a_slope(case: int) -> None:
+    """A solid sphere that rolls gains 5/7 g sin(angle)."""
+    angle = draw(50 + case, 0.1, 0.3)
+    slope = shape(Box((5.0, 1.0, 0.1)), "floor", position=(0.0, 0.0, 0.0), orientation=turn(Y, angle))
+    nx, nz = sin(angle), cos(angle)
+    with solids(ball("a", 0.1, 1.0), scenery=(slope,)) as one:
+        one.put("a", (0.2 * nx, 0.0, 0.2 * nz))
+        one.run(100)
+        x, _, z = one.get("a", "linear_velocity")
+        assert sqrt(x * x + z * z) == pytest.approx(5 / 7 * GRAVITY * sin(angle) * 1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_restitution(case: int) -> None:
+    """A sphere that falls on a floor of restitution e comes back with e times its speed."""
+    bounce = draw(60 + case, 0.3, 0.9)
+    feel = physics(erp=0.005, ball=Side(1.0, 0.0), floor=Side(bounce, 0.0))
+    with solids(ball("a", 0.1, 1.0, "ball"), feel=feel) as one:
+        one.put("a", (0.0, 0.0, 0.5), velocity=(0.0, 0.0, -draw(70 + case, 1.0, 4.0)))
+        before = 0.0
+        for _ in range(100):
+            one.run(1)
+            now = one.get("a", "linear_velocity")[2]
+            if now > 0.0:
+                break
+            before = now
+        assert now == pytest.approx(-bounce * before, rel=0.05)
+        assert one.get("a", "contacts")[0] == 1.0
+
+
+def pendulum(length: float, mass: float, damping: float = 0.0) -> Body:
+    """A point on a rod without a mass, which turns about y where its base is."""
+    link = Link(
+        "arm",
+        "continuous",
+        (shape(Sphere(0.02), position=(0.0, 0.0, -length)),),
+        mass,
+        (1e-6, 1e-6, 1e-6),
+        centre_of_mass=(0.0, 0.0, -length),
+        axis=Y,
+        damping=damping,
+    )
+    return Body("arm", "pendulum", (0.0, 0.0, 3.0), (link,))
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_a_pendulum_swings_with_its_period(case: int) -> None:
+    """T = 2 pi sqrt(l / g) (1 + a^2 / 16) at the amplitude a."""
+    length, amplitude = draw(80 + case, 0.3, 1.5), 0.1
+    with solids(pendulum(length, draw(90 + case, 0.5, 5.0)), tick_s=0.002) as one:
+        one.set("arm", "joint_positions", amplitude)
+        period = 2 * pi * sqrt(length / GRAVITY) * (1 + amplitude * amplitude / 16)
+        ticks = round(2 * period / 0.002)
+        one.run(ticks)
+        assert one.get("arm", "joint_positions")[0] == pytest.approx(amplitude, abs=0.003)
+
+
+def test_damping_slows_a_joint() -> None:
+    """Without gravity: w = w0 exp(-d t / I)."""
+    with solids(pendulum(0.5, 2.0, damping=0.25), feel=physics(0.0)) as one:
+        one.set("arm", "joint_velocities", 2.0)
+        one.run(100)
+        inertia = 2.0 * 0.5 * 0.5
+        assert one.get("arm", "joint_velocities")[0] == pytest.approx(2.0 * 2.718281828 ** (-0.25 / inertia), rel=0.02)
+
+
+def chain(links: int) -> Body:
+    """Links on a fixed base, each turning about an axis of its own, with centres of mass away from their origins."""
+    made = []
+    for number in range(links):
+        axis = (Y, Z, (0.6, 0.0, 0.8))[number % 3]
+        made.append(
+            Link(
+                f"link{number}",
+                "revolute",
+                (shape(Capsule(0.03, 0.2), position=(0.0, 0.0, 0.15)),),
+                1.0,
+                (0.01, 0.012, 0.004),
+                centre_of_mass=(0.01, 0.02, 0.12),
+                axis=axis,
+                limits=(-3.0, 3.0),
+                parent=number - 1,
+                position=(0.0, 0.0, 0.5 if number == 0 else 0.3),
+                orientation=turn((1.0, 0.0, 0.0), 0.2 * number),
+                principal=turn((0.0, 0.6, 0.8), 0.3),
+            )
+        )
+    return Body("arm", "chain", (0.0, 0.0, 1.0), tuple(made))
+
+
+def energy_of(one: Solids, body: Body) -> float:
+    """Kinetic and potential energy of a chain, by our own kinematics."""
+    entity, total = one[body.name], 0.0
+    poses = forward_kinematics(body, entity, one.numbers)
+    for index, (link, (_, position, orientation)) in enumerate(zip(body.links, poses, strict=True)):
+        x, y, z = rotate(orientation, link.centre_of_mass)
+        middle = position[0] + x, position[1] + y, position[2] + z
+        linear, angular = twist(body, entity, one.numbers, index, middle)
+        px, py, pz, pw = link.principal
+        turned = rotate(
+            (-px, -py, -pz, pw), rotate((-orientation[0], -orientation[1], -orientation[2], orientation[3]), angular)
+        )
+        total += 0.5 * link.mass * sum(part * part for part in linear) + link.mass * GRAVITY * middle[2]
+        total += 0.5 * sum(i * w * w for i, w in zip(link.inertia, turned, strict=True))
+    return total
+
+
+def test_the_energy_of_a_chain_stays() -> None:
+    """Centres of mass away from the links' origins, principal axes turned: energy by our own kinematics is kept."""
+    body = chain(3)
+    with solids(body, scenery=(), tick_s=0.0005) as one:
+        one.set("arm", "joint_positions", 0.3, -0.4, 0.2)
+        one.set("arm", "joint_velocities", 0.5, 1.0, -0.7)
+        before = energy_of(one, body)
+        one.run(400)
+        assert one.get("arm", "joint_velocities") != [0.5, 1.0, -0.7]
+        assert energy_of(one, body) == pytest.approx(before, rel=0.002)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_links_are_where_our_kinematics_put_them(case: int) -> None:
+    """Bullet's own poses of links, at drawn joint angles, against the one forward kinematics."""
+    from foosim.node.physics.bullet_client import p
+
+    body = chain(6)
+    with solids(body, scenery=()) as one:
+        angles = [draw(100 + 10 * case + number, -2.0, 2.0) for number in range(6)]
+        one.set("arm", "joint_positions", *angles)
+        ours = forward_kinematics(body, one["arm"], one.numbers)
+        one.solve(one.engine, one.entities, one.numbers.copy())
+        made = one.engine._made[0]
+        for joint, angle in zip(made.joints, angles, strict=True):
+            p.resetJointState(made.id, joint, angle, 0.0, one.engine._client)
+        for joint, (_, position, orientation) in zip(made.joints, ours, strict=True):
+            state = p.getLinkState(made.id, joint, computeForwardKinematics=1, physicsClientId=one.engine._client)
+            assert state[4] == pytest.approx(position, abs=1e-6)  # Bullet keeps axes as single floats
+            sign = 1.0 if state[5][3] * orientation[3] >= 0 else -1.0
+            assert [sign * part for part in state[5]] == pytest.approx(orientation, abs=1e-6)
+
+
+def test_a_centre_of_mass_away_from_the_origin_of_a_free_body() -> None:
+    """Thrown with a spin, the centre of mass flies on a parabola and the spin about a principal axis stays."""
+    link = Link(
+        "a",
+        "free",
+        (shape(Box((0.2, 0.1, 0.1))),),
+        2.0,
+        (0.02, 0.05, 0.06),
+        centre_of_mass=(0.5, 0.1, 0.0),
+        principal=turn(Z, 0.7),
+    )
+    body = Body("a", "offset", ORIGIN, (link,), speed_limit=10.0)
+    with solids(body, scenery=()) as one:
+        one.put("a", (1.0, 2.0, 5.0), velocity=(1.0, 0.0, 2.0), spin=(0.0, 0.0, 3.0))
+        assert forward_kinematics(body, one["a"], one.numbers)[0][1] != (1.0, 2.0, 5.0)
+        one.run(50)
+        steps, h = 200, TICK_S / 4
+        z = 5.0 + 2.0 * 0.5 - GRAVITY * h * h * steps * (steps + 1) / 2
+        assert one.get("a", "position") == pytest.approx([1.5, 2.0, z], abs=1e-9)
+        assert one.get("a", "angular_velocity") == pytest.approx([0.0, 0.0, 3.0], abs=1e-9)
+
+
+def test_forces_and_torques_on_a_base_act_in_its_own_axes() -> None:
+    """A body that is turned by 90 degrees about z: a force along its x accelerates along the world's y."""
+    with solids(box("a", (0.2, 0.1, 0.1), 2.0), feel=physics(0.0), scenery=()) as one:
+        one.put("a", (0.0, 0.0, 5.0), orientation=turn(Z, pi / 2))
+        one.drives["a"] = Drives(wrench=((4.0, 0.0, 0.0), ORIGIN))
+        one.run(50)
+        assert one.get("a", "linear_velocity") == pytest.approx([0.0, 4.0 / 2.0 * 0.5, 0.0], abs=1e-6)
+        one.put("a", (0.0, 0.0, 5.0), orientation=turn(Z, pi / 2))
+        one.drives["a"] = Drives(wrench=(ORIGIN, (0.01, 0.0, 0.0)))
+        one.run(50)
+        inertia = 2.0 * (0.04 + 0.04) / 12
+        assert one.get("a", "angular_velocity") == pytest.approx([0.0, 0.01 / inertia * 0.5, 0.0], abs=1e-6)
+
+
+def test_motors_reach_speeds_with_their_forces_and_efforts_act_throughout() -> None:
+    """Without gravity: torque over inertia, held at the speed; an effort likewise, without a bound."""
+    inertia = 2.0 * 0.5 * 0.5 + 1e-6
+    with solids(pendulum(0.5, 2.0), feel=physics(0.0)) as one:
+        one.drives["arm"] = Drives((Motor(1.0, 2.0),))
+        one.run(10)
+        assert one.get("arm", "joint_velocities")[0] == pytest.approx(2.0 / inertia * 0.1, rel=1e-3)
+        assert one.get("arm", "joint_efforts")[0] == pytest.approx(2.0, rel=1e-3)
+        one.run(40)
+        assert one.get("arm", "joint_velocities")[0] == pytest.approx(1.0, abs=1e-6)
+        one.set("arm", "joint_velocities", 0.0)
+        one.drives["arm"] = Drives((Motor(0.0, 0.0, 3.0),))
+        one.run(50)
+        assert one.get("arm", "joint_velocities")[0] == pytest.approx(3.0 / inertia * 0.5, rel=1e-3)
+        assert one.get("arm", "joint_efforts") == [3.0]
+
+
+def test_a_revolute_joint_stops_at_its_limits() -> None:
+    body = Body("arm", "limited", (0.0, 0.0, 3.0), (Link(
+        "arm", "revolute", (shape(Sphere(0.02), position=(0.0, 0.0, -0.5)),), 1.0, (1e-4,) * 3,
+        centre_of_mass=(0.0, 0.0, -0.5), axis=Y, limits=(-0.5, 0.8),
+    ),))  # fmt: skip
+    with solids(body) as one:
+        one.drives["arm"] = Drives((Motor(2.0, 50.0),))
+        one.run(200)
+        assert one.get("arm", "joint_positions")[0] == pytest.approx(0.8, abs=0.02)
+        one.drives["arm"] = Drives((Motor(-2.0, 50.0),))
+        one.run(200)
+        assert one.get("arm", "joint_positions")[0] == pytest.approx(-0.5, abs=0.02)
+
+
+def corners(half: Vector) -> Mesh:
+    import numpy as np
+
+    points = [[x, y, z] for x in (-half[0], half[0]) for y in (-half[1], half[1]) for z in (-half[2], half[2])]
+    return Mesh(np.array(points), np.zeros((0, 3), np.int32), b"corners")
+
+
+@pytest.mark.parametrize(
+    ("name", "shapes", "height"),
+    [
+        ("box", (shape(Box((0.1, 0.1, 0.1))),), 0.1),
+        ("cylinder", (shape(Cylinder(0.1, 0.3)),), 0.15),
+        ("capsule", (shape(Capsule(0.1, 0.3), orientation=turn(Y, pi / 2)),), 0.1),
+        ("hull", (shape(Hull(corners((0.1, 0.1, 0.1)))),), 0.1),
+        ("hulls", (shape(Box((0.1, 0.1, 0.02))), shape(Hull(corners((0.05, 0.05, 0.1))))), 0.1),
+        ("several", (shape(Sphere(0.05), position=(0.1, 0.0, -0.05)), shape(Box((0.2, 0.2, 0.1)))), 0.1),
+    ],
+)
+def test_what_lies_on_the_floor_stays_as_high_as_its_shape(name: str, shapes: tuple, height: float) -> None:  # type: ignore[type-arg]
+    body = Body(name, name, ORIGIN, (Link(name, "free", shapes, 1.0, (0.01, 0.01, 0.01)),), speed_limit=10.0)
+    with solids(body) as one:
+        one.put(name, (0.0, 0.0, height + 0.005))
+        one.run(100)
+        assert one.get(name, "position")[2] == pytest.approx(height, abs=0.003), one.get(name, "position")
+        count, impulse, last = one.get(name, "contacts")
+        assert (count, last) == (0.0, 3.0) and impulse == pytest.approx(GRAVITY * TICK_S, rel=0.02)
+
+
+def test_a_body_knows_whom_it_touches() -> None:
+    """A box on a box: the lower one touches the upper one and the floor, impulses are of their weights."""
+    with solids(box("a", (0.1, 0.1, 0.1), 1.0), box("b", (0.1, 0.1, 0.1), 2.0)) as one:
+        one.put("a", (0.0, 0.0, 0.1))
+        one.put("b", (0.0, 0.0, 0.3))
+        one.run(100)
+        assert one.get("a", "partners") == [1.0, -1.0, -1.0, -1.0] and one.get("b", "partners")[0] == 0.0
+        assert one.get("b", "partner_impulses")[0] == pytest.approx(2.0 * GRAVITY * TICK_S, rel=0.05)
+        assert one.get("a", "contacts")[1] == pytest.approx((2.0 + 3.0) * GRAVITY * TICK_S, rel=0.05)
+
+
+def test_a_mover_pushes_a_box() -> None:
+    """A wall without a mass that moves at 0.5 m/s: the box before it goes as fast."""
+    wall = Body("wall", "wall", ORIGIN, (Link("wall", "free", (shape(Box((0.05, 0.5, 0.2))),), 0.0, ORIGIN),))
+    with solids(box("a", (0.1, 0.1, 0.1), 1.0), wall) as one:
+        from foosim.node.physics.interface import Island
+        from foosim.world.components.drives import NO_DRIVES
+
+        engine = one.make([one.bodies[0]], [one.bodies[1]])
+        one.put("a", (0.2, 0.0, 0.1))
+        for tick in range(100):
+            one.put("wall", (0.0 + 0.5 * TICK_S * tick, 0.0, 0.2), velocity=(0.5, 0.0, 0.0))
+            island = Island((one.entities[0],), (one.entities[1],), (NO_DRIVES,))
+            engine.load(island, one.bodies, one.numbers, one.numbers)
+            engine.step(island)
+            engine.read(island, one.numbers)
+        engine.close()
+        assert one.get("a", "linear_velocity")[0] == pytest.approx(0.5, abs=0.05)
+        assert one.get("a", "position")[0] > 0.5 and one.get("a", "partners")[0] == 1.0

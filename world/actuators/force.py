@@ -1,0 +1,80 @@
+"""A force and a torque on the base of a free robot, in the frame of its first link."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from msgspec import Meta, Struct
+
+from foosim.common import units
+from foosim.common.units import Quantity
+from foosim.world.components.drives import Motor, Wrench
+from foosim.world.components.mounted import body_on
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.registry import actuator
+from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.scene import conjugate, rotate
+
+Newtons: TypeAlias = Annotated[float, Meta(extra={"unit": "N"})]
+NewtonMetres: TypeAlias = Annotated[float, Meta(extra={"unit": "N m"})]
+ForceMost = Annotated[float, Quantity(units.FORCE, "0 N", "10000 kN")]
+TorqueMost = Annotated[float, Quantity(units.TORQUE, "0 N m", "10000000 N m")]
+
+
+class ForceSettings(ActuatorSettings):
+    """Pushes a free robot: along each axis with at most `force`, about each axis with at most `torque`."""
+
+    force: ForceMost
+    torque: TorqueMost
+
+
+class Push(Struct, frozen=True):
+    """A force at the centre of mass and a torque, in the frame of the robot's first link."""
+
+    force_x: Newtons
+    force_y: Newtons
+    force_z: Newtons
+    torque_x: NewtonMetres
+    torque_y: NewtonMetres
+    torque_z: NewtonMetres
+
+
+@actuator("force", ForceSettings, Push, slots={"set_point": 6}, needs=("angular_velocity",), moves=False)
+class ForceActuator:
+    """Pushes with the last force and torque that it was told, throughout each tick."""
+
+    def __init__(self, settings: ForceSettings, at: Mounting) -> None:
+        self._force, self._torque = settings.force, settings.torque
+        self._set_point = at.slot("set_point")
+        self._back = conjugate(body_on(at).links[0].principal)
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest of each number."""
+        forces = {f"force_{axis}": (-self._force, self._force) for axis in "xyz"}
+        return forces | {f"torque_{axis}": (-self._torque, self._torque) for axis in "xyz"}
+
+    def accept(self, command: Push, view: WritableView) -> bool:
+        """Take a force and a torque; what is above its greatest is refused."""
+        force = command.force_x, command.force_y, command.force_z
+        torque = command.torque_x, command.torque_y, command.torque_z
+        if max(map(abs, force)) > self._force or max(map(abs, torque)) > self._torque:
+            return False
+        view.write(self._set_point, *force, *torque)
+        return True
+
+    def hold(self, view: WritableView) -> None:
+        """Push no more."""
+        view.write(self._set_point, *[0.0] * 6)
+
+    def stir(self, view: WritableView) -> None:
+        """Push a little, for the small run that tells engines apart."""
+        view.write(self._set_point, *[0.1 * self._force] * 3, *[0.1 * self._torque] * 3)
+
+    def command(self, view: View) -> tuple[Motor, ...]:
+        """Return nothing: it has no joints."""
+        return ()
+
+    def wrench(self, view: View) -> Wrench:
+        """Return force (N) and torque (N m) in the principal axes of the base."""
+        x, y, z, a, b, c = view.read(self._set_point)
+        return rotate(self._back, (x, y, z)), rotate(self._back, (a, b, c))

@@ -1,0 +1,51 @@
+"""Joints at speeds: what a motor with a speed controller does."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from foosim.world.components.drives import Motor
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.registry import actuator
+from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
+
+
+class JointVelocitySettings(JointSettings):
+    """Moves joints at speeds, with at most the effort of each joint."""
+
+
+class JointVelocities(Struct, frozen=True):
+    """The set-points of the speeds of joints, in their order (m/s or rad/s)."""
+
+    velocities: Many
+
+
+@actuator("joint_velocity", JointVelocitySettings, JointVelocities, slots=set_points, needs=("joint_positions",))
+class JointVelocityActuator:
+    """Motors that keep the last speeds that they were told."""
+
+    def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:
+        self._group = JointGroup(settings, at)
+        self.joints = self._group.indices
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return no bounds that are common to all joints: each has its own."""
+        return {}
+
+    def accept(self, command: JointVelocities, view: WritableView) -> bool:
+        """Take the speeds of all joints; one above its joint's greatest refuses them."""
+        speeds = self._group.speeds
+        return self._group.take(command.velocities, [-speed for speed in speeds], speeds, view)
+
+    def hold(self, view: WritableView) -> None:
+        """Stop the joints."""
+        view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
+
+    def stir(self, view: WritableView) -> None:
+        """Turn each joint a little, for the small run that tells engines apart."""
+        view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
+
+    def command(self, view: View) -> tuple[Motor, ...]:
+        """Return speed and greatest force of each motor."""
+        wanted = view.read(self._group.set_point)
+        return tuple([Motor(speed, force) for speed, force in zip(wanted, self._group.forces, strict=True)])

@@ -1,0 +1,75 @@
+"""A quadrotor: a rigid body that four rotors lift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from foosim.world.components.view import Mounting, WritableView
+from foosim.world.forms.registry import model
+from foosim.world.materials import PLASTIC
+from foosim.world.parameters.primitives import RIGID, ROUNDING, SPIN_MAX
+from foosim.world.parameters.rotors import QuadrotorRobot
+from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape
+
+GREY: Final[Colour] = (0.30, 0.32, 0.36, 1.0)
+RED: Final[Colour] = (0.80, 0.20, 0.15, 1.0)
+
+
+@model(
+    "quadrotor",
+    QuadrotorRobot,
+    slots=RIGID,
+    is_rigid=True,
+    actuators={"rotors": {"kind": "rotor_speeds"}},
+    tags=("flying",),
+)
+class Quadrotor:
+    """A frame with four discs, x ahead, z up: a rigid body.
+
+    Its mass is half in the middle, a solid box, and half in the four rotors, which count as points: I_x = I_y =
+    m_c (b^2 + h^2) / 12 + m_r a^2 / 2, I_z = m_c 2 b^2 / 12 + m_r a^2, with b the middle's side and a the arm.
+    """
+
+    def __init__(self, settings: QuadrotorRobot, at: Mounting) -> None:
+        self._settings, self._at = settings, at
+        self._position, self._velocity = at.slot("position").at, at.slot("linear_velocity").at
+        self._spin = at.slot("angular_velocity").at
+        self._way_max = settings.speed_limit * at.spec.tick_ns / 1e9 * ROUNDING
+
+    def body(self) -> Body:
+        """Return the middle and the discs of its rotors."""
+        settings, name = self._settings, self._at.robot.name
+        side, height = 0.6 * settings.arm, settings.height
+        middle = Shape(Box((side / 2, side / 2, height / 2)), settings.surface, GREY, radio=PLASTIC)
+        disc = Cylinder(settings.rotor_radius, 0.2 * height)
+        shapes = [middle]
+        for x, y, _ in settings.rotor_places():
+            colour = RED if x > 0.0 else GREY
+            shapes.append(Shape(disc, settings.surface, colour, (x, y, 0.4 * height), radio=PLASTIC))
+        core = rotors = settings.mass / 2.0
+        arm = settings.arm * settings.arm
+        level = core * (side * side + height * height) / 12.0 + rotors * arm / 2.0
+        upright = core * side * side / 6.0 + rotors * arm
+        link = Link(name, "free", tuple(shapes), settings.mass, (level, level, upright))
+        return Body(name, "quadrotor", ORIGIN, (link,), speed_limit=settings.speed_limit)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, at rest."""
+        at = self._at
+        view.write(at.slot("position"), *self._settings.at.position)
+        view.write(at.slot("orientation"), *self._settings.at.orientation)
+        view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is within its speed limit and its reach."""
+        at, velocity, spin = self._position, self._velocity, self._spin
+        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
+        vx, vy, vz = numbers[velocity : velocity + 3]
+        a, b, c = numbers[spin : spin + 3]
+        most = self._settings.speed_limit
+        return (
+            dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max
+            and vx * vx + vy * vy + vz * vz <= most * most
+            and a * a + b * b + c * c <= SPIN_MAX * SPIN_MAX
+        )

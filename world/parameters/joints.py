@@ -1,0 +1,80 @@
+"""Actuators of joints: which joints of a robot one drives, and what these can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Annotated, Final
+
+from msgspec import Meta
+from pydantic import Field
+
+from foosim.common.errors import BadValue
+from foosim.common.names import nearest_name
+from foosim.common.spec_base import Name
+from foosim.world.components.mounted import body_on
+from foosim.world.components.view import Mounting, Slot, View, WritableView
+from foosim.world.forms.forms import Carrier
+from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.scene import Link
+
+JOINTS_MAX: Final = 64
+FORCE_MAX: Final = 1e6
+"""What a joint without a limit of its effort is driven with at most (N or N m)."""
+SPEED_MAX: Final = 1e3
+"""How fast a joint without a limit of its speed is driven at most (m/s or rad/s)."""
+
+Many = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]
+"""A number for each joint: m or rad, m/s or rad/s, N or N m."""
+
+
+class JointSettings(ActuatorSettings):
+    """Drives the named joints of a robot, in this order; all, in the order of its links, where none are named."""
+
+    joints: Annotated[list[Name], Field(min_length=1, max_length=JOINTS_MAX)] | None = None
+
+
+def set_points(settings: JointSettings, carrier: Carrier) -> Mapping[str, int]:
+    """Return the slots of an actuator of joints: a set-point for each. Raises BadValue for a robot without joints."""
+    if carrier.joints == 0:
+        raise BadValue("an actuator of joints on a robot without any", settings.kind)
+    if settings.joints is None:
+        return {"set_point": carrier.joints}
+    if len(settings.joints) > carrier.joints or len(set(settings.joints)) < len(settings.joints):
+        raise BadValue(f"{carrier.joints} joints, each once, are valid", settings.joints)
+    return {"set_point": len(settings.joints)}
+
+
+class JointGroup:
+    """The joints that an actuator drives, in the frames of one layout."""
+
+    def __init__(self, settings: JointSettings, at: Mounting) -> None:
+        """Raises BadValue for a joint that the robot does not have."""
+        body = body_on(at)
+        names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
+        for name in settings.joints or ():
+            if name not in names:
+                problem = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
+                raise BadValue(problem, name, nearest_name(name, names))
+        self.indices = tuple(names.index(name) for name in settings.joints or names)
+        self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
+        self.set_point: Slot = at.slot("set_point")
+        start = at.robot.offsets["joint_positions"]
+        self._positions = [start + index for index in self.indices]
+        self.forces = tuple(min(link.effort, FORCE_MAX) for link in self.links)
+        self.speeds = tuple(min(link.speed, SPEED_MAX) for link in self.links)
+        ends = [link.limits if link.joint in ("prismatic", "revolute") else (-inf, inf) for link in self.links]
+        self.lows, self.highs = tuple(low for low, _ in ends), tuple(high for _, high in ends)
+
+    def positions(self, view: View) -> list[float]:
+        """Return where the joints are (m or rad)."""
+        return [view.numbers[at] for at in self._positions]
+
+    def take(self, wanted: Sequence[float], lows: Sequence[float], highs: Sequence[float], view: WritableView) -> bool:
+        """Make numbers the set-points; False where there are too many or few of them, or one is out of its bounds."""
+        if len(wanted) != len(self.indices):
+            return False
+        if not all(low <= one <= high for one, low, high in zip(wanted, lows, highs, strict=True)):
+            return False
+        view.write(self.set_point, *wanted)
+        return True

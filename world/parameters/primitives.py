@@ -1,0 +1,92 @@
+"""Rigid objects of one shape: their settings, and what their models have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from foosim.common import units
+from foosim.common.spec_base import Name, default
+from foosim.common.units import Quantity
+from foosim.world.components.view import Mounting, WritableView
+from foosim.world.forms.forms import BODY, CONTACTS, PARTNERS, RESTING
+from foosim.world.forms.settings import EntitySettings
+from foosim.world.materials import UNKNOWN, Radio
+from foosim.world.physics import DEFAULT
+from foosim.world.placing import At
+from foosim.world.scene import ORIGIN, Body, Geometry, Link, Shape, Vector
+from foosim.world.scenery import Material
+
+ObjectMass = Annotated[float, Quantity(units.MASS, "1 mg", "1000000 kg")]
+Extent = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "1000 m")]
+SpeedLimit = Annotated[float, Quantity(units.SPEED, "1 mm/s", "10000 m/s")]
+
+SPIN_MAX: Final = 1000.0
+"""The greatest rate of turning that can be (rad/s): Bullet clamps at this."""
+ROUNDING: Final = 1.000001
+"""A way is no longer than its speed allows, but for rounding."""
+RIGID: Final = {**BODY, **CONTACTS, **PARTNERS, **RESTING, "quarantined": 1}
+"""The fields of a free rigid body."""
+
+
+class ObjectSettings(EntitySettings):
+    """A rigid object: where it is at tick 0 (its middle), its mass, the surface that others feel, its looks.
+
+    No part of it is ever faster than `speed_limit`: one that is comes into quarantine. Bodies within twice the way that
+    this is in a tick are solved together, so a limit that is near what happens makes a world cheap.
+    """
+
+    at: At = Field(default_factory=lambda: At.model_validate({}))
+    mass: ObjectMass
+    surface: Name = DEFAULT
+    speed_limit: SpeedLimit = default("10 m/s")
+    material: Material = Field(default_factory=Material)
+    radio: Radio | None = None
+
+
+class RigidObject:
+    """An entity of one shape and a uniform density, in the frames of one layout."""
+
+    def __init__(self, settings: ObjectSettings, at: Mounting, geometry: Geometry, inertia: Vector) -> None:
+        """`inertia` is the diagonal about the middle of the shape, for a mass of 1 kg (m2)."""
+        self._settings, self._at, self._geometry, self._inertia = settings, at, geometry, inertia
+        self._position, self._velocity = at.slot("position").at, at.slot("linear_velocity").at
+        self._spin = at.slot("angular_velocity").at
+        self._speed_max = settings.speed_limit
+        self._way_max = settings.speed_limit * at.spec.tick_ns / 1e9 * ROUNDING
+
+    def body(self) -> Body:
+        """Return the shape."""
+        settings, name = self._settings, self._at.robot.name
+        radio = UNKNOWN if settings.radio is None else settings.radio
+        shape = Shape(self._geometry, settings.surface, settings.material.colour, radio=radio)
+        x, y, z = self._inertia
+        mass = settings.mass
+        link = Link(name, "free", (shape,), mass, (mass * x, mass * y, mass * z))
+        return Body(name, settings.model, ORIGIN, (link,), speed_limit=settings.speed_limit)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, at rest."""
+        at = self._at
+        view.write(at.slot("position"), *self._settings.at.position)
+        view.write(at.slot("orientation"), *self._settings.at.orientation)
+        view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
+
+    def stir(self, view: WritableView) -> None:
+        """Push and turn it, for the small run that tells engines apart."""
+        view.write(self._at.slot("linear_velocity"), 0.3, 0.2, 0.1)
+        view.write(self._at.slot("angular_velocity"), 0.5, -0.3, 1.0)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is within its speed limit and its reach."""
+        at, velocity, spin = self._position, self._velocity, self._spin
+        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
+        vx, vy, vz = numbers[velocity : velocity + 3]
+        a, b, c = numbers[spin : spin + 3]
+        return (
+            dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max
+            and vx * vx + vy * vy + vz * vz <= self._speed_max * self._speed_max
+            and a * a + b * b + c * c <= SPIN_MAX * SPIN_MAX
+        )
