@@ -7,8 +7,8 @@ from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form, with_article, word_of
-from foosim.world.forms.settings import BASES, RobotSettings
+from foosim.world.forms.forms import Form, Model, with_article, word_of
+from foosim.world.forms.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
 OPEN: Final = {base.__name__: form for form, base in BASES.items()}
@@ -27,15 +27,19 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
     schema["properties"]["engine"] = _any_engine(installed=installed)
     definitions = schema["$defs"]
     for name, form in OPEN.items():
-        definitions[name] = _any_of_form(form, definitions, installed=installed)
+        if form != "model":
+            definitions[name] = _any_of_form(form, definitions, installed=installed)
     properties = {key: value for key, value in schema["properties"].items() if key != KITS}
     for kind in registry.names("kit"):
         kit = registry.find("kit", kind)
         if installed or kit.module.startswith(OWN):
             properties[kind] = {"$ref": REF + _add(kit, definitions)}
-    robots = definitions.pop(RobotSettings.__name__)
-    ((pattern, _),) = properties["robots"]["patternProperties"].items()
-    properties["robots"] = {**properties["robots"], "patternProperties": {pattern: robots}}
+    for section, is_robot in (("robots", True), ("objects", False)):
+        entities = _any_of_form("model", definitions, installed=installed, is_robot=is_robot)
+        ((pattern, _),) = properties[section]["patternProperties"].items()
+        properties[section] = {**properties[section], "patternProperties": {pattern: entities}}
+    for name in (RobotSettings.__name__, EntitySettings.__name__):
+        definitions.pop(name)
     schema["properties"] = properties
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}
 
@@ -56,13 +60,18 @@ def _class() -> dict[str, Any]:
     return {"pattern": CLASS_PATTERN, "title": "Class", "type": "string"}
 
 
-def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool) -> dict[str, Any]:
-    """Return the schema of anything of a form by its kind, and add that of each kind to the definitions."""
+def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:
+    """Return the schema of anything of a form by its kind, and add that of each kind to the definitions.
+
+    Of models those of robots, or those of objects: what only a kit brings is none of these.
+    """
     key = "model" if form == "model" else "kind"
     mapping = {}
     for kind in registry.names(form):
         found = registry.find(form, kind)
-        if (not installed and not found.module.startswith(OWN)) or not getattr(found, "is_robot", True):
+        if not installed and not found.module.startswith(OWN):
+            continue
+        if isinstance(found, Model) and (found.is_robot != is_robot or (found.kit and not is_robot)):
             continue
         name = _add(found, definitions)
         mapping[kind] = REF + name

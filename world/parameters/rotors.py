@@ -34,7 +34,7 @@ class QuadrotorRobot(RobotSettings):
     height: Extent = default("10 cm")
     rotor_radius: Extent = default("12 cm")
     rotor_speed: RotorSpeed = default("900 rad/s")
-    thrust_factor: Annotated[float, Field(gt=0, le=1)] = 9.0e-6
+    thrust_factor: Annotated[float, Field(ge=1e-9, le=1)] = 9.0e-6
     drag_factor: Annotated[float, Field(ge=0, le=1)] = 1.5e-7
     surface: Name = DEFAULT
     speed_limit: SpeedLimit = default("30 m/s")
