@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
-from foosim.common.units import parse_ns, period_ticks
+from foosim.common.units import NS_PER_S, parse_ns
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule
@@ -32,7 +32,7 @@ from foosim.world.forms.settings import (
     RobotSettings,
     SensorSettings,
 )
-from foosim.world.spec import KITS
+from foosim.world.spec import KITS, schedule_of
 
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
@@ -263,10 +263,13 @@ class _Reader:
         """Return the least time between two values; None where it is wrong, which is found elsewhere."""
         try:
             tick_ns = parse_ns(self._data.get("tick"))
-            ticks = period_ticks(settings.rate_hz, tick_ns) if isinstance(settings, SensorSettings) else 1
-            return (tick_ns if component.speaks else ticks * tick_ns) or None
-        except (BadValue, ZeroDivisionError):
+        except BadValue:
             return None
+        if not isinstance(settings, SensorSettings) or component.speaks:
+            return tick_ns or None
+        if not 0 < tick_ns * settings.rate_hz <= NS_PER_S:
+            return None
+        return schedule_of(settings, tick_ns).least_ticks * tick_ns
 
 
 def _unfit(

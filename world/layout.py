@@ -320,7 +320,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
 
 def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> int:
     """Return the least time between two readings: a sensor that speaks may measure at each tick."""
-    return spec.tick_ns if sensor.speaks else spec.turns(settings)[0] * spec.tick_ns
+    return spec.tick_ns if sensor.speaks else spec.schedule(settings).least_ticks * spec.tick_ns
 
 
 def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:

@@ -194,7 +194,8 @@ class Mounting:
 class ModifierMounting:
     """What a modifier is on: the numbers of a reading or command, with the bounds of each, and the key of its draws.
 
-    `period_s` is the time between two readings, or a tick's for commands.
+    `period_s` is the time between two readings, `period_ticks` the least number of ticks between them: where the period
+    is not whole ticks, some are one tick farther apart. Those of commands are a tick's.
     """
 
     mounting: Mounting
@@ -203,12 +204,8 @@ class ModifierMounting:
     high: tuple[float, ...]
     tick_ns: int
     period_s: float
+    period_ticks: int
     key: bytes
-
-    @property
-    def period_ticks(self) -> int:
-        """The ticks between two readings; 1 for commands."""
-        return round(self.period_s * 1e9 / self.tick_ns)
 
     def slot(self, field: str) -> Slot:
         """Return a slot of the modifier."""

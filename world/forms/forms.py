@@ -50,7 +50,8 @@ CONTACTS: Final[Mapping[str, int]] = MappingProxyType({"contacts": 3})
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """What a modifier is on: how many numbers a value has, and in which time they come one after the other (ns).
+    """What a modifier is on: how many numbers a value has, and the least time in which they follow each other: whole
+    ticks (ns).
 
     Commands come in a tick's time at the earliest.
     """
