@@ -15,7 +15,7 @@ from foosim.common.spec_base import SpecBase
 from foosim.common.units import NS_PER_S, parse_ns
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule
+from foosim.world.forms.forms import NO_SLOTS, Carrier, Component, Form, Model, WorldRule
 from foosim.world.forms.misfits import (
     component_problems,
     model_problems,
@@ -192,7 +192,9 @@ class _Reader:
             if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
                 assert isinstance(component, Component), component
                 self.findings += self._unfit_slots(component, found, location)
-                self.findings += self._unfit_modifiers(component, found, location)
+                if model is not None or not callable(component.several):
+                    counts = NO_SLOTS if model is None else model.slots
+                    self.findings += self._unfit_modifiers(component, found, counts, location)
             return found
         except UnknownName as error:
             self.findings.append(Finding((*location, "kind"), error.problem, kind, error.nearest))
@@ -227,10 +229,17 @@ class _Reader:
             yield from _unknown_slots(component, settings, Carrier(0, period_ns), location)
 
     def _unfit_modifiers(
-        self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
+        self,
+        component: Component,
+        settings: SensorSettings | ActuatorSettings,
+        counts: Mapping[str, int],
+        location: Location,
     ) -> Iterator[Finding]:
-        """Yield the settings of modifiers that do not fit the readings or commands that these are on."""
-        numbers = numbers_of(component, settings)
+        """Yield the settings of modifiers that do not fit the readings or commands that these are on.
+
+        `counts` are how many numbers the fields of the robot have.
+        """
+        numbers = numbers_of(component, settings, counts)
         for number, modifier in enumerate(settings.modifiers):
             place: Location = (*location, "modifiers", number)
             if numbers is None:

@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr, SerializeAsAny
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
+from foosim.world.earth import EarthOrigin
 from foosim.world.forms.settings import RobotSettings, RuleSettings, SceneSettings
 from foosim.world.mesh import Mesh
 from foosim.world.scene import Shape
@@ -79,6 +80,7 @@ class WorldSpec(SpecBase):
     kits: dict[str, SerializeAsAny[SpecBase]] = Field(default={}, max_length=KITS_MAX)
     rules: dict[Name, SerializeAsAny[RuleSettings]] = Field(default={}, max_length=RULES_MAX)
     scene: SerializeAsAny[SceneSettings] | None = None
+    origin: EarthOrigin | None = None
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)

@@ -13,6 +13,7 @@ from foosim.world.physics import Physics
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
+STANDARD_GRAVITY: Final = 9.80665
 FELT_BY_NOBODY: Final = ""
 """The surface of scenery that no rigid body feels."""
 
@@ -36,6 +37,16 @@ def physics_of(spec: WorldSpec) -> Physics:
     found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]  # type: ignore[attr-defined]
     assert len(found) == 1, f"{len(found)} kits say what rigid bodies feel"
     return found[0]  # type: ignore[no-any-return]
+
+
+def gravity_of(spec: WorldSpec) -> float:
+    """Return how fast what falls becomes faster (m/s2), against the world's z: as the kit says that has what rigid
+    bodies feel, else as standard gravity is (3rd CGPM, 1901)."""
+    for _, kit in kits_of(spec):
+        physics: Physics | None = kit.physics()  # type: ignore[attr-defined]
+        if physics is not None:
+            return physics.gravity
+    return STANDARD_GRAVITY
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:

@@ -154,7 +154,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         sensor = _made(component, settings, mounting)
         of_values = Spacing.of_readings(spec, component, settings)
         modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
-        numbers = numbers_of(component, settings)
+        numbers = numbers_of(component, settings, robot.counts)
         fitted.append(
             FittedSensor(
                 robot.name,
@@ -215,7 +215,7 @@ def _modifiers(
     """Yield the modifiers of a component's readings or commands, in order; their draws are keyed by their names."""
     if not settings.modifiers:
         return
-    numbers = numbers_of(component, settings)
+    numbers = numbers_of(component, settings, mounting.robot.counts)
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = made.limits() if component.form == "sensor" and hasattr(made, "limits") else NO_LIMITS

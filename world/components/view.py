@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
+from foosim.common.errors import BadValue
+from foosim.common.finding import Location
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import Entity, Layout
@@ -28,6 +30,14 @@ class ComponentError(Exception):
     def __init__(self, what: str, tick: int, cause: Exception) -> None:
         super().__init__(f"{what} failed at tick {tick}: {failure_of(cause)}")
         self.cause = cause
+
+
+class Misfit(BadValue):
+    """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
+
+    def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
+        super().__init__(what, value, nearest)
+        self.path = path
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +231,8 @@ class ModifierMounting:
 class Sensor(Protocol):
     """What the tick of a node asks of a sensor. It is made from its settings and its mounting.
 
-    A class may have three more methods: `limits()`, the least and greatest value of each field that it can measure;
+    A class may have four more methods: the static `check(settings, at)`, which raises Misfit where the settings do not
+    fit robot or world; `limits()`, the least and greatest value of each field that it can measure;
     the static `together(sensors)`, which returns an object whose `sample(view)` gives the numbers of the readings of
     several as an array of shape (sensors, numbers), with the same bits; and the static `rays(sensors, numbers)`, which
     returns both ends of each ray that several send, as an array of shape (rays, 6) in the world's frame (m), to be
