@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from foosim.common.finding import Finding
 from foosim.common.keyed_random import draw_key
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.misfit import Misfit
+from foosim.world.components.view import Mounting
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
 from foosim.world.spec import WorldSpec

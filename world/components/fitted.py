@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
@@ -24,7 +24,7 @@ from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
 from foosim.world.layout import Entity, Layout, modifier_labels
-from foosim.world.spec import Schedule, WorldSpec
+from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
 
@@ -50,11 +50,14 @@ class FittedModifier:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSensor:
-    """A sensor of one robot: the channel of its readings, its schedule, the slot that counts them."""
+    """A sensor of one robot: the channel of its readings, its schedule (`spec.Schedule`) number by number,
+    which is read at each tick, and the slot that counts them."""
 
     robot: str
     channel: str
-    schedule: Schedule
+    step: int
+    shift: int
+    period: int
     samples_at: int
     sensor: Sensor
     codec: PayloadCodec
@@ -66,8 +69,9 @@ class FittedSensor:
 
     def is_due(self, tick: int, numbers: Sequence[float]) -> bool:
         """Whether it measures at a tick, at whose start the numbers of the frame are these."""
-        step, shift, period = self.schedule
-        return (tick * step + shift) % period < step or (self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0)
+        return (tick * self.step + self.shift) % self.period < self.step or (
+            self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0
+        )
 
     def sample(self, view: WritableView) -> Any:
         """Return what is measured. Raises ComponentError."""
@@ -152,14 +156,14 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         key = draw_key(spec.seed, "sensor", robot.name, channel)
         mounting = Mounting(spec, layout, robot, channel, key, is_owners=True)
         sensor = _made(component, settings, mounting)
-        of_values = Spacing.of_readings(spec, component, settings)
+        of_values = _spacing(spec, component, settings)
         modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
         numbers = numbers_of(component, settings, robot.counts)
         fitted.append(
             FittedSensor(
                 robot.name,
                 channel,
-                spec.schedule(settings),
+                *spec.schedule(settings),
                 robot.offsets[f"{channel}.{SAMPLES}"],
                 sensor,
                 codec_of(settings.kind, "sensor"),
@@ -197,12 +201,12 @@ class Spacing(NamedTuple):
     least_ticks: int
     period_s: float
 
-    @classmethod
-    def of_readings(cls, spec: WorldSpec, sensor: Component, settings: SensorSettings) -> Self:
-        """That of a sensor's readings; one that speaks may have one at each tick."""
-        if sensor.speaks:
-            return cls(1, spec.tick_ns / 1e9)
-        return cls(spec.schedule(settings).least_ticks, float(1 / settings.rate_hz))
+
+def _spacing(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> Spacing:
+    """Return that of a sensor's readings; one that speaks may have one at each tick."""
+    if sensor.speaks:
+        return Spacing(1, spec.tick_ns / 1e9)
+    return Spacing(spec.schedule(settings).least_ticks, float(1 / settings.rate_hz))
 
 
 def _modifiers(

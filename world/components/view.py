@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
-from foosim.common.errors import BadValue
-from foosim.common.finding import Location
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import Entity, Layout
@@ -30,14 +28,6 @@ class ComponentError(Exception):
     def __init__(self, what: str, tick: int, cause: Exception) -> None:
         super().__init__(f"{what} failed at tick {tick}: {failure_of(cause)}")
         self.cause = cause
-
-
-class Misfit(BadValue):
-    """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
-
-    def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
-        super().__init__(what, value, nearest)
-        self.path = path
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,9 @@ from pydantic import Field
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.common.spec_base import Name
+from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import body_at
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import Mounting, View
 from foosim.world.forms.forms import JOINTS
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
