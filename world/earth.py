@@ -18,8 +18,8 @@ FLATTENING: Final = 1.0 / 298.257223563
 SEMI_MINOR_M: Final = SEMI_MAJOR_M * (1.0 - FLATTENING)
 ECCENTRICITY2: Final = FLATTENING * (2.0 - FLATTENING)
 """The square of the first eccentricity; that of the second one is this by 1 - ECCENTRICITY2."""
-ROUNDS: Final = 4
-"""Rounds of Bowring's formula: up to 100 km of height two reach the last digits of a float."""
+ROUNDS: Final = 2
+"""Rounds of Bowring's formula: up to 1000 km of height one is right to 5 mm, two to the last digits of a float."""
 
 Point = tuple[float, float, float]
 Latitude = Annotated[float, Quantity(units.ANGLE, "-90 deg", "90 deg")]

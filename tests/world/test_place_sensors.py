@@ -96,6 +96,17 @@ def test_the_axes_of_the_ellipsoid(geodetic: Vector, ecef: Vector) -> None:
     assert abs(geodetic[0]) > 1.5 or longitude == pytest.approx(geodetic[1])
 
 
+@given(st.floats(-pi / 2, pi / 2), st.floats(-3.1, 3.1), st.floats(-11e3, 1e6))
+def test_a_place_of_the_earth_comes_back_to_the_last_digits(latitude: float, longitude: float, altitude: float) -> None:
+    place = to_ecef((latitude, longitude, altitude))
+    assert to_ecef(to_geodetic(place)) == pytest.approx(place, rel=0, abs=1e-8)
+
+
+def test_45_degrees_at_a_height_come_back_to_the_last_digits() -> None:
+    place = to_ecef((pi / 4, 0.3, 1e6))
+    assert to_ecef(to_geodetic(place)) == pytest.approx(place, rel=0, abs=1e-8)
+
+
 @given(
     st.decimals(-90, 90, places=6),
     st.decimals(-180, 180, places=6),
