@@ -4,7 +4,7 @@ Quantities are strings with units in a file and SI numbers here; times are integ
 """
 
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
@@ -13,9 +13,10 @@ from foosim.common.units import Quantity
 
 Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
-Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
+RATE_MIN: Final = "1 mHz"
+Rate = Annotated[Fraction, Quantity(units.RATE, RATE_MIN, "10 kHz")]
 Offset = Annotated[int, Quantity(units.TIME, "0 s", "1000 s")]
-"""Offset of an event from the multiples of its period: whole ticks, below the period."""
+"""Offset of an event from the multiples of its period: below the period, whole ticks for who acts in lockstep."""
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Gravity = Annotated[float, Quantity(units.ACCELERATION, "0 m/s2", "100 m/s2")]

@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
-from foosim.common.units import parse_ns, period_ticks
+from foosim.common.units import NS_PER_S, parse_ns
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Carrier, Component, Form, Model, WorldRule, with_article
+from foosim.world.forms.forms import NO_SLOTS, Carrier, Component, Form, Model, WorldRule, with_article
 from foosim.world.forms.misfits import (
     component_problems,
     model_problems,
@@ -32,7 +32,7 @@ from foosim.world.forms.settings import (
     RobotSettings,
     SensorSettings,
 )
-from foosim.world.spec import KITS
+from foosim.world.spec import KITS, schedule_of
 
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
@@ -198,7 +198,9 @@ class _Reader:
             if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
                 assert isinstance(component, Component), component
                 self.findings += self._unfit_slots(component, found, location)
-                self.findings += self._unfit_modifiers(component, found, location)
+                if model is not None or not callable(component.several):
+                    counts = NO_SLOTS if model is None else model.slots
+                    self.findings += self._unfit_modifiers(component, found, counts, location)
             return found
         except UnknownName as error:
             self.findings.append(Finding((*location, "kind"), error.problem, kind, error.nearest))
@@ -233,10 +235,17 @@ class _Reader:
             yield from _unknown_slots(component, settings, Carrier(0, period_ns), location)
 
     def _unfit_modifiers(
-        self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
+        self,
+        component: Component,
+        settings: SensorSettings | ActuatorSettings,
+        counts: Mapping[str, int],
+        location: Location,
     ) -> Iterator[Finding]:
-        """Yield the settings of modifiers that do not fit the readings or commands that these are on."""
-        numbers = numbers_of(component, settings)
+        """Yield the settings of modifiers that do not fit the readings or commands that these are on.
+
+        `counts` are how many numbers the fields of the robot have.
+        """
+        numbers = numbers_of(component, settings, counts)
         for number, modifier in enumerate(settings.modifiers):
             place: Location = (*location, "modifiers", number)
             if numbers is None:
@@ -269,10 +278,13 @@ class _Reader:
         """Return the least time between two values; None where it is wrong, which is found elsewhere."""
         try:
             tick_ns = parse_ns(self._data.get("tick"))
-            ticks = period_ticks(settings.rate_hz, tick_ns) if isinstance(settings, SensorSettings) else 1
-            return (tick_ns if component.speaks else ticks * tick_ns) or None
-        except (BadValue, ZeroDivisionError):
+        except BadValue:
             return None
+        if not isinstance(settings, SensorSettings) or component.speaks:
+            return tick_ns or None
+        if not 0 < tick_ns * settings.rate_hz <= NS_PER_S:
+            return None
+        return schedule_of(settings, tick_ns).least_ticks * tick_ns
 
 
 def _unfit(

@@ -52,6 +52,7 @@ from foosim.deployment.text.yaml import (
 )
 from foosim.deployment.timing_checks import check_timing
 from foosim.world.assembly.sections import findings_of
+from foosim.world.assembly.unfit_sensors import unfit_sensors
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.layout import doubled_slots
 
@@ -281,7 +282,8 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         between = first(doubled_slots(deployment)) or first(_trial_findings(deployment))
-        between = between or first(findings_of(deployment), rules, place_findings(deployment))
+        placed = place_findings(deployment)
+        between = between or first(findings_of(deployment), rules, placed, unfit_sensors(deployment))
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
 

@@ -1,17 +1,21 @@
-"""Checks of a deployment's times: rates and offsets are whole ticks, offsets are below their periods.
+"""Checks of a deployment's times: sensors have any rate up to that of the ticks, rates and offsets of who acts in
+lockstep are whole ticks, offsets are below their periods.
 
 Like `checks`, it reads plain data and skips malformed values.
 """
 
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
+from fractions import Fraction
 from itertools import chain
+from math import ceil
 from typing import Any
 
 from foosim.common import names, units
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.common.units import format_ns
+from foosim.common.spec_base import RATE_MIN
+from foosim.common.units import format_ns, format_rate
 from foosim.deployment.checks import View
 
 Said = dict[tuple[int, str], dict[str, list[str]]]
@@ -29,20 +33,25 @@ def check_timing(data: object) -> Iterator[Finding]:
     if tick_ns is None:
         return
     yield from _substeps(view, tick_ns)
-    for place in _sampled(view):
+    for place in _sensors(view):
+        yield from _sensor(view, place, tick_ns)
+    for place in _lockstep(view):
         yield from _rate(view, (*place, "rate"), tick_ns)
         yield from _offset(view, place, tick_ns)
     yield from _rate(view, ("capture", "poses"), tick_ns)
 
 
-def _sampled(view: View) -> Iterator[Location]:
-    """Sensors and lockstep clients: their ticks follow from rate and offset."""
+def _sensors(view: View) -> Iterator[Location]:
     seen: set[int] = set()
     for robot in view.robots:
         sensors = view.mapping("robots", robot, "sensors")
         if id(sensors) not in seen:  # robots that are like a template share its sensors
             seen.add(id(sensors))
             yield from (("robots", robot, "sensors", channel) for channel in sensors)
+
+
+def _lockstep(view: View) -> Iterator[Location]:
+    """Lockstep clients: their ticks follow from rate and offset."""
     for section, is_default in (("players", True), ("clients", False)):
         for name in view.mapping(section):
             if _in_lockstep(view, section, name, is_default=is_default):
@@ -61,6 +70,30 @@ def _substeps(view: View, tick_ns: int) -> Iterator[Finding]:
         valid = sorted((n for n in range(1, 65) if tick_ns % n == 0), key=lambda n: (abs(n - substeps), n))
         what = f"does not divide the tick of {tick_ns} ns"
         yield Finding(("substeps",), what, substeps, " and ".join(str(n) for n in sorted(valid[:2])))
+
+
+def _sensor(view: View, place: Location, tick_ns: int) -> Iterator[Finding]:
+    """A sensor has at most a reading at each tick, and its offset is below its period."""
+    text, offset = view.get(*place, "rate"), view.get(*place, "offset")
+    try:
+        rate = units.parse(text, units.RATE)
+    except BadValue:
+        return
+    fastest = Fraction(units.NS_PER_S, tick_ns)
+    if rate > fastest:
+        valid = f"valid are {RATE_MIN} to {format_rate(fastest)}"
+        yield Finding((*place, "rate"), f"above the rate of the ticks: {valid}", text, repr(format_rate(fastest)))
+    if rate <= 0 or rate > fastest or offset is None:
+        return
+    try:
+        offset_ns = units.parse_ns(offset)
+    except BadValue:
+        return
+    period_ns = units.NS_PER_S / rate
+    if offset_ns >= period_ns:
+        period = format_ns(int(period_ns)) if period_ns.denominator == 1 else f"{1 / rate} s"
+        valid = f"valid are {format_ns(0)} to {format_ns(ceil(period_ns) - 1)}"
+        yield Finding((*place, "offset"), f"not below the period of {period}: {valid}", offset)
 
 
 def _rate(view: View, place: Location, tick_ns: int) -> Iterator[Finding]:

@@ -307,7 +307,9 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
-        slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator), spec.tick_ns)
+        slots |= _slots_of_modifiers(
+            label, actuator.modifiers, numbers_of(component, actuator, model.slots), spec.tick_ns
+        )
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
         slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
@@ -316,14 +318,14 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         component = registry.find_component("sensor", sensor.kind)
         period_ns = least_period_ns(spec, component, sensor)
         slots = _slots(label, component, sensor, Carrier(0, period_ns, joints))
-        slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor), period_ns)
+        slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor, model.slots), period_ns)
         slots[f"{label}.{SAMPLES}"] = 1
         yield Declaring(f"sensor {label}", (*place, "sensors", label), slots, is_owners=True)
 
 
 def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> int:
     """Return the least time between two readings: a sensor that speaks may measure at each tick."""
-    return spec.tick_ns if sensor.speaks else spec.turns(settings)[0] * spec.tick_ns
+    return spec.tick_ns if sensor.speaks else spec.schedule(settings).least_ticks * spec.tick_ns
 
 
 def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:

@@ -21,8 +21,7 @@ class Sampling:
 
     def __init__(self, spec: WorldSpec) -> None:
         sensors = [sensor for robot in spec.robots.values() for sensor in robot.sensors.values()]
-        self._turns = tuple(sorted({spec.turns(sensor) for sensor in sensors}))
-        """Period and offset, in ticks."""
+        self._schedules = tuple(sorted({spec.schedule(sensor) for sensor in sensors}))
         self._speaking = sorted(
             {
                 (name, speaks)
@@ -37,7 +36,7 @@ class Sampling:
 
     def is_due(self, tick: int) -> bool:
         """Whether some sensor samples at a tick by its rate."""
-        return any(tick % period == offset for period, offset in self._turns)
+        return any((tick * step + shift) % period < step for step, shift, period in self._schedules)
 
     def may_be_due(self, tick: int) -> bool:
         """Whether some sensor may sample at a tick whose frame is not known."""

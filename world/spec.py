@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Annotated, Final, Protocol, Self, TypeVar
+from math import gcd
+from typing import Annotated, Final, NamedTuple, Protocol, Self, TypeVar
 
 from pydantic import Field, PrivateAttr, SerializeAsAny
 
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
+from foosim.world.earth import EarthOrigin
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.mesh import Mesh
 from foosim.world.physics import PhysicsSettings, SurfaceSettings
@@ -36,6 +38,39 @@ class Timed(Protocol):
         """By how much later than a multiple of the period."""
 
 
+class Schedule(NamedTuple):
+    """The ticks at which a sensor is due: those k for which (k step + shift) mod period is below the step.
+
+    A reading is due at times t for which (t - offset) rate is whole. It is taken at the first tick not before, so at
+    most a tick's length later: at tick k where floor((k T - offset) rate) is more than at tick k - 1, T being the tick.
+    The numbers are this inequality in integers, divided by what they have in common. With a period of n whole ticks
+    they are 1, -offset in ticks, n.
+    """
+
+    step: int
+    shift: int
+    period: int
+
+    def is_due(self, tick: int) -> bool:
+        """Whether a reading is taken at a tick."""
+        return (tick * self.step + self.shift) % self.period < self.step
+
+    @property
+    def least_ticks(self) -> int:
+        """The least number of ticks between two readings; where they are not as many each time, there is one more."""
+        return self.period // self.step
+
+
+def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
+    """Return the schedule of what happens at a rate, which is not above that of the ticks."""
+    rate = timed.rate_hz
+    step, period = tick_ns * rate.numerator, units.NS_PER_S * rate.denominator
+    shift = -timed.offset_ns * rate.numerator
+    assert 0 < step <= period, f"{rate} Hz at ticks of {tick_ns} ns"
+    common = gcd(step, shift, period)
+    return Schedule(step // common, shift // common % (period // common), period // common)
+
+
 class WorldSpec(SpecBase):
     """The world: its robots, the sections of kits, rules, a scene, and fixed things."""
 
@@ -47,6 +82,7 @@ class WorldSpec(SpecBase):
     kits: dict[str, SerializeAsAny[SpecBase]] = Field(default={}, max_length=KITS_MAX)
     rules: dict[Name, SerializeAsAny[RuleSettings]] = Field(default={}, max_length=RULES_MAX)
     scene: SerializeAsAny[SceneSettings] | None = None
+    origin: EarthOrigin | None = None
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
     physics: PhysicsSettings | None = None
@@ -98,5 +134,9 @@ class WorldSpec(SpecBase):
         return period_ticks(rate_hz, self.tick_ns)
 
     def turns(self, timed: Timed) -> tuple[int, int]:
-        """Period and offset, in ticks, of a sensor or of a player in lockstep: its ticks are offset + n periods."""
+        """Period and offset, in ticks, of a player in lockstep: its ticks are offset + n periods."""
         return self.ticks(timed.rate_hz), timed.offset_ns // self.tick_ns
+
+    def schedule(self, sensor: Timed) -> Schedule:
+        """The ticks of a sensor."""
+        return schedule_of(sensor, self.tick_ns)

@@ -88,13 +88,13 @@ def test_a_text_without_its_files_is_refused() -> None:
 def test_problems_are_in_the_file_that_they_are_written_in(files: Files) -> None:
     source = files(
         f="include: [a/a.yaml, b.yaml]\n" + HEAD + "nodes: {one: {robots: ['*']}}\nclients: {c: {on: r-4}}\n",
-        a_a=ROVER.replace("rate: 5 Hz", "rate: 3 Hz") + "  other: {modl: 1, class: 'a:B'}\n",
+        a_a=ROVER.replace("rate: 5 Hz", "rate: 60 Hz") + "  other: {modl: 1, class: 'a:B'}\n",
         b="# text\n" + ROBOTS.replace("x: 1 m", "x: 1 kg") + SHELF.replace("width", "widht"),
     )
     assert refused(source) == [
         "f.yaml:11:19: clients.c.on: unknown robot, 'r-4', nearest is 'r-1'",
-        "a/a.yaml:5:32: templates.rover.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
-        "nearest is '50/17 Hz' and '3.125 Hz'",
+        "a/a.yaml:5:32: templates.rover.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, "
+        "'60 Hz', nearest is '50 Hz'",
         "a/a.yaml:7:11: templates.other: unknown key, 'modl'",
         "b.yaml:2:40: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km), '1 kg', nearest is '1 km'",
         "b.yaml:4:10: scenery.shelf: missing key, 'width'",

@@ -91,9 +91,9 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
         (("rate: 5 Hz", "rate: 5 Hx"),
          "5:32: templates.rover.sensors.pose.rate: not a rate (a number and one of Hz, kHz, mHz), '5 Hx', "
          "nearest is '5 Hz'"),
-        (("rate: 5 Hz", "rate: 3 Hz"),
-         "5:32: templates.rover.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
-         "nearest is '50/17 Hz' and '3.125 Hz'"),
+        (("rate: 5 Hz", "rate: 60 Hz"),
+         "5:32: templates.rover.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
+         "nearest is '50 Hz'"),
         (("5 Hz, offset", "5 Hz, ofset"),
          "5:38: templates.rover.sensors.pose: unknown key, 'ofset', nearest is 'offset'"),
         (("kind: pose, rate: 5 Hz, ", "kind: pose, "),
@@ -117,12 +117,12 @@ def test_what_is_wrong_with_a_template_is_said_there_once(change: tuple[str, str
 
 def test_what_an_entry_has_beside_its_template_is_wrong_there() -> None:
     bad = TWENTY.replace("r7: {like: rover, x: -3 m", "r7: {like: rover, x: -3 mm/s")
-    bad = bad.replace("r8: {like: rover, x: -2 m, ", "r8: {like: rover, sensors: {pose: {rate: 3 Hz}}, ")
+    bad = bad.replace("r8: {like: rover, x: -2 m, ", "r8: {like: rover, sensors: {pose: {rate: 60 Hz}}, ")
     assert problems_of(hall(ROVER + bad)) == [
         "15:24: robots.r7.x: not a length (a number and one of m, cm, mm, um, km), '-3 mm/s', nearest is '-3 mm'",
         "16:7: robots.r8: missing key, 'x'",
-        "16:44: robots.r8.sensors.pose.rate: not a whole number of ticks of 20 ms, '3 Hz', "
-        "nearest is '50/17 Hz' and '3.125 Hz'",
+        "16:44: robots.r8.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
+        "nearest is '50 Hz'",
     ]
 
 
@@ -172,9 +172,9 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
     ("template", "problems"),
     [
         ("  other: {model: rover, charg: 1 %}\n", ["7:25: templates.other: unknown key, 'charg', nearest is 'charge'"]),
-        ("  other: {model: rover, sensors: {p: {kind: pose, rate: 3 Hz}}}\n",
-         ["7:57: templates.other.sensors.p.rate: not a whole number of ticks of 20 ms, '3 Hz', "
-          "nearest is '50/17 Hz' and '3.125 Hz'"]),
+        ("  other: {model: rover, sensors: {p: {kind: pose, rate: 60 Hz}}}\n",
+         ["7:57: templates.other.sensors.p.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
+          "nearest is '50 Hz'"]),
         ("  other: {model: rower}\n",
          ["7:18: templates.other.model: unknown model (there are: camera, rod, rover, station, "
            "or any module:Class), 'rower', "

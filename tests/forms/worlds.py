@@ -114,6 +114,7 @@ class World(NamedTuple):
 
 TABLE: Final = World(_table())
 HALL: Final = World(_hall())
+EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude": "13.4 deg"}})
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -147,9 +148,16 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("motion", "two_wheels"): HALL,
     ("sensor", "ball"): sensor(TABLE, ["camera"], "ball"),
     ("sensor", "battery"): sensor(HALL, ROVERS, "battery"),
+    ("sensor", "contact"): sensor(TABLE, RODS, "contact"),
     ("sensor", "encoder"): sensor(TABLE, RODS, "encoder"),
+    ("sensor", "gps"): sensor(EARTH, ROVERS, "gps", at={"x": "10 cm", "z": "50 cm"}),
+    ("sensor", "imu"): sensor(TABLE, RODS, "imu", at={"link": "spin", "x": "5 cm", "y": "20 cm"}),
+    ("sensor", "joint_state"): sensor(
+        TABLE, RODS, "joint_state", modifiers=[{"kind": "gaussian_noise", "std": {"motion": 0.001, "efforts": 0.5}}]
+    ),
     ("sensor", "odometry"): sensor(HALL, ROVERS, "odometry"),
     ("sensor", "pose"): sensor(HALL, ROVERS, "pose"),
+    ("sensor", "pose_3d"): sensor(HALL, ROVERS, "pose_3d", at={"x": "10 cm", "yaw": "30 deg"}),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
     ("actuator", "rod_position"): TABLE,
     ("actuator", "wheel_speeds"): HALL,

@@ -32,7 +32,15 @@ MODIFIERS: Final[dict[str, Any]] = {
     "odometry": [{"kind": "bias_walk", "initial": "1 mm", "walk": "1 mm"}, {"kind": "delay", "time": "20 ms"}],
     "battery": [{"kind": "quantise", "step": {"voltage": "100 mV"}}, {"kind": "drop_out", "probability": "20 %"}],
     "proximity": [{"kind": "clip", "low": "10 cm", "high": "2 m"}],
+    "pose_3d": [{"kind": "frame_change", "x": "1 m", "yaw": "10 deg"}],
+    "gps": [{"kind": "gaussian_noise", "std": {"horizontal": 1e-5}}],
 }
+OF_ROD: Final[dict[str, Any]] = {
+    "imu": {"kind": "imu", "rate": "333 Hz", "at": {"link": "spin", "x": "5 cm"}},
+    "joints": {"kind": "joint_state", "rate": "70 Hz", "modifiers": [{"kind": "bias_walk", "walk": 0.001}]},
+    "touch": {"kind": "contact", "rate": "7 Hz"},
+}
+"""Sensors of the rod of each goal, at rates that are not whole ticks."""
 UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table")}
 """Scenes are those of the kits; one engine computes."""
 
@@ -50,6 +58,9 @@ def mixed() -> str:
     sensors = {name: {"kind": name, "rate": "50 Hz", "modifiers": modifiers} for name, modifiers in MODIFIERS.items()}
     sensors["proximity"] |= {"rays": 8, "range": "4 m"}
     data["hall"] = hall
+    data["origin"] = {"latitude": "52.5 deg", "longitude": "13.4 deg"}
+    for rod in ("red.goal", "blue.goal"):
+        data["robots"][rod]["sensors"] |= OF_ROD
     data["robots"] |= {
         "rover-1": {"model": "rover", "x": "1.4 m", "y": "0 m", "heading": "170 deg", "sensors": sensors},
         "rover-2": {"model": "rover", "x": "-1.6 m", "y": "1 m", "charge": "50 %", "sensors": sensors},

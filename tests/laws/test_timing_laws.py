@@ -87,6 +87,31 @@ def test_with_offsets_a_vhub_that_is_killed_loses_nothing() -> None:
     assert_the_same(fly(killed, TICKS, OFFSETS), with_offsets())
 
 
+UNEVEN: Final = (
+    *SETS,
+    *BY_PERIOD,
+    "robots.camera.sensors.ball.rate=30 Hz",
+    "robots.camera.sensors.ball.modifiers=[{kind: delay, time: 70 ms}, {kind: bias_walk, walk: 1 mm}]",
+    "robots.red.goal.sensors.encoder.rate=333 Hz",
+    "robots.red.goal.sensors.encoder.offset=1001 us",
+    "robots.red.goal.sensors.encoder.modifiers=[{kind: gaussian_noise, std: {slide: 1 mm}}]",
+)
+
+
+def test_sensors_at_uneven_rates_measure_at_their_ticks_and_are_the_same_world_on_one_node_or_two() -> None:
+    seen = fly([], TICKS, UNEVEN)
+    alone, _ = run(1, UNEVEN)
+    two, _ = run(2, UNEVEN)
+    assert alone.digests == two.digests == seen.run.digests
+    sent = {(f.source, f.sent_ns) for c in seen.closings for f in c.fates}
+    ticks = {name: sorted(ns // 2_000_000 for source, ns in sent if source == name) for name in ("camera", "red.goal")}
+    assert all(ns % 2_000_000 == 0 for _, ns in sent), "the time of a reading is that of its frame"
+    due = [-(-number * 500 // 30) for number in range(TICKS * 30 // 500 + 1)]
+    assert ticks["camera"] == [tick for tick in due if 50 <= tick < TICKS], "those before have waited for their delay"
+    times = [1_001_000 + number * 1_000_000_000 / 333 for number in range(TICKS)]
+    assert ticks["red.goal"] == [tick for tick in (int(-(-ns // 2_000_000)) for ns in times) if tick < TICKS]
+
+
 # --- who acts at arrival ---------------------------------------------------------------------------------------------
 
 

@@ -253,6 +253,8 @@ def test_means_of_models_of_loss_and_delay() -> None:
 # --- sensors and players in step -------------------------------------------------------------------------------------
 
 STEP: Final = "sensor and player are in step"
+RODS: Final = [f"{team}.{line}" for team in ("red", "blue") for line in ("goal", "defence", "midfield", "attack")]
+SENSED: Final = (("camera", "ball"), *((rod, "encoder") for rod in RODS))
 
 
 @pytest.mark.parametrize(
@@ -262,6 +264,8 @@ STEP: Final = "sensor and player are in step"
         ("7 ms", (), f"10 ms old, of which the delay explains 8 ms: {STEP}; an offset of 8 ms"),
         ("1300 us", ("players.player-red.offset=2 ms", "players.player-blue.offset=2 ms"), ""),
         ("10 ms", (), ""),
+        ("1300 us", tuple(f"robots.{robot}.sensors.{name}.rate=30 Hz" for robot, name in SENSED), ""),
+        ("1300 us", tuple(f"robots.{robot}.sensors.{name}.offset=7500 us" for robot, name in SENSED), ""),
         ("1300 us", ("players.player-red.rate=50 Hz", "players.player-blue.rate=50 Hz"), "10 ms old, of which"),
         ("1300 us", tuple(f"players.player-{team}.act=arrival" for team in ("red", "blue"))
          + tuple(f"players.player-{team}.arrivals={{camera: [ball]}}" for team in ("red", "blue")), ""),

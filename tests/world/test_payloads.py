@@ -18,14 +18,19 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.rod_position import Command
 from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
+from foosim.world.sensors.contact import Touches
 from foosim.world.sensors.encoder import RodPosition
+from foosim.world.sensors.gps import GlobalPosition
+from foosim.world.sensors.imu import Inertial
+from foosim.world.sensors.joint_state import JointState
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
+from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -40,10 +45,19 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
     "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
-}
+    "contact": (Touches(2.0, 0.125, -1.0), [2.0, 0.125, -1.0], ["", "N s", ""]),
+    "gps": (GlobalPosition(52.5, -13.25, 1 / 3), [52.5, -13.25, 1 / 3], ["deg", "deg", "m"]),
+    "imu": (Inertial(0.1, -0.2, 9.81, 1.0, 2.0, 1 / 3), [0.1, -0.2, 9.81, 1.0, 2.0, 1 / 3],
+            ["m/s2"] * 3 + ["rad/s"] * 3),
+    "joint_state": (JointState((0.1, 1.5), (-0.5, 2.0), (40.0, 1 / 3)), [0.1, 1.5, -0.5, 2.0, 40.0, 1 / 3], [""] * 3),
+    "pose_3d": (Pose3d(1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8), [1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8],
+                ["m"] * 3 + [""] * 4),
+}  # fmt: skip
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
+SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56}
 """In bytes, of the kinds that have as many numbers always."""
+SEVERAL = {"proximity", "joint_state"}
 
 
 def codec(kind: str) -> PayloadCodec:
@@ -52,7 +66,7 @@ def codec(kind: str) -> PayloadCodec:
 
 def test_every_kind_is_tested() -> None:
     assert sorted(VALUES) == sorted([*names("sensor"), *names("actuator")])
-    assert {*SIZES, "proximity"} == {*VALUES}
+    assert {*SIZES, *SEVERAL} == {*VALUES}
 
 
 @pytest.mark.parametrize("kind", VALUES)
@@ -74,11 +88,11 @@ def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
     fields = codec(kind).fields
     assert [field.name for field in fields] == list(structs.asdict(value))
     assert [field.unit for field in fields] == units
-    assert [field.is_number for field in fields] == [kind != "proximity"] * len(fields)
-    assert [field.is_several for field in fields] == [kind == "proximity"] * len(fields)
+    assert [field.is_number for field in fields] == [kind not in SEVERAL] * len(fields)
+    assert [field.is_several for field in fields] == [kind in SEVERAL] * len(fields)
 
 
-@given(st.sampled_from(sorted(SIZES)), st.binary(max_size=40))
+@given(st.sampled_from(sorted(SIZES)), st.binary(max_size=64))
 def test_random_bytes_are_a_value_or_malformed(kind: str, payload: bytes) -> None:
     if len(payload) == SIZES[kind] and np.isfinite(np.frombuffer(payload, "<f8")).all():
         assert codec(kind).encode(codec(kind).decode(payload)) == payload
@@ -91,6 +105,29 @@ def test_random_bytes_are_a_value_or_malformed(kind: str, payload: bytes) -> Non
 def test_rays_are_one_to_128_finite_numbers(payload: bytes) -> None:
     with pytest.raises(Malformed, match="proximity"):
         codec("proximity").decode(payload)
+
+
+@pytest.mark.parametrize("payload", [b"", bytes(8), bytes(16), bytes(32), bytes(8 * 3 * 257), bytes(25)])
+def test_joints_have_a_position_a_velocity_and_an_effort_each(payload: bytes) -> None:
+    with pytest.raises(Malformed, match="joint_state has 0 and 24 for each of 1 to 256 numbers"):
+        codec("joint_state").decode(payload)
+
+
+@given(st.integers(1, 256))
+def test_several_numbers_of_several_fields_come_back(count: int) -> None:
+    numbers = tuple(float(place) for place in range(3 * count))
+    value = JointState(numbers[:count], numbers[count : 2 * count], numbers[2 * count :])
+    assert codec("joint_state").decode(codec("joint_state").encode(value)) == value
+    assert codec("joint_state").from_numbers(numbers) == value
+    names = [field_at(codec("joint_state").fields, 3 * count, place).name for place in range(3 * count)]
+    assert names == ["positions"] * count + ["velocities"] * count + ["efforts"] * count
+
+
+def test_fields_of_several_numbers_are_of_one_length() -> None:
+    with pytest.raises(BadValue, match=r"joint_state\.efforts is not as many numbers as positions, 2, 1"):
+        codec("joint_state").encode(JointState((0.0, 1.0), (0.0, 1.0), (0.0,)))
+    with pytest.raises(BadValue, match=r"joint_state\.efforts is not finite"):
+        codec("joint_state").encode(JointState((0.0, 1.0), (0.0, 1.0), (0.0, inf)))
 
 
 def test_one_ray_and_128_are_rays() -> None:

@@ -36,6 +36,9 @@ from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
+SENSORS: Final = [
+    *("ball", "battery", "contact", "encoder", "gps", "imu", "joint_state", "odometry", "pose", "pose_3d", "proximity")
+]
 
 GAUGES: Final = '''
 from typing import Annotated
@@ -235,8 +238,8 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
-    assert names("sensor") == ["ball", "battery", "encoder", "odometry", "pose", "proximity"]
-    assert names("actuator") == ["rod_position", "wheel_speeds"]
+    assert names("sensor") == SENSORS
+    assert names("actuator") == ACTUATORS
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]
@@ -269,7 +272,7 @@ print(json.dumps([found, [name for name in sys.modules if name.startswith(folder
     [
         ("sensor", "encodr", ", nearest is 'encoder'"),
         ("sensor", "Pose", ", nearest is 'pose'"),
-        ("sensor", "rod_position", ""),
+        ("sensor", "joint_position", ", nearest is 'joint_state'"),
         ("sensor", "", ""),
         ("sensor", "..", ""),
         ("sensor", "pose.PoseTracker", ""),
@@ -438,7 +441,7 @@ def test_a_package_that_cannot_be_imported_is_named_and_hurts_nobody_else(site: 
         pytest.fail("a package that leaves takes the process with it")
     assert str(error.value) == (
         f"unknown sensor; {BROKEN[module]} "
-        "(there are: ball, battery, encoder, odometry, pose, proximity, reach, or any module:Class), 'reech', "
+        f"(there are: {', '.join(SENSORS)}, reach, or any module:Class), 'reech', "
         "nearest is 'reach'"
     )
     assert find("sensor", "reach").module == "own_gauges" and find("sensor", "encoder").name == "encoder"
@@ -602,7 +605,7 @@ WRONG: Final = (
      [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
        "(is the folder that it is in on PYTHONPATH?), 'own_gone:Idle'")]),
     ("kind: own_gauges.ReachGauge, rate: 100 Hz",
-     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity, "
+     [("own_gauges", f".kind: unknown sensor (there are: {', '.join(SENSORS)}, "
        "or any module:Class), 'own_gauges.ReachGauge'")]),
 )  # fmt: skip
 """Settings, and what is said of them at which word."""

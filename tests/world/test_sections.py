@@ -9,7 +9,7 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly import sections
-from foosim.world.assembly.sections import findings_of, physics_of
+from foosim.world.assembly.sections import findings_of, gravity_of, physics_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -17,6 +17,12 @@ DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 
 def test_the_tables_kit_says_it() -> None:
     assert list(findings_of(DEPLOYMENT)) == [] and physics_of(DEPLOYMENT).gravity == 9.81
+
+
+def test_gravity_is_that_of_the_kit_that_says_it_else_standard_gravity() -> None:
+    hall = TABLE.with_stem("warehouse")
+    assert gravity_of(DEPLOYMENT) == 9.81
+    assert gravity_of(load_deployment(hall.read_text(), hall.name)) == 9.80665
 
 
 def test_two_that_say_it_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

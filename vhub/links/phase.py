@@ -55,7 +55,11 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
             robot = deployment.robots.get(source)
             if robot is None or channel not in robot.sensors:
                 continue
-            every, sampled = deployment.turns(robot.sensors[channel])
+            step, shift, turn = deployment.schedule(robot.sensors[channel])
+            if turn % step:  # its readings are not as many ticks apart each time: it is in step with nobody
+                continue
+            every = turn // step
+            sampled = -(shift // step) % every
             profile = profiles.find(source, name, channel)
             delay = -(-late_ns(profile.settings) // tick_ns)
             common = gcd(period, every)

@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 from foosim.common import units
 from foosim.common.units import Quantity
 from foosim.world.components.drives import Motor, Wrench
-from foosim.world.components.mounted import body_on
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
@@ -46,7 +46,7 @@ class ForceActuator:
     def __init__(self, settings: ForceSettings, at: Mounting) -> None:
         self._force, self._torque = settings.force, settings.torque
         self._set_point = at.slot("set_point")
-        self._back = conjugate(body_on(at).links[0].principal)
+        self._back = conjugate(body_at(at).links[0].principal)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest of each number."""

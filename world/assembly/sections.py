@@ -13,6 +13,7 @@ from foosim.world.physics import Physics, physics_from
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
+STANDARD_GRAVITY: Final = 9.80665
 FELT_BY_NOBODY: Final = ""
 """The surface of scenery that no rigid body feels."""
 
@@ -36,6 +37,11 @@ def physics_of(spec: WorldSpec) -> Physics:
     found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]  # type: ignore[attr-defined]
     assert len(found) <= 1, f"{len(found)} kits say what rigid bodies feel"
     return found[0] if found else physics_from(spec.physics, spec.surfaces)
+
+
+def gravity_of(spec: WorldSpec) -> float:
+    """Return what everything falls with (m/s2)."""
+    return physics_of(spec).gravity
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
@@ -23,7 +23,7 @@ from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, least_period_ns, modifier_labels
+from foosim.world.layout import Entity, Layout, modifier_labels
 from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
@@ -50,12 +50,14 @@ class FittedModifier:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSensor:
-    """A sensor of one robot: the channel of its readings, period and offset in ticks, the slot that counts them."""
+    """A sensor of one robot: the channel of its readings, its schedule (`spec.Schedule`) number by number,
+    which is read at each tick, and the slot that counts them."""
 
     robot: str
     channel: str
+    step: int
+    shift: int
     period: int
-    offset: int
     samples_at: int
     sensor: Sensor
     codec: PayloadCodec
@@ -67,7 +69,9 @@ class FittedSensor:
 
     def is_due(self, tick: int, numbers: Sequence[float]) -> bool:
         """Whether it measures at a tick, at whose start the numbers of the frame are these."""
-        return tick % self.period == self.offset or (self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0)
+        return (tick * self.step + self.shift) % self.period < self.step or (
+            self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0
+        )
 
     def sample(self, view: WritableView) -> Any:
         """Return what is measured. Raises ComponentError."""
@@ -151,17 +155,15 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         component = registry.find_component("sensor", settings.kind)
         key = draw_key(spec.seed, "sensor", robot.name, channel)
         mounting = Mounting(spec, layout, robot, channel, key, is_owners=True)
-        period, offset = spec.turns(settings)
         sensor = _made(component, settings, mounting)
-        least_ns = least_period_ns(spec, component, settings)
-        modifiers = tuple(_modifiers(component, settings, mounting, sensor, least_ns))
-        numbers = numbers_of(component, settings)
+        of_values = _spacing(spec, component, settings)
+        modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
+        numbers = numbers_of(component, settings, robot.counts)
         fitted.append(
             FittedSensor(
                 robot.name,
                 channel,
-                period,
-                offset,
+                *spec.schedule(settings),
                 robot.offsets[f"{channel}.{SAMPLES}"],
                 sensor,
                 codec_of(settings.kind, "sensor"),
@@ -180,7 +182,7 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         component = registry.find_component("actuator", settings.kind)
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "actuator", robot.name, channel))
         made = _made(component, settings, mounting)
-        modifiers = tuple(_modifiers(component, settings, mounting, made, spec.tick_ns))
+        modifiers = tuple(_modifiers(component, settings, mounting, made, Spacing(1, spec.tick_ns / 1e9)))
         fitted.append(FittedActuator(robot.name, channel, made, codec_of(settings.kind, "actuator"), modifiers))
     return tuple(fitted)
 
@@ -193,13 +195,31 @@ def _made(component: Component, settings: ComponentSettings, mounting: Mounting 
         raise ComponentError(f"{component.form} {at.name} of {at.robot.name}", 0, error) from error
 
 
+class Spacing(NamedTuple):
+    """How far apart the values of a component are: the least number of ticks, and the mean time (s)."""
+
+    least_ticks: int
+    period_s: float
+
+
+def _spacing(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> Spacing:
+    """Return that of a sensor's readings; one that speaks may have one at each tick."""
+    if sensor.speaks:
+        return Spacing(1, spec.tick_ns / 1e9)
+    return Spacing(spec.schedule(settings).least_ticks, float(1 / settings.rate_hz))
+
+
 def _modifiers(
-    component: Component, settings: SensorSettings | ActuatorSettings, mounting: Mounting, made: Any, period_ns: int
+    component: Component,
+    settings: SensorSettings | ActuatorSettings,
+    mounting: Mounting,
+    made: Any,
+    of_values: Spacing,
 ) -> Iterator[FittedModifier]:
     """Yield the modifiers of a component's readings or commands, in order; their draws are keyed by their names."""
     if not settings.modifiers:
         return
-    numbers = numbers_of(component, settings)
+    numbers = numbers_of(component, settings, mounting.robot.counts)
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = made.limits() if component.form == "sensor" and hasattr(made, "limits") else NO_LIMITS
@@ -208,6 +228,6 @@ def _modifiers(
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
         key = draw_key(spec.seed, component.form, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
-        at = ModifierMounting(own, numbers, low, high, spec.tick_ns, period_ns / 1e9, key)
+        at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
         made_modifier = _made(registry.find_component("modifier", its.kind), its, at)
         yield FittedModifier(f"modifier {label} of {robot.name} {channel}", made_modifier)

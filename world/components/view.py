@@ -194,7 +194,8 @@ class Mounting:
 class ModifierMounting:
     """What a modifier is on: the numbers of a reading or command, with the bounds of each, and the key of its draws.
 
-    `period_s` is the time between two readings, or a tick's for commands.
+    `period_s` is the time between two readings, `period_ticks` the least number of ticks between them: where the period
+    is not whole ticks, some are one tick farther apart. Those of commands are a tick's.
     """
 
     mounting: Mounting
@@ -203,12 +204,8 @@ class ModifierMounting:
     high: tuple[float, ...]
     tick_ns: int
     period_s: float
+    period_ticks: int
     key: bytes
-
-    @property
-    def period_ticks(self) -> int:
-        """The ticks between two readings; 1 for commands."""
-        return round(self.period_s * 1e9 / self.tick_ns)
 
     def slot(self, field: str) -> Slot:
         """Return a slot of the modifier."""
@@ -224,7 +221,8 @@ class ModifierMounting:
 class Sensor(Protocol):
     """What the tick of a node asks of a sensor. It is made from its settings and its mounting.
 
-    A class may have three more methods: `limits()`, the least and greatest value of each field that it can measure;
+    A class may have four more methods: the static `check(settings, at)`, which raises Misfit where the settings do not
+    fit robot or world; `limits()`, the least and greatest value of each field that it can measure;
     the static `together(sensors)`, which returns an object whose `sample(view)` gives the numbers of the readings of
     several as an array of shape (sensors, numbers), with the same bits; and the static `rays(sensors, numbers)`, which
     returns both ends of each ray that several send, as an array of shape (rays, 6) in the world's frame (m), to be

@@ -59,8 +59,8 @@ RESTING: Final[Mapping[str, int]] = MappingProxyType({"slow_ticks": 1})
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """What a component is on: how many numbers a value has, and in which time they come one after the other (ns); how
-    many joints its robot has.
+    """What a component is on: how many numbers a value has, and the least time in which they follow each other: whole
+    ticks (ns); how many joints its robot has.
 
     Commands come in a tick's time at the earliest. A sensor or actuator is on no numbers, a modifier on no robot.
     """
@@ -101,6 +101,10 @@ SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
 for settings that do not fit that."""
 
 
+SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
+"""How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
     """A registered class: its form and name, the class, and the model of its settings.
@@ -132,7 +136,8 @@ class Component(Form):
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
     that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
-    reading has, if it has several. `moves` says that an actuator commands the motors of its robot: one of a robot may.
+    reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
+    `moves` says that an actuator commands the motors of its robot: one of a robot may.
     `speaks` is a field of the robot: a sensor also measures at each tick at whose start its first number is not 0.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
@@ -141,7 +146,7 @@ class Component(Form):
     value: type[Struct] | None = None
     slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
     needs: tuple[str, ...] = ()
-    several: str = ""
+    several: str | SeveralOf = ""
     speaks: str = ""
     moves: bool = False
     per_field: Mapping[str, float | None] = field(default_factory=dict)

@@ -1,8 +1,9 @@
 """Payloads of packets: readings and commands to and from bytes.
 
 A reading or command is a msgspec struct that its component brings. One of numbers is packed: each a little-endian
-float64 in SI units, a tuple of numbers at the end as many of them as there are. Any other is MessagePack, a map of its
-fields. `echo`, and what players and clients send each other, is any bytes.
+float64 in SI units, a tuple of numbers at the end as many of them as there are; several tuples at the end are of one
+length. Any other is MessagePack, a map of its fields. `echo`, and what players and clients send each other, is any
+bytes.
 """
 
 from __future__ import annotations
@@ -45,11 +46,13 @@ class PayloadCodec:
         self.kind: Final = kind
         self.name: Final = name
         self.fields: Final = tuple(_field(field) for field in _info(kind).fields)
-        self._many = self.fields[-1].is_several
+        self._many = many_of(self.fields)
         count = len(self.fields) - self._many
         self._is_packed = all(field.is_number for field in self.fields[:count])
         self._packed = struct.Struct(f"<{count}d")
-        self._least, self._most = _bounds(_info(kind).fields[-1].type) if self._many else (0, 0)
+        bounds = [_bounds(field.type) for field in _info(kind).fields[count:]]
+        self._least, self._most = max((least for least, _ in bounds), default=0), min((m for _, m in bounds), default=0)
+        """How long each of its tuples is at the least and at the most."""
         self._other = msgspec.msgpack.Decoder(kind)
 
     @property
@@ -78,17 +81,17 @@ class PayloadCodec:
         return self._decode_many(payload)
 
     def _decode_many(self, payload: bytes) -> Any:
-        more, rest = divmod(len(payload) - self._packed.size, 8)
         if not self._many:
             raise Malformed(f"{len(payload)} bytes, {self.name} has {self._packed.size}")
+        more, rest = divmod(len(payload) - self._packed.size, 8 * self._many)
         if rest or not self._least <= more <= self._most:
-            what = f"{self.name} has {self._packed.size} and 8 for each of {self._least} to {self._most} numbers"
+            each = f"{8 * self._many} for each of {self._least} to {self._most} numbers"
+            what = f"{self.name} has {self._packed.size} and {each}"
             raise Malformed(f"{len(payload)} bytes, {what}")
         numbers = struct.unpack(f"<{len(payload) // 8}d", payload)
         if not all(map(isfinite, numbers)):
             raise Malformed(f"{self.name} with numbers that are not finite")
-        count = len(self.fields) - 1
-        return self.kind(*numbers[:count], numbers[count:])
+        return self.from_numbers(numbers)
 
     def encode(self, value: Any) -> bytes:
         """Return the payload of a value; raises BadValue for a number that is none or not finite."""
@@ -98,12 +101,12 @@ class PayloadCodec:
         numbers = self.numbers(value)
         if not self._many and FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers)):
             return self._packed.pack(*numbers)
-        names = [field.name for field in self.fields]
-        more = len(numbers) - len(names) + 1
+        more = (len(numbers) - len(self.fields) + self._many) // self._many if self._many else 0
         if self._many and not self._least <= more <= self._most:
-            raise BadValue(f"{self.name}.{names[-1]} is not {self._least} to {self._most} numbers", more)
+            last = self.fields[-1].name
+            raise BadValue(f"{self.name}.{last} is not {self._least} to {self._most} numbers", more)
         for place, number in enumerate(numbers):
-            self._check(names[min(place, len(names) - 1)], number)
+            self._check(field_at(self.fields, len(numbers), place).name, number)
         return struct.pack(f"<{len(numbers)}d", *numbers)
 
     def encode_numbers(self, numbers: Sequence[float]) -> bytes:
@@ -117,7 +120,11 @@ class PayloadCodec:
     def from_numbers(self, numbers: Sequence[float]) -> Any:
         """Return the value that has these numbers, in the order of its fields."""
         count = len(self.fields) - self._many
-        return self.kind(*numbers[:count], *([tuple(numbers[count:])] if self._many else ()))
+        if not self._many:
+            return self.kind(*numbers)
+        more = (len(numbers) - count) // self._many
+        starts = range(count, count + self._many * more, more) if more else [count] * self._many
+        return self.kind(*numbers[:count], *(tuple(numbers[start : start + more]) for start in starts))
 
     def _check(self, field: str, number: Any) -> None:
         if not isinstance(number, int | float):
@@ -132,9 +139,26 @@ class PayloadCodec:
         values = list(msgspec.structs.astuple(value))
         if not self._many:
             return values
-        if not isinstance(values[-1], tuple | list):
-            raise BadValue(f"{self.name}.{self.fields[-1].name} is not several numbers", values[-1])
-        return [*values[:-1], *values[-1]]
+        count = len(values) - self._many
+        for field, several in zip(self.fields[count:], values[count:], strict=True):
+            if not isinstance(several, tuple | list):
+                raise BadValue(f"{self.name}.{field.name} is not several numbers", several)
+            if len(several) != len(values[count]):
+                what = f"{self.name}.{field.name} is not as many numbers as {self.fields[count].name}"
+                raise BadValue(f"{what}, {len(values[count])}", len(several))
+        return [*values[:count], *(number for several in values[count:] for number in several)]
+
+
+def many_of(fields: Sequence[Field]) -> int:
+    """Return how many fields at the end are several numbers each."""
+    return next((number for number, field in enumerate(reversed(fields)) if not field.is_several), len(fields))
+
+
+def field_at(fields: Sequence[Field], size: int, place: int) -> Field:
+    """Return the field that one of a value's `size` numbers belongs to, by its place."""
+    many = many_of(fields)
+    single = len(fields) - many
+    return fields[place] if place < single else fields[single + (place - single) * many // (size - single)]
 
 
 def as_mapping(value: Value) -> dict[str, Any]:

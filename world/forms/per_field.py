@@ -18,8 +18,8 @@ from foosim.common import units
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.units import Dimension, custom_error
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Component
-from foosim.world.forms.payloads import Field, PayloadCodec
+from foosim.world.forms.forms import NO_SLOTS, Component
+from foosim.world.forms.payloads import Field, PayloadCodec, field_at, many_of
 from foosim.world.forms.settings import ComponentSettings
 
 Quantity: TypeAlias = str | StrictInt | StrictFloat
@@ -58,7 +58,7 @@ PerField: TypeAlias = Annotated[Quantity | dict[str, Quantity], BeforeValidator(
 class Numbers:
     """The numbers of a reading or command: their fields, the groups of these, and how many numbers there are.
 
-    All numbers beyond the fields are those of the last one, which has several.
+    Fields at the end may have several numbers each, all as many.
     """
 
     fields: tuple[Field, ...]
@@ -72,7 +72,7 @@ class Numbers:
 
     def field(self, place: int) -> Field:
         """Return the field that a number belongs to."""
-        return self.fields[min(place, len(self.fields) - 1)]
+        return field_at(self.fields, self.size, place)
 
 
 @cache
@@ -83,16 +83,23 @@ def codec_of(kind: str, form: str) -> PayloadCodec:
     return PayloadCodec(component.value, component.name)
 
 
-def numbers_of(component: Component, settings: ComponentSettings) -> Numbers | None:
+def numbers_of(
+    component: Component, settings: ComponentSettings, counts: Mapping[str, int] = NO_SLOTS
+) -> Numbers | None:
     """Return the numbers of a component's readings or commands; None where these have something else, too, or as many
-    as nobody says."""
-    codec = codec_of(component.name, component.form)
-    if not all(field.is_number or field.is_several for field in codec.fields):
+    as nobody says.
+
+    `counts` are how many numbers the fields of its robot have.
+    """
+    fields = codec_of(component.name, component.form).fields
+    many = many_of(fields)
+    if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.several):
         return None
-    if codec.fields[-1].is_several and not component.several:
-        return None
-    more = getattr(settings, component.several) - 1 if codec.fields[-1].is_several else 0
-    return Numbers(codec.fields, getattr(component.value, GROUPS, {}), len(codec.fields) + more)
+    size = len(fields) - many
+    if many:
+        several = component.several
+        size += many * (several(settings, counts) if callable(several) else getattr(settings, several))
+    return Numbers(fields, getattr(component.value, GROUPS, {}), size)
 
 
 def read_per_field(written: Any, numbers: Numbers, least: float | None = None) -> list[float | None]:

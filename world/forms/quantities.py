@@ -7,7 +7,13 @@ from msgspec import Meta
 Metres: TypeAlias = Annotated[float, Meta(extra={"unit": "m"})]
 Radians: TypeAlias = Annotated[float, Meta(extra={"unit": "rad"})]
 MetresPerSecond: TypeAlias = Annotated[float, Meta(extra={"unit": "m/s"})]
+MetresPerSecondSquared: TypeAlias = Annotated[float, Meta(extra={"unit": "m/s2"})]
+RadiansPerSecond: TypeAlias = Annotated[float, Meta(extra={"unit": "rad/s"})]
+NewtonSeconds: TypeAlias = Annotated[float, Meta(extra={"unit": "N s"})]
+Degrees: TypeAlias = Annotated[float, Meta(extra={"unit": "deg"})]
 Amperes: TypeAlias = Annotated[float, Meta(extra={"unit": "A"})]
 Volts: TypeAlias = Annotated[float, Meta(extra={"unit": "V"})]
 Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """Of a whole: 0 to 1."""
+Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]

@@ -84,9 +84,9 @@ def _component(found: Any) -> Iterator[str]:
         yield from _slots(found.slots, is_sensor=found.form == "sensor")
     yield from _names("needs", found.needs)
     for key in ("several", "speaks"):
-        if not isinstance(getattr(found, key), str):
+        if not isinstance(getattr(found, key), str) and not (key == "several" and callable(found.several)):
             yield f"{key} is a name, not {show(getattr(found, key))}"
-    if found.several and found.several not in found.settings.model_fields:
+    if isinstance(found.several, str) and found.several and found.several not in found.settings.model_fields:
         yield f"several names no setting, {show(found.several)}"
     if not isinstance(found.per_field, Mapping):
         yield f"per_field is a mapping of settings to least values, not {show(found.per_field)}"

@@ -32,6 +32,7 @@ from foosim.world.forms.forms import (
     Model,
     Motion,
     Scene,
+    SeveralOf,
     SlotsOf,
     WorldRule,
     with_article,
@@ -85,7 +86,7 @@ def sensor(
     slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
     needs: tuple[str, ...] = (),
     kit: str = "",
-    several: str = "",
+    several: str | SeveralOf = "",
     speaks: str = "",
 ) -> Callable[[Made], Made]:
     """Register a sensor: a class with the methods of `components.view.Sensor`."""

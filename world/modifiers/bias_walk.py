@@ -1,7 +1,7 @@
 """A bias that walks: an offset of each number that begins with a draw and changes by one at each value.
 
-Between two values that are t apart the offset changes by a normal draw of standard deviation walk * sqrt(t): a Wiener
-process at the values' times (the rate random walk of an inertial sensor, IEEE Std 952).
+Between two values the offset changes by a normal draw of standard deviation walk * sqrt(t), t being the period: a
+Wiener process at the values' times (the rate random walk of an inertial sensor, IEEE Std 952).
 """
 
 from __future__ import annotations

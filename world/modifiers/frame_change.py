@@ -1,4 +1,4 @@
-"""Change of the frame of reference: positions, directions and headings as another frame has them.
+"""Change of the frame of reference: positions, directions, headings and orientations as another frame has them.
 
 A point p of the world is R^T (p - o) in a frame whose origin is at o and which is turned by R about the world's z.
 """
@@ -20,14 +20,14 @@ from foosim.world.forms.settings import ModifierSettings
 
 Length = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Angle = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
-POSITION, DIRECTION, HEADING = "position", "direction", "heading"
-GROUPS: Final = (POSITION, DIRECTION, HEADING)
+POSITION, DIRECTION, HEADING, ORIENTATION = "position", "direction", "heading", "orientation"
+GROUPS: Final = (POSITION, DIRECTION, HEADING, ORIENTATION)
 """Groups of fields that are other numbers in another frame: x, y and maybe z of a point, those of a velocity or force,
-an angle from +x towards +y. A field of such a name is a group of its own."""
+an angle from +x towards +y, a quaternion x, y, z, w. A field of such a name is a group of its own."""
 
 
 class FrameChangeSettings(ModifierSettings):
-    """Gives positions, directions and headings in a frame with its origin at `x`, `y`, `z`, turned by `yaw` about z."""
+    """Gives positions, directions, headings and orientations in a frame at `x`, `y`, `z`, turned by `yaw` about z."""
 
     x: Length = default("0 m")
     y: Length = default("0 m")
@@ -37,13 +37,15 @@ class FrameChangeSettings(ModifierSettings):
 
 @modifier("frame_change", FrameChangeSettings)
 class FrameChange:
-    """Gives positions, directions and headings in another frame."""
+    """Gives positions, directions, headings and orientations in another frame."""
 
     def __init__(self, settings: FrameChangeSettings, at: ModifierMounting) -> None:
         self._origin = settings.x, settings.y, settings.z
         self._yaw = settings.yaw
         self._cos, self._sin = cos(settings.yaw), sin(settings.yaw)
-        self._points, self._directions, self._headings = (at.numbers.places(group) for group in GROUPS)
+        self._points, self._directions, self._headings = (at.numbers.places(group) for group in GROUPS[:3])
+        self._orientations = at.numbers.places(ORIENTATION)
+        self._half_cos, self._half_sin = cos(0.5 * settings.yaw), sin(0.5 * settings.yaw)
 
     @staticmethod
     def check(settings: FrameChangeSettings, numbers: Numbers) -> None:
@@ -65,4 +67,10 @@ class FrameChange:
         for place in self._headings:
             heading = values[place] - self._yaw
             changed[place] = heading - 2.0 * pi if heading > pi else heading + 2.0 * pi if heading <= -pi else heading
+        if self._orientations:
+            x, y, z, w = (values[place] for place in self._orientations)
+            c, s = self._half_cos, self._half_sin
+            turned = c * x + s * y, c * y - s * x, c * z - s * w, c * w + s * z
+            for place, value in zip(self._orientations, turned, strict=True):
+                changed[place] = value
         return changed

@@ -12,7 +12,7 @@ from pydantic import Field
 from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.common.spec_base import Name
-from foosim.world.components.mounted import body_on
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, Slot, View, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.settings import ActuatorSettings
@@ -50,7 +50,7 @@ class JointGroup:
 
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
         """Raises BadValue for a joint that the robot does not have."""
-        body = body_on(at)
+        body = body_at(at)
         names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
         for name in settings.joints or ():
             if name not in names:

@@ -1,0 +1,41 @@
+"""What a rigid body has touched in the last tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.forms.quantities import Count, NewtonSeconds
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+
+
+class ContactSettings(SensorSettings):
+    """Measures touches at its rate, and besides at each tick at whose start a touch has begun in the tick before."""
+
+
+class Touches(Struct, frozen=True):
+    """The touches of a robot in the last tick: the `count` of those that began, the sum of the normal impulses, and the
+    last substep, counted from 0, in which anything was touched; -1 where nothing was."""
+
+    count: Count
+    impulse: NewtonSeconds
+    substep: Count
+
+
+@sensor("contact", ContactSettings, Touches, needs=("contacts",), speaks="contacts")
+class ContactSensor:
+    """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
+
+    def __init__(self, settings: ContactSettings, at: Mounting) -> None:
+        self.contacts = at.slot("contacts")
+
+    def sample(self, view: View) -> Touches:
+        return Touches(*view.read(self.contacts))
+
+    @staticmethod
+    def together(sensors: Sequence[ContactSensor]) -> SlotReadings:
+        """Return these as one."""
+        return SlotReadings([one.contacts for one in sensors])

@@ -1,0 +1,61 @@
+"""Where a place on a robot is on Earth, as a receiver of satellite navigation says it."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import ClassVar, Final
+
+from msgspec import Struct
+
+from foosim.world.components.misfit import Misfit
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.view import Mounting, View
+from foosim.world.earth import Geodesy
+from foosim.world.forms.quantities import Degrees, Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.placing import FIRST_LINK, MountedAt
+
+DEGREES: Final = 180.0 / pi
+
+
+class GpsSettings(SensorSettings):
+    """Where a place on a robot is on Earth: `at` is that of the antenna, in the frame of a link.
+
+    The deployment says by `origin` where its world lies.
+    """
+
+    at: MountedAt = FIRST_LINK
+
+
+class GlobalPosition(Struct, frozen=True):
+    """A place on Earth (WGS 84): `latitude` north and `longitude` east in degrees, `altitude` above the ellipsoid."""
+
+    latitude: Degrees
+    longitude: Degrees
+    altitude: Metres
+
+    groups: ClassVar = {"horizontal": ("latitude", "longitude")}
+
+
+@sensor("gps", GpsSettings, GlobalPosition)
+class Gps:
+    """Latitude, longitude and altitude of the mount."""
+
+    def __init__(self, settings: GpsSettings, at: Mounting) -> None:
+        self._mount = Mounted(at, settings.at)
+        assert at.spec.origin is not None, "checked with the deployment"
+        self._geodesy = Geodesy(at.spec.origin)
+
+    @staticmethod
+    def check(settings: GpsSettings, at: Mounting) -> None:
+        """Raise Misfit in a world without an origin on Earth, and for a link that the robot does not have."""
+        if at.spec.origin is None:
+            what = "in a world that is nowhere on Earth: the deployment needs origin: {latitude: ..., longitude: ...}"
+            raise Misfit(("kind",), what, settings.kind)
+        Mounted(at, settings.at)
+
+    def sample(self, view: View) -> GlobalPosition:
+        position, _ = self._mount.pose(view.numbers)
+        latitude, longitude, altitude = self._geodesy.geodetic(position)
+        return GlobalPosition(latitude * DEGREES, longitude * DEGREES, altitude)

@@ -1,0 +1,104 @@
+"""Positions, velocities and efforts of a robot's joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final
+
+from msgspec import Meta, Struct
+from pydantic import Field
+
+from foosim.common.names import nearest_name
+from foosim.common.plain_data import quoted
+from foosim.common.spec_base import Name
+from foosim.world.components.misfit import Misfit
+from foosim.world.components.mounted import body_at
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.forms import JOINTS
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+
+if TYPE_CHECKING:  # numpy is for those who compute a tick
+    import numpy as np
+    from numpy.typing import NDArray
+
+JOINTS_MAX: Final = 256
+Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]
+
+
+class JointStateSettings(SensorSettings):
+    """Positions, velocities and efforts of `joints`, by the names of the links that hang on them, in this order.
+
+    Where none is named they are those of all joints that move, in the order of their links.
+    """
+
+    joints: list[Name] = Field(default=[], max_length=JOINTS_MAX)
+
+
+class JointState(Struct, frozen=True):
+    """The state of joints, a number for each: `positions` (m or rad), `velocities` (m/s or rad/s), and the `efforts`
+    that their motors applied in the last substep (N or N m)."""
+
+    positions: Several
+    velocities: Several
+    efforts: Several
+
+    groups: ClassVar = {"motion": ("positions", "velocities")}
+
+
+def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
+    """Return how many joints are measured, of a robot whose fields have so many numbers."""
+    return len(settings.joints) or counts["joint_positions"]
+
+
+@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, several=joints_of)
+class JointStates:
+    """Positions, velocities and efforts of joints."""
+
+    def __init__(self, settings: JointStateSettings, at: Mounting) -> None:
+        slots = [at.slot(field) for field in JOINTS]
+        chosen = _chosen(settings, at) if settings.joints else range(slots[0].size)
+        self.places = [slot.at + joint for slot in slots for joint in chosen]
+
+    @staticmethod
+    def check(settings: JointStateSettings, at: Mounting) -> None:
+        """Raise Misfit for a joint that the robot does not have, or that is named twice."""
+        if settings.joints:
+            _chosen(settings, at)
+
+    def sample(self, view: View) -> JointState:
+        numbers = [view.numbers[place] for place in self.places]
+        count = len(numbers) // 3
+        return JointState(tuple(numbers[:count]), tuple(numbers[count : 2 * count]), tuple(numbers[2 * count :]))
+
+    @staticmethod
+    def together(sensors: Sequence[JointStates]) -> JointStateBatch:
+        """Return these as one; all have as many joints."""
+        return JointStateBatch(sensors)
+
+
+class JointStateBatch:
+    """Several of them, with as many joints."""
+
+    def __init__(self, sensors: Sequence[JointStates]) -> None:
+        import numpy as np
+
+        self._places = np.array([one.places for one in sensors])
+
+    def sample(self, view: View) -> NDArray[np.float64]:
+        """Return the numbers, of shape (sensors, 3 joints)."""
+        numbers: NDArray[np.float64] = view.values[self._places]
+        return numbers
+
+
+def _chosen(settings: JointStateSettings, at: Mounting) -> list[int]:
+    """Return the numbers of the joints that are named. Raises Misfit."""
+    body = body_at(at)
+    names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
+    for place, name in enumerate(settings.joints):
+        if name not in names:
+            what = f"{body.name} has no such joint; there are {', '.join(names)}"
+            raise Misfit(("joints", place), what, name, quoted(nearest_name(name, names)))
+        if name in settings.joints[:place]:
+            raise Misfit(("joints", place), "named twice", name)
+    return [names.index(name) for name in settings.joints]

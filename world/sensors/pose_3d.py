@@ -1,0 +1,51 @@
+"""Position and orientation of a place on a robot."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from msgspec import Struct
+
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres, QuaternionPart
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.placing import FIRST_LINK, MountedAt
+
+
+class Pose3dSettings(SensorSettings):
+    """Where a place on a robot is, and how it is turned: `at` is that place, in the frame of a link."""
+
+    at: MountedAt = FIRST_LINK
+
+
+class Pose3d(Struct, frozen=True):
+    """A pose in the world frame: `x`, `y`, `z`, and the unit quaternion from the mount's frame to the world's."""
+
+    x: Metres
+    y: Metres
+    z: Metres
+    qx: QuaternionPart
+    qy: QuaternionPart
+    qz: QuaternionPart
+    qw: QuaternionPart
+
+    groups: ClassVar = {"position": ("x", "y", "z"), "orientation": ("qx", "qy", "qz", "qw")}
+
+
+@sensor("pose_3d", Pose3dSettings, Pose3d)
+class PoseTracker3d:
+    """Position and orientation of the mount in the world frame."""
+
+    def __init__(self, settings: Pose3dSettings, at: Mounting) -> None:
+        self._mount = Mounted(at, settings.at)
+
+    @staticmethod
+    def check(settings: Pose3dSettings, at: Mounting) -> None:
+        """Raise Misfit for a link that the robot does not have."""
+        Mounted(at, settings.at)
+
+    def sample(self, view: View) -> Pose3d:
+        position, orientation = self._mount.pose(view.numbers)
+        return Pose3d(*position, *orientation)
