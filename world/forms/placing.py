@@ -7,7 +7,7 @@ from typing import Annotated, Final
 from foosim.common import units
 from foosim.common.spec_base import Name, SpecBase, default
 from foosim.common.units import Quantity
-from foosim.world.scene import Quaternion, Vector, multiply, turn
+from foosim.world.scene import Quaternion, Vector, from_rpy
 
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
@@ -31,8 +31,7 @@ class At(SpecBase):
     @property
     def orientation(self) -> Quaternion:
         """The rotation from its frame to the world's."""
-        about_x, about_y = turn((1.0, 0.0, 0.0), self.roll), turn((0.0, 1.0, 0.0), self.pitch)
-        return multiply(turn((0.0, 0.0, 1.0), self.yaw), multiply(about_y, about_x))
+        return from_rpy(self.roll, self.pitch, self.yaw)
 
 
 class MountedAt(At):
