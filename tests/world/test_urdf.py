@@ -103,7 +103,7 @@ def entity_of(body: Body) -> tuple[Entity, list[float]]:
     for slot, count in slots.items():
         offsets[slot], size = size, size + count
     model = Model(form="model", name="urdf", made=object, settings=RobotSettings, slots=slots)
-    return Entity(0, body.name, model, 0, size, size, offsets, slots), [0.0] * size
+    return Entity(0, body.name, model, 0, size, size, offsets, slots, slots), [0.0] * size
 
 
 # --- what a file says ------------------------------------------------------------------------------------------------

@@ -19,7 +19,6 @@ from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
 from foosim.world.bodies.urdf_joints import JointPart, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, materials_of, mesh_paths, read_link
 from foosim.world.bodies.xml_tree import Element, read_xml
-from foosim.world.mesh import AssetError
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Quaternion, Shape, Vector, multiply, rotate
 
 LINKS_MAX: Final = 128
@@ -270,8 +269,3 @@ def _with_base_mass(robot: Robot, links: list[Link]) -> list[Link]:
     ]
     found[0] = replace(found[0], mass=whole.mass, inertia=moments, centre_of_mass=whole.centre, principal=axes)
     return found
-
-
-def missing_file(path: str) -> AssetError:
-    """Return the error for a URDF file that is not there."""
-    return AssetError(f"{path}: the file of a robot is missing")
