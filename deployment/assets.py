@@ -11,7 +11,7 @@ from pathlib import Path
 from foosim.deployment.loader import apply_sets, check_open_meshes, check_state_fields, load_deployment
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
-from foosim.world.bodies.urdf import Robot, meshes_of, read_urdf
+from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
 from foosim.world.mesh import AssetError, digest_of
 from foosim.world.scenery import SceneryMesh
 
@@ -27,7 +27,13 @@ def read_robot(file: Path, assets: Path | None) -> Robot:
     except ValueError:
         raise AssetError(f"{file}: not in the asset folder {assets}") from None
     files = read_files(folder, ".", [path])
-    return read_urdf(path, files | read_files(folder, ".", meshes_of(path, files[path]), files))
+    for mesh in meshes_of(path, files[path]):
+        try:
+            files |= read_files(folder, ".", [mesh], files)
+        except AssetError as error:
+            place = place_of_mesh(path, files[path], mesh)
+            raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
+    return read_urdf(path, files)
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:

@@ -33,8 +33,8 @@ MODIFIERS: Final[dict[str, Any]] = {
     "battery": [{"kind": "quantise", "step": {"voltage": "100 mV"}}, {"kind": "drop_out", "probability": "20 %"}],
     "proximity": [{"kind": "clip", "low": "10 cm", "high": "2 m"}],
 }
-UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table")}
-"""Scenes are those of the kits; one engine computes."""
+UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table"), ("model", "urdf")}
+"""Scenes are those of the kits; one engine computes; of a robot from a file the islands do not know the reach."""
 
 
 def written(data: dict[str, Any]) -> str:

@@ -77,6 +77,11 @@ def meshes_of(path: str, content: bytes) -> tuple[str, ...]:
     return tuple(mesh_paths(_robot_of(path, content)))
 
 
+def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
+    """Return `file:line` of where a URDF file names a mesh first."""
+    return mesh_paths(_robot_of(path, content))[mesh].place
+
+
 def read_urdf(path: str, files: Mapping[str, bytes]) -> Robot:
     """Return the robot in the URDF file of this path; its meshes are in `files`, too. Raises AssetError."""
     meshes = tuple([(mesh, files[mesh]) for mesh in meshes_of(path, files[path]) if mesh in files])
