@@ -412,6 +412,30 @@ def components(
 
 
 @app.command()
+def inspect(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A URDF file.")],
+    assets: Annotated[
+        Path | None, typer.Option(help="The asset folder, which has its meshes; by default that of FILE.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and what a deployment says of it.
+
+    The file is read as by a run, which refuses the same: what is shown is what is simulated. What is passed over is
+    noted.
+    """
+    from foosim.common.json_text import encode_json
+    from foosim.deployment.assets import read_robot
+    from foosim.world.bodies.urdf_text import as_json, lines
+
+    robot = read_robot(file, assets)
+    if json:
+        print(encode_json(as_json(robot)).decode())
+    else:
+        print(*lines(robot), sep="\n")
+
+
+@app.command()
 def schema(
     own: Annotated[bool, typer.Option("--own", help="Leave out what other packages bring.")] = False,
 ) -> None:

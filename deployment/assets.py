@@ -1,17 +1,39 @@
 """The files that a deployment refers to, pinned: they are read once, and their digests go into the deployment's text.
 
-They are in its asset folder, which is the deployment file's own, or the one inside it that `assets:` names.
+Those of scenery, links and robots, and what a robot's file names in turn. They are in the deployment's asset folder,
+which is that of its own file, or the one inside it that `assets:` names.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from foosim.deployment.loader import apply_sets, check_open_meshes, load_deployment
+from foosim.deployment.loader import apply_sets, check_open_meshes, check_state_fields, load_deployment
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
-from foosim.world.mesh import digest_of
+from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
+from foosim.world.mesh import AssetError, digest_of
 from foosim.world.scenery import SceneryMesh
+
+
+def read_robot(file: Path, assets: Path | None) -> Robot:
+    """The robot in a URDF file, its meshes read from the asset folder: that of the file, if none is given.
+
+    Raises AssetError.
+    """
+    folder = file.parent if assets is None else assets
+    try:
+        path = file.name if assets is None else file.resolve().relative_to(assets.resolve()).as_posix()
+    except ValueError:
+        raise AssetError(f"{file}: not in the asset folder {assets}") from None
+    files = read_files(folder, ".", [path])
+    for mesh in meshes_of(path, files[path]):
+        try:
+            files |= read_files(folder, ".", [mesh], files)
+        except AssetError as error:
+            place = place_of_mesh(path, files[path], mesh)
+            raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
+    return read_urdf(path, files)
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
@@ -22,12 +44,18 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
     checked.
     """
     deployment = load_deployment(text, name)
-    wanted = deployment.files()
-    if not wanted:
+    files: dict[str, bytes] = {}
+    while wanted := deployment.wanted(files):
+        files |= read_files(folder, deployment.assets, wanted, files)
+    if not files:
         return text, {}
-    files = read_files(folder, deployment.assets, wanted)
-    check_open_meshes(text, name, deployment.with_assets(files))
-    sets = [
+    complete = deployment.with_assets(files)
+    check_open_meshes(text, name, complete)
+    check_state_fields(text, name, complete)
+    robots = deployment.robot_files(files)
+    sets = ["digests={}"] if robots else []
+    sets += [f'digests."{path}"="{digest_of(files[path])}"' for path in robots]
+    sets += [
         f'scenery.{thing}.digest="{digest_of(files[spec.file])}"'
         for thing, spec in deployment.scenery.items()
         if isinstance(spec, SceneryMesh)

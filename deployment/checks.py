@@ -345,7 +345,7 @@ def _scenery(view: View) -> Iterator[Finding]:
     """Some engines have no meshes, only free bodies feel surfaces; waves cross a material, or have a loss."""
     engine = view.get("engine")
     no_meshes = isinstance(engine, str) and _is_without_meshes(engine)
-    has_rigid = any(model.is_free for model in _models(view))
+    has_rigid = any(model.can_be_free for model in _models(view))
     for name in view.mapping("scenery"):
         if name in view.robots:
             yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")

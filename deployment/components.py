@@ -15,7 +15,17 @@ from foosim.common.spec_base import SpecBase
 from foosim.common.units import NS_PER_S, parse_ns
 from foosim.deployment.schema_errors import settings_findings
 from foosim.world.forms import registry
-from foosim.world.forms.forms import NO_SLOTS, Carrier, Component, Form, Model, WorldRule, with_article
+from foosim.world.forms.forms import (
+    JOINTS,
+    JOINTS_MAX,
+    NO_SLOTS,
+    Carrier,
+    Component,
+    Form,
+    Model,
+    WorldRule,
+    with_article,
+)
 from foosim.world.forms.misfits import (
     component_problems,
     model_problems,
@@ -37,6 +47,7 @@ from foosim.world.spec import KITS, schedule_of
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
 ROBOTS: Final = "robots"
+JOINT_POSITIONS: Final = JOINTS[0]
 OF_MODEL: Final = ("actuators", "rules")
 """The sections of which a robot that says nothing has those of its model."""
 
@@ -197,9 +208,9 @@ class _Reader:
             found = component.settings.model_validate(settings)
             if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
                 assert isinstance(component, Component), component
-                self.findings += self._unfit_slots(component, found, location)
+                counts = _counts(model)
+                self.findings += self._unfit_slots(component, found, counts, location)
                 if model is not None or not callable(component.several):
-                    counts = NO_SLOTS if model is None else model.slots
                     self.findings += self._unfit_modifiers(component, found, counts, location)
             return found
         except UnknownName as error:
@@ -227,12 +238,17 @@ class _Reader:
             yield self.component("modifier", None, (*location, number), settings)
 
     def _unfit_slots(
-        self, component: Component, settings: SensorSettings | ActuatorSettings, location: Location
+        self,
+        component: Component,
+        settings: SensorSettings | ActuatorSettings,
+        counts: Mapping[str, int],
+        location: Location,
     ) -> Iterator[Finding]:
         """Yield why the slots of a sensor or actuator do not follow from its settings."""
         period_ns = self._period_ns(component, settings)
         if period_ns is not None:
-            yield from _unknown_slots(component, settings, Carrier(0, period_ns), location)
+            carrier = Carrier(0, period_ns, counts.get(JOINT_POSITIONS, 0))
+            yield from _unknown_slots(component, settings, carrier, location)
 
     def _unfit_modifiers(
         self,
@@ -285,6 +301,13 @@ class _Reader:
         if not 0 < tick_ns * settings.rate_hz <= NS_PER_S:
             return None
         return schedule_of(settings, tick_ns).least_ticks * tick_ns
+
+
+def _counts(model: Model | None) -> Mapping[str, int]:
+    """Return how many numbers the fields of a robot have; joints as many as may be where that follows from its file."""
+    if model is None:
+        return NO_SLOTS
+    return dict.fromkeys(JOINTS, JOINTS_MAX) if model.declared is None else model.declared
 
 
 def _unfit(

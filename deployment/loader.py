@@ -52,7 +52,8 @@ from foosim.deployment.text.yaml import (
 )
 from foosim.deployment.timing_checks import check_timing
 from foosim.world.assembly.sections import findings_of
-from foosim.world.assembly.unfit_sensors import unfit_sensors
+from foosim.world.assembly.state_fields import field_findings
+from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.layout import doubled_slots
 
@@ -215,6 +216,17 @@ def check_open_meshes(text: Text, name: str, deployment: Deployment) -> None:
     refuse_findings(text, name, findings)
 
 
+def check_state_fields(text: Text, name: str, deployment: Deployment) -> None:
+    """Refuse robots whose models are made from files, where these do not give what the robots' components need.
+
+    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
+    """
+    findings = list(islice(field_findings(deployment), PROBLEMS_MAX + 1))
+    if not findings and deployment.robot_files(deployment.asset_files):
+        findings = list(_trial_findings(deployment))
+    refuse_findings(text, name, findings)
+
+
 def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
     """Raise DeploymentError for problems that were found in a loaded deployment, if any.
 
@@ -283,14 +295,14 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         between = first(doubled_slots(deployment)) or first(_trial_findings(deployment))
         placed = place_findings(deployment)
-        between = between or first(findings_of(deployment), rules, placed, unfit_sensors(deployment))
+        between = between or first(findings_of(deployment), rules, placed, unfit_components(deployment))
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
 
 
 def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
-    """What a trial of forms of other packages finds; foosim's own are not tried."""
-    if not foreign_versions(deployment):
+    """What a trial of forms of other packages finds; foosim's own are not tried. Robots' files must be there."""
+    if deployment.lacks_files or not foreign_versions(deployment):
         return ()
     from foosim.world.assembly.trial import trial_findings  # brings numpy
 

@@ -172,14 +172,22 @@ class Deployment(WorldSpec):
     deadlines: Deadlines = Field(default_factory=Deadlines)
 
     def with_assets(self, files: Mapping[str, bytes]) -> Self:
-        """The same with the contents of the files that scenery and network name; raises AssetError."""
-        deployment = self.with_contents(read_contents(self.scenery, files, network_files(self.network)))
+        """The same with the contents of the files that scenery, robots and network name; raises AssetError."""
+        others = [*network_files(self.network), *self.robot_files(files)]
+        deployment = self.with_contents(read_contents(self.scenery, files, others))
         check_files(self.network, files)
+        self.check_robot_files(files)
         return deployment
 
     def files(self) -> dict[str, str | None]:
         """The files that it names, by path, each with the digest that is written beside it."""
-        return mesh_files(self.scenery) | network_files(self.network)
+        named: dict[str, str | None] = dict.fromkeys(self.robot_files({}))
+        return named | self.digests | mesh_files(self.scenery) | network_files(self.network)
+
+    def wanted(self, files: Mapping[str, bytes]) -> list[str]:
+        """The files that are needed beside `files`, as far as these tell: one may name further ones."""
+        needed = [*mesh_files(self.scenery), *network_files(self.network), *self.robot_files(files)]
+        return [path for path in dict.fromkeys(needed) if path not in files]
 
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""

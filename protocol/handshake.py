@@ -99,7 +99,8 @@ class Member:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
             raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
-        build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        if not deployment.lacks_files:  # else when they have come
+            build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self._coming = build, deployment, Fetching(deployment, self._files)
         self.deadline_ns = 0
 

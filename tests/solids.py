@@ -76,7 +76,7 @@ class Solids:
         for field, count in slots.items():
             offsets[field] = at
             at += count
-        entity = Entity(index, body.name, kind, len(self.numbers), at, at, offsets, slots)
+        entity = Entity(index, body.name, kind, len(self.numbers), at, at, offsets, slots, slots)
         self.numbers += [0.0] * (at - len(self.numbers))
         self.numbers[offsets["contacts"] + 2] = -1.0
         self.numbers[offsets["partners"] : offsets["partners"] + PARTNERS_MAX] = [NO_ENTITY] * PARTNERS_MAX

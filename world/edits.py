@@ -84,7 +84,7 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
         elif isinstance(edit, Freeze | Thaw):
             if not layout.kind_of(models[edit.name]).is_robot:
                 continue
-        elif not layout.kind_of(models[edit.name]).is_free:
+        elif not layout.would_be_free(edit.name, models[edit.name]):
             continue
         fitting.append(edit)
     return fitting

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Final
 
-from foosim.common.errors import Malformed
+from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Finding, Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
+    LINEAR_VELOCITY,
     ROBOTS,
     SAMPLES,
     Carrier,
@@ -54,6 +55,8 @@ class Entity:
     offsets: Mapping[str, int]
     counts: Mapping[str, int]
     """The place of the first number of each field, and how many it has."""
+    fields: Mapping[str, int]
+    """Those of its model, with their counts."""
 
     @property
     def model(self) -> str:
@@ -78,7 +81,7 @@ class Entity:
     @property
     def is_free(self) -> bool:
         """Whether it is a rigid body that nothing holds: it can be pushed."""
-        return self.kind.is_free
+        return self.kind.is_rigid and LINEAR_VELOCITY in self.offsets
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +101,21 @@ class Declared:
     """What a layout has of the deployment, whatever is added to the world.
 
     `names` are the entities that are always there; `carried` what entities carry, by name; `memory` what the rules of
-    the world remember of each entity of a model; `addable` the models of which a running world can have more.
+    the world remember of each entity of a model; `addable` the models of which a running world can have more; `fields`
+    those of the state of entities whose model has no fixed ones, by name.
     """
 
     names: frozenset[str] = frozenset()
     carried: Mapping[str, Carried] = field(default_factory=dict)
     memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     addable: tuple[str, ...] = ()
+    fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+
+    def fields_of(self, name: str, kind: Model) -> Mapping[str, int]:
+        """Return the fields of the state of an entity of a model."""
+        if kind.declared is not None:
+            return kind.declared
+        return self.fields[name]
 
     def remembered(self, kind: Model) -> dict[str, int]:
         """Return the slots in which the rules of the world remember what they know of each entity of a model."""
@@ -124,7 +135,8 @@ class Layout:
             its = declared.carried.get(name, NOTHING)
             start = position
             offsets: dict[str, int] = {}
-            counts = {**kind.slots, **declared.remembered(kind), **its.solver}
+            fields = declared.fields_of(name, kind)
+            counts = {**fields, **declared.remembered(kind), **its.solver}
             for slot, count in counts.items():
                 offsets[slot] = position
                 position += count
@@ -132,7 +144,7 @@ class Layout:
             for slot, count in its.owner.items():
                 offsets[slot], counts[slot] = position, count
                 position += count
-            entities.append(Entity(index, name, kind, start, split, position, offsets, counts))
+            entities.append(Entity(index, name, kind, start, split, position, offsets, counts, fields))
         self.entities: tuple[Entity, ...] = tuple(entities)
         self.size = position
         self.models = dict(models)
@@ -159,6 +171,11 @@ class Layout:
     def of(self, model: str) -> tuple[Entity, ...]:
         """Return the entities of a model, in name order."""
         return tuple([entity for entity in self.entities if entity.model == model])
+
+    def would_be_free(self, name: str, model: str) -> bool:
+        """Whether an entity of this name and model is, or would be, a rigid body that nothing holds."""
+        kind = _model(model)
+        return kind.is_rigid and LINEAR_VELOCITY in self.declared.fields_of(name, kind)
 
     @staticmethod
     def kind_of(model: str) -> Model:
@@ -202,7 +219,10 @@ class Layout:
 
 
 def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layout:
-    """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
+    """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`.
+
+    Where models name files (`WorldSpec.robot_files`), their contents must have been given.
+    """
     models: dict[str, str] = {}
     addable: list[str] = []
     for kit in kits_named(spec):
@@ -215,7 +235,7 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
-    declared = Declared(frozenset(models), carried, memory, tuple(addable))
+    declared = Declared(frozenset(models), carried, memory, tuple(addable), _fields(spec, models))
     for name, model in added:
         if not addable:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")
@@ -223,6 +243,19 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
             raise Malformed(f"{model} {name} cannot be added: {' or '.join(addable)} with a free name can be")
         models[name] = model
     return Layout(models, declared)
+
+
+def _fields(spec: WorldSpec, models: Mapping[str, str]) -> dict[str, Mapping[str, int]]:
+    """Return the fields of the state of entities whose model has no fixed ones."""
+    found: dict[str, Mapping[str, int]] = {}
+    for name, model in models.items():
+        kind = _model(model)
+        if kind.declared is None:
+            try:
+                found[name] = kind.fields_of(spec.settings_of(name), spec)
+            except BadValue as bad:
+                raise Malformed(f"{name}, {kind.name}: {bad}") from None
+    return found
 
 
 def kits_named(spec: WorldSpec) -> list[Kit]:
@@ -302,14 +335,13 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
     place: Location = ("robots", name)
     model = _model(robot.model)
-    joints = model.slots.get("joint_positions", 0)
+    fields = model.fields_of(robot, spec)
+    joints = fields.get("joint_positions", 0)
     yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
-        slots |= _slots_of_modifiers(
-            label, actuator.modifiers, numbers_of(component, actuator, model.slots), spec.tick_ns
-        )
+        slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
         slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
@@ -318,7 +350,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         component = registry.find_component("sensor", sensor.kind)
         period_ns = least_period_ns(spec, component, sensor)
         slots = _slots(label, component, sensor, Carrier(0, period_ns, joints))
-        slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor, model.slots), period_ns)
+        slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor, fields), period_ns)
         slots[f"{label}.{SAMPLES}"] = 1
         yield Declaring(f"sensor {label}", (*place, "sensors", label), slots, is_owners=True)
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from foosim.common import units
-from foosim.common.spec_base import Name, SpecBase, default
-from foosim.common.units import Quantity
-from foosim.world.scene import Quaternion, Vector, multiply, turn
+from pydantic import StringConstraints
 
+from foosim.common import units
+from foosim.common.spec_base import SpecBase, default
+from foosim.common.units import Quantity
+from foosim.world.scene import Quaternion, Vector, from_rpy
+
+LinkName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=64)]
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 
@@ -31,14 +34,13 @@ class At(SpecBase):
     @property
     def orientation(self) -> Quaternion:
         """The rotation from its frame to the world's."""
-        about_x, about_y = turn((1.0, 0.0, 0.0), self.roll), turn((0.0, 1.0, 0.0), self.pitch)
-        return multiply(turn((0.0, 0.0, 1.0), self.yaw), multiply(about_y, about_x))
+        return from_rpy(self.roll, self.pitch, self.yaw)
 
 
 class MountedAt(At):
     """A pose in the frame of a link of the robot: the one of this name, the first one without a name."""
 
-    link: Name | None = None
+    link: LinkName | None = None
 
 
 ORIGIN_OF_WORLD: Final = At()

@@ -209,6 +209,12 @@ def turn(axis: Vector, angle: float) -> Quaternion:
     return axis[0] * s, axis[1] * s, axis[2] * s, cos(0.5 * angle)
 
 
+def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the rotation about fixed x by `roll`, then about y by `pitch`, then about z by `yaw` (rad)."""
+    about_x, about_y = turn((1.0, 0.0, 0.0), roll), turn((0.0, 1.0, 0.0), pitch)
+    return multiply(turn((0.0, 0.0, 1.0), yaw), multiply(about_y, about_x))
+
+
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
     """Return the world pose of a shape whose link has this pose."""
     dx, dy, dz = rotate(orientation, shape.position)

@@ -20,7 +20,7 @@ from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.materials import UNKNOWN, Radio
 from foosim.world.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of
-from foosim.world.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, multiply, turn
+from foosim.world.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, from_rpy
 
 PATH_LENGTH_MAX: Final = 200
 PATH_DEPTH_MAX: Final = 8
@@ -120,8 +120,7 @@ class Placed(SpecBase):
 
     @property
     def orientation(self) -> Quaternion:
-        about_x, about_y = turn((1.0, 0.0, 0.0), self.roll), turn((0.0, 1.0, 0.0), self.pitch)
-        return multiply(turn((0.0, 0.0, 1.0), self.yaw), multiply(about_y, about_x))
+        return from_rpy(self.roll, self.pitch, self.yaw)
 
 
 class SceneryBox(Placed):

@@ -12,16 +12,27 @@ from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
-from foosim.world.mesh import Mesh
+from foosim.world.mesh import AssetError, Mesh, check_digest
 from foosim.world.physics import PhysicsSettings, SurfaceSettings
 from foosim.world.scene import Shape
-from foosim.world.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, open_meshes, scenery_shape
+from foosim.world.scenery import (
+    SCENERY_MAX,
+    AssetFolder,
+    AssetPath,
+    Contents,
+    Digest,
+    Scenery,
+    open_meshes,
+    scenery_shape,
+)
 
 KITS: Final = "kits"
 """The field of kits' sections, which in a file stand each under the name of its kit."""
 KITS_MAX: Final = 16
 RULES_MAX: Final = 64
 SURFACES_MAX: Final = 64
+ROBOT_FILES_MAX: Final = 128
+"""Files that models of robots are made from, in one world."""
 
 Section = TypeVar("Section", bound=SpecBase)
 
@@ -72,7 +83,11 @@ def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
 
 
 class WorldSpec(SpecBase):
-    """The world: its robots, the sections of kits, rules, a scene, and fixed things."""
+    """The world: its robots, the sections of kits, rules, a scene, and fixed things.
+
+    `digests` (BLAKE2b) say which files are meant that models of robots are made from, by path in the asset folder; they
+    are written when a run is planned.
+    """
 
     world: Name
     seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
@@ -88,6 +103,7 @@ class WorldSpec(SpecBase):
     physics: PhysicsSettings | None = None
     surfaces: dict[Name, SurfaceSettings] = Field(default={}, max_length=SURFACES_MAX)
     objects: dict[RobotName, SerializeAsAny[EntitySettings]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    digests: dict[AssetPath, Digest] = Field(default={}, max_length=ROBOT_FILES_MAX)
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     _contents: Contents = PrivateAttr(default_factory=Contents)
 
@@ -111,6 +127,36 @@ class WorldSpec(SpecBase):
     def asset_files(self) -> Mapping[str, bytes]:
         """The contents of the files that it was given, by path."""
         return self._contents.files
+
+    def robot_files(self, files: Mapping[str, bytes]) -> list[str]:
+        """The files that models of robots are made from, in name order, as far as `files` (contents by path) tell.
+
+        Raises AssetError.
+        """
+        found: dict[str, None] = {}
+        for robot in self.robots.values():
+            found |= dict.fromkeys(robot.asset_paths(files))
+        if len(found) > ROBOT_FILES_MAX:
+            raise AssetError(
+                f"{min(found)}: one of {len(found)} files of robots, at most {ROBOT_FILES_MAX} are allowed"
+            )
+        return sorted(found)
+
+    def check_robot_files(self, files: Mapping[str, bytes]) -> None:
+        """Raise AssetError for a file of a robot that is missing, not the one meant or not acceptable."""
+        for path in self.robot_files(files):
+            if path not in files:
+                raise AssetError(f"{path}: the file of a robot is missing")
+            if path in self.digests:
+                check_digest(path, files[path], self.digests[path])
+        for robot in self.robots.values():
+            robot.check_assets(files)
+
+    @property
+    def lacks_files(self) -> bool:
+        """Whether a file was not given that a robot's model is made from: nothing is known of its body and state."""
+        files = self._contents.files
+        return any(path not in files for path in self.robot_files(files))
 
     def file_with(self, digest: str) -> bytes | None:
         """The content of the file with this digest (hex), of those that it was given."""

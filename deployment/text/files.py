@@ -10,9 +10,11 @@ import codecs
 import errno
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final
 
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
@@ -21,6 +23,7 @@ from foosim.deployment.text.yaml import Place, Problem
 from foosim.world.mesh import AssetError
 from foosim.world.scenery import path_problem
 
+NO_FILES: Final[Mapping[str, bytes]] = MappingProxyType({})
 _COMPONENT = os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC
 _FILE = _COMPONENT | os.O_NONBLOCK  # a pipe without a writer would block
 
@@ -85,10 +88,15 @@ def _decoded(raw: bytes, file: str, rank: int) -> str:
         raise _Unreadable(Problem(place, describe("not UTF-8", raw[error.start]))) from None
 
 
-def read_files(folder: Path, assets: str, wanted: Mapping[str, object]) -> dict[str, bytes]:
-    """The contents of files by their paths inside the asset folder `assets` of a folder; raises AssetError."""
+def read_files(
+    folder: Path, assets: str, wanted: Iterable[str], known: Mapping[str, bytes] = NO_FILES
+) -> dict[str, bytes]:
+    """The contents of files by their paths inside the asset folder `assets` of a folder; raises AssetError.
+
+    `known` are those that were read before: there is a limit of all together.
+    """
     files: dict[str, bytes] = {}
-    left = limits.ASSETS_BYTES_MAX
+    left = limits.ASSETS_BYTES_MAX - sum(map(len, known.values()))
     try:
         root = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:

@@ -161,11 +161,11 @@ def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
     [
         ("each={ROBOTS: {'x': 1}, 'rod': {'y': 1}}, writes=('ball',)", ""),
         ("each={'rood': {'y': 1}}", "rule of worlds that remembers something of each rood: unknown model (there are: "
-         "ball, camera, rod, rover, station), 'rood', nearest is 'rod'"),
+         "ball, camera, rod, rover, station, urdf), 'rood', nearest is 'rod'"),
         ("writes=('bal',)", "rule of worlds that writes bal: unknown model (there are: ball, camera, rod, rover, "
-         "station), 'bal', nearest is 'ball'"),
+         "station, urdf), 'bal', nearest is 'ball'"),
         ("writes=(ROBOTS,)", "rule of worlds that writes *: unknown model (there are: ball, camera, rod, rover, "
-         "station), '*'"),
+         "station, urdf), '*'"),
     ],
 )  # fmt: skip
 def test_a_rule_of_worlds_names_models_that_there_are(site: Path, about: str, told: str) -> None:
@@ -208,7 +208,7 @@ KITS: Final = {
     "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
                                 "are in robots:"],
     "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: ball, "
-                                  "camera, rod, rover, station, or any module:Class), 'beest'"],
+                                  "camera, rod, rover, station, urdf, or any module:Class), 'beest'"],
     "entities={'leo': 'crate'}": ["its entity leo is a rigid model whose reach the islands do not know; valid are "
                                   "rod, ball, and models with a motion"],
     "entities={'world': 'beast'}": ["its entity world has a reserved name"],
@@ -225,7 +225,7 @@ KITS: Final = {
     "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
                            "place_at and no field position"],
     "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: ball, camera, "
-                          "rod, rover, station, or any module:Class), 'lion'"],
+                          "rod, rover, station, urdf, or any module:Class), 'lion'"],
 }  # fmt: skip
 """Kits, and what is said of a table with each."""
 

@@ -34,7 +34,7 @@ class Driver:
         self._value: type[Struct] = kind.value
         self._robots = parameters["robots"]
         (limits,) = {
-            tuple(sorted(one.actuator.limits().items()))
+            tuple(sorted(one.limits.items()))
             for robot in self._robots[:1]
             for one in CommandEncoder(deployment).actuators(robot)
         }

@@ -45,7 +45,7 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
         assert (entity.index, entity.start) == (index, position)
         assert entity.start < entity.split <= entity.stop
         its = carried.get(entity.name, NOTHING)
-        assert entity.counts == {**entity.kind.slots, **its.solver, **its.owner}
+        assert entity.counts == {**entity.fields, **its.solver, **its.owner}
         assert entity.stop - entity.split == sum(its.owner.values())
         assert list(entity.offsets) == list(entity.counts)
         for field, count in entity.counts.items():
@@ -67,8 +67,8 @@ def test_the_table_has_its_entities() -> None:
     assert [entity.name for entity in LAYOUT.of("ball")] == [BALL]
     assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
     models = [find_model(name) for name in names("model")]
-    assert {model.name for model in models if model.is_solved and model.is_robot} == {"rod", "rover"}
-    assert LAYOUT.declared.addable == ("ball",) and find_model("ball").is_free and not find_model("ball").is_robot
+    assert {model.name for model in models if model.is_solved and model.is_robot} == {"rod", "rover", "urdf"}
+    assert LAYOUT.declared.addable == ("ball",) and find_model("ball").can_be_free and not find_model("ball").is_robot
     assert {model.name for model in models if model.actuators} == {"rod", "rover"}
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 

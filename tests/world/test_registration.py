@@ -168,15 +168,19 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
 )
 def test_a_model_has_the_fields_that_foosim_needs(site: Path, about: str, fields: list[str]) -> None:
     written(site, f"model('own', RobotSettings, {about})(Own)")
-    assert [*find_model("own_form:Own").slots] == fields
+    assert [*find_model("own_form:Own").fields_of(None, None)] == fields
 
 
 def test_foosims_own_models_keep_the_places_of_their_fields() -> None:
     """Digests of layouts, and captures, have them."""
-    assert [*find_model("rod").slots] == [
+    assert [*find_model("rod").fields_of(None, None)] == [
         *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused")
     ]
-    assert [*find_model("station").slots] == [*find_model("camera").slots] == ["down", "refused"]
+    assert (
+        [*find_model("station").fields_of(None, None)]
+        == [*find_model("camera").fields_of(None, None)]
+        == ["down", "refused"]
+    )
 
 
 # --- modules that cannot be imported ---------------------------------------------------------------------------------
@@ -226,8 +230,8 @@ def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) ->
     line = len((site / "own_form.py").read_text().splitlines())
     why = f"own_form of worn 0.3 cannot be imported: RuntimeError: at import (own_form.py:{line})"
     assert problems("robots.camera.model=zeppelin") == [
-        f"robots.camera.model: unknown model; {why} (there are: camera, rod, rover, station, or any module:Class), "
-        "'zeppelin'"
+        f"robots.camera.model: unknown model; {why} (there are: camera, rod, rover, station, urdf, "
+        "or any module:Class), 'zeppelin'"
     ]
     assert problems("zoo={fence: 1 m}") == [f"unknown key; {why}, 'zoo'"]
     assert problems("capture.zoo=3") == ["capture: unknown key, 'zoo'"]

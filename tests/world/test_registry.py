@@ -36,6 +36,9 @@ from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
+ACTUATORS = [
+    *("force", "joint_position", "joint_torque", "joint_velocity", "rod_position", "rotor_speeds", "wheel_speeds")
+]
 SENSORS: Final = [
     *("ball", "battery", "contact", "encoder", "gps", "imu", "joint_state", "odometry", "pose", "pose_3d", "proximity")
 ]
@@ -239,7 +242,15 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     assert names("sensor") == SENSORS
-    assert names("actuator") == ACTUATORS
+    assert names("actuator") == [
+        "force",
+        "joint_position",
+        "joint_torque",
+        "joint_velocity",
+        "rod_position",
+        "rotor_speeds",
+        "wheel_speeds",
+    ]
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]

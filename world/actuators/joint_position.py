@@ -51,6 +51,11 @@ class JointPositionActuator:
         self._gain = settings.gain
         self.joints = self._group.indices
 
+    @staticmethod
+    def check(settings: JointPositionSettings, at: Mounting) -> None:
+        """Raise Misfit for a joint that the robot does not have."""
+        JointGroup(settings, at)
+
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return no bounds that are common to all joints: each has its own."""
         return {}

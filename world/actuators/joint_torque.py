@@ -28,6 +28,11 @@ class JointTorqueActuator:
         self._group = JointGroup(settings, at)
         self.joints = self._group.indices
 
+    @staticmethod
+    def check(settings: JointTorqueSettings, at: Mounting) -> None:
+        """Raise Misfit for a joint that the robot does not have."""
+        JointGroup(settings, at)
+
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return no bounds that are common to all joints: each has its own."""
         return {}

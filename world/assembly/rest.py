@@ -72,7 +72,7 @@ def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
         if at is None or numbers[at] == 0.0 or entity.name not in before.layout:
             continue
         was = before.layout[entity.name]
-        for field in entity.kind.slots:
+        for field in entity.fields:
             here, there, count = entity.offsets[field], was.offsets[field], entity.counts[field]
             if field not in MAY_CHANGE and numbers[here : here + count] != old[there : there + count]:
                 numbers[at] = 0.0

@@ -189,7 +189,11 @@ def _check_shape(shape: Any) -> None:
 
 def _check_addable(model: Model) -> None:
     lacking = [method for method in ("check_place", "place_at") if not hasattr(model.made, method)]
-    _need(not lacking and "position" in model.slots, "a model with position, check_place and place_at", model.name)
+    _need(
+        not lacking and "position" in (model.declared or ()),
+        "a model with position, check_place and place_at",
+        model.name,
+    )
 
 
 def _check_findings(findings: Iterable[Any]) -> None:

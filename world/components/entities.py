@@ -113,7 +113,7 @@ class Kit(Protocol):
 
 def mounting_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Mounting:
     """Return what the model of an entity is made with."""
-    return Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.kind.slots))
+    return Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.fields))
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,9 +41,13 @@ BODY: Final[Mapping[str, int]] = MappingProxyType(
     {"position": 3, "orientation": 4, "linear_velocity": 3, "angular_velocity": 3}
 )
 """The fields of a free rigid body: SI units, in the world frame, orientation as a quaternion x, y, z, w."""
+LINEAR_VELOCITY: Final = "linear_velocity"
+"""The field that a rigid body has which nothing holds."""
 JOINTS: Final = ("joint_positions", "joint_velocities", "joint_efforts")
 """The fields of a jointed rigid body, a number for each joint: m or rad, m/s or rad/s, N or N m. An effort is what the
 joint's motor applied in the last substep."""
+JOINTS_MAX: Final = 64
+"""Joints that an actuator drives at most."""
 CONTACTS: Final[Mapping[str, int]] = MappingProxyType({"contacts": 3})
 """The contact log of a rigid body in the last tick: count of touches that began, impulse (N s), last substep or -1."""
 
@@ -96,9 +100,31 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
     return f"{numbers} numbers in all, at most {SLOTS_MAX} are valid" if numbers > SLOTS_MAX else ""
 
 
+OF_ROBOTS: Final = ("down", "refused")
+"""Fields that each robot has: whether it is out of service, and how many commands it has refused."""
+OF_SOLVED: Final = ("quarantined",)
+"""Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
+
 SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
 """The slots of a component, by its settings and what it is on; a sensor or actuator is on no numbers. Raises BadValue
 for settings that do not fit that."""
+FieldsOf: TypeAlias = Callable[[Any, Any], Mapping[str, int]]
+"""The fields of an entity's state, by its settings (None of what is no robot) and the world (`WorldSpec`) with its
+files. Raises BadValue for settings of which none follow."""
+
+
+def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sensor: bool = False) -> Mapping[str, int]:
+    """Return what a function of a form says of its slots. Raises BadValue where it fails, or what it says is wrong."""
+    try:
+        found = slots_of(*arguments)
+    except BadValue:
+        raise
+    except Exception as error:
+        raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", name) from error
+    problem = slots_problem(found, is_sensor=is_sensor)
+    if problem:
+        raise BadValue(f"its slots are wrong: {problem}", name)
+    return found  # type: ignore[no-any-return]
 
 
 SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
@@ -156,30 +182,22 @@ class Component(Form):
         follow from them."""
         if not callable(self.slots):
             return self.slots
-        try:
-            found: Any = self.slots(settings, carrier)
-        except BadValue:
-            raise
-        except Exception as error:
-            raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", self.name) from error
-        problem = slots_problem(found, is_sensor=self.form == "sensor")
-        if problem:
-            raise BadValue(f"its slots are wrong: {problem}", self.name)
-        return found  # type: ignore[no-any-return]
+        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model(Form):
     """A model of entities.
 
-    `slots` are the fields of its state. Those that foosim itself needs it has whatever it declares: robots `down` and
-    `refused`, what is solved `quarantined`. An engine solves one that is rigid; one with a `motion` goes on by that;
-    any other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of
-    a robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one
-    standing for all behind it; fields that every model calls the same need none.
+    `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
+    needs it has whatever it declares: robots `down` and `refused`, what is solved `quarantined`. An engine solves one
+    that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and sends and
+    receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a deployment.
+    `units` are those of its fields' numbers, the last one standing for all behind it; fields that every model calls the
+    same need none.
     """
 
-    slots: Mapping[str, int] = field(default_factory=dict)
+    slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
     is_robot: bool = True
     has_body: bool = True
     """Whether it is somewhere, with an antenna; else only a place of the network can say where."""
@@ -198,9 +216,29 @@ class Model(Form):
         return self.is_rigid or bool(self.motion)
 
     @property
-    def is_free(self) -> bool:
-        """Whether it is a rigid body that nothing holds: it can be pushed."""
-        return self.is_rigid and "linear_velocity" in self.slots
+    def declared(self) -> Mapping[str, int] | None:
+        """The fields of the state of every entity of it; None where they follow from settings."""
+        return None if callable(self.slots) else self.slots
+
+    @property
+    def can_be_free(self) -> bool:
+        """Whether its entities are rigid bodies that nothing holds, or some may be."""
+        return self.is_rigid and (self.declared is None or LINEAR_VELOCITY in self.declared)
+
+    def fields_of(self, settings: Any, spec: Any) -> Mapping[str, int]:
+        """Return the fields of the state of an entity with these settings (None of what is no robot).
+
+        Raises BadValue where none follow from them.
+        """
+        if not callable(self.slots):
+            return self.slots
+        found = slots_found(self.name, self.slots, settings, spec)
+        return {**found, **{slot: 1 for slot in self.needed if slot not in found}}
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The fields that foosim itself needs."""
+        return (*(OF_ROBOTS if self.is_robot else ()), *(OF_SOLVED if self.is_solved else ()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

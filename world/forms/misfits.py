@@ -66,29 +66,33 @@ def model_problems(model: Model, kits: Collection[str]) -> Iterator[str]:
         return
     assert isinstance(motion, Motion), motion
     for verb, fields in (("needs", motion.needs), ("writes", motion.writes)):
-        missing = [field for field in fields if field not in model.slots]
+        missing = [] if model.declared is None else [field for field in fields if field not in model.declared]
         if missing:
             yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {fields_of(model, missing)}"
     for problem in needs_kit(motion, kits, motion.name):
         yield f"a model whose motion is {problem}"
 
 
-def component_problems(form: Form, model: Model) -> Iterator[str]:
-    """Yield what a robot of a model does not have that a component or rule of it needs."""
+def component_problems(form: Form, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
+    """Yield what a robot of a model does not have that a component or rule of it needs.
+
+    `having` are the fields of its state, where they follow from settings; without them nothing is missing.
+    """
+    has = model.declared if having is None else having
     word = word_of(form.form)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
     if isinstance(form, Component) and form.speaks and form.speaks not in needs:
         needs = (*needs, form.speaks)
-    missing = [field for field in needs if field not in model.slots]
+    missing = [] if has is None else [field for field in needs if field not in has]
     if missing:
-        fitting = ", ".join(other.name for other in models_of(robots=True) if {*needs} <= {*other.slots})
-        valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing)}")
+        fitting = ", ".join(other.name for other in models_of(robots=True) if {*needs} <= {*(other.declared or ())})
+        valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing, has)}")
         yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
     if not isinstance(form, EntityRule):
         return
-    written = [field for field in form.writes if field not in model.slots]
+    written = [] if has is None else [field for field in form.writes if field not in has]
     if written:
-        yield f"{word} that writes {', '.join(written)}: {fields_of(model, written)}"
+        yield f"{word} that writes {', '.join(written)}: {fields_of(model, written, has)}"
     if not model.is_solved:
         yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
 
@@ -142,14 +146,14 @@ def _not_placed(name: str) -> Iterator[str]:
     model = find_kit_model(name)
     if model is not None and not model.is_robot:
         missing = [f"method {method}" for method in PLACED_BY if not hasattr(model.made, method)]
-        missing += ["field position"] if "position" not in model.slots else []
+        missing += ["field position"] if "position" not in (model.declared or ()) else []
         if missing:
             yield f"of the model {model.name}, which has no {' and no '.join(missing)}"
 
 
-def fields_of(model: Model, missing: Sequence[str]) -> str:
+def fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None = None) -> str:
     """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
-    fields = [*model.slots]
+    fields = [*(having or model.declared or ())]
     shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
     nearest = nearest_name(missing[0], fields)
     near = "" if nearest is None else f", nearest to {missing[0]} is {nearest}"

@@ -14,6 +14,8 @@ from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
 from foosim.world.forms.forms import (
+    OF_ROBOTS,
+    OF_SOLVED,
     Component,
     EntityRule,
     Form,
@@ -100,8 +102,9 @@ def _component(found: Any) -> Iterator[str]:
 
 
 def _model(found: Any) -> Iterator[str]:
-    yield from _slots(found.slots)
-    for slot in ("down", "refused", "quarantined"):
+    if not callable(found.slots):
+        yield from _slots(found.slots)
+    for slot in () if callable(found.slots) else (*OF_ROBOTS, *OF_SOLVED):
         if found.slots.get(slot, 1) != 1:
             yield f"{slot}, which foosim writes, is one number, not {show(found.slots[slot])}"
     if not isinstance(found.motion, str):

@@ -64,10 +64,6 @@ FOLDERS: Final[Mapping[str, str]] = {
 }
 """Where foosim's own are, by form."""
 FORMS: Final = tuple(FOLDERS)
-OF_ROBOTS: Final = ("down", "refused")
-"""Fields that each robot has: whether it is out of service, and how many commands it has refused."""
-OF_SOLVED: Final = ("quarantined",)
-"""Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
 BY_CLASS: Final = "module:Class"
 """What names a form beside its name."""
 
@@ -159,11 +155,10 @@ def model(name: str, settings: type[EntitySettings], **about: Any) -> Callable[[
 
     def describe(made: Callable[..., Any]) -> Model:
         found = Model(form="model", name=name, made=made, settings=settings, **about)
-        needed = (*(OF_ROBOTS if found.is_robot else ()), *(OF_SOLVED if found.is_solved else ()))
         declared: Any = found.slots
         if not isinstance(declared, Mapping):
-            return found  # it is refused
-        return replace(found, slots={**declared, **{slot: 1 for slot in needed if slot not in declared}})
+            return found  # they follow from settings, or it is refused
+        return replace(found, slots={**declared, **{slot: 1 for slot in found.needed if slot not in declared}})
 
     return _registering(describe)
 

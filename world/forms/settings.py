@@ -1,6 +1,6 @@
 """What the settings of all forms have, in a deployment."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Final
 
@@ -71,6 +71,14 @@ class RobotSettings(EntitySettings):
     sensors: dict[Name, SerializeAsAny[SensorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     actuators: dict[Name, SerializeAsAny[ActuatorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
     rules: dict[Name, SerializeAsAny[EntityRuleSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
+
+    def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
+        """Return the files that its model is made from, by paths inside the asset folder: those that the settings name,
+        and of those that are in `files`, contents by path, the ones that these name in turn. Raises AssetError."""
+        return ()
+
+    def check_assets(self, files: Mapping[str, bytes]) -> None:
+        """Raise AssetError for a file that is not acceptable; all that `asset_paths` names are in `files`."""
 
 
 BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(

@@ -11,14 +11,15 @@ from pydantic import Field
 
 from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
+from foosim.common.plain_data import quoted
 from foosim.common.spec_base import Name
+from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, Slot, View, WritableView
-from foosim.world.forms.forms import Carrier
+from foosim.world.forms.forms import JOINTS_MAX, Carrier
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.scene import Link
 
-JOINTS_MAX: Final = 64
 FORCE_MAX: Final = 1e6
 """What a joint without a limit of its effort is driven with at most (N or N m)."""
 SPEED_MAX: Final = 1e3
@@ -49,13 +50,13 @@ class JointGroup:
     """The joints that an actuator drives, in the frames of one layout."""
 
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
-        """Raises BadValue for a joint that the robot does not have."""
+        """Raises Misfit for a joint that the robot does not have."""
         body = body_at(at)
         names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
-        for name in settings.joints or ():
+        for place, name in enumerate(settings.joints or ()):
             if name not in names:
                 problem = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-                raise BadValue(problem, name, nearest_name(name, names))
+                raise Misfit(("joints", place), problem, name, quoted(nearest_name(name, names)))
         self.indices = tuple(names.index(name) for name in settings.joints or names)
         self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
         self.set_point: Slot = at.slot("set_point")

@@ -4,6 +4,8 @@ import { decodeMesh, FLOATS_PER_LINK } from "./messages.js";
 
 /** Corners of a mesh that its outline is made of; of a mesh with more the outermost ones in so many directions. */
 const CORNERS_MAX = 400;
+/** Corners that a circle is drawn with. */
+const ROUND = 16;
 
 /** @param {Rgba} colour */
 function cssColour([red, green, blue, alpha]) {
@@ -62,8 +64,8 @@ function outermost(points) {
 }
 
 /**
- * What is seen of a shape from above: the convex outline of its projection, or a circle. A cylinder that lies is seen as
- * the box around it; null for a mesh that is not known.
+ * What is seen of a shape from above: the convex outline of its projection, or a circle; upright, a cylinder and a capsule
+ * are circles. A cylinder that lies is seen as the box around it; null for a mesh that is not known.
  * @param {Shape} shape
  * @param {Vec3} position of its link
  * @param {Quat} orientation of its link
@@ -78,7 +80,15 @@ export function fromAbove(shape, position, orientation, meshes) {
   if (shape.kind === "sphere") return { kind: "circle", at, radius: shape.radius, colour };
   const up = turned(turn, [0, 0, 1]);
   const radius = shape.radius ?? 0;
-  if (shape.kind === "cylinder" && Math.abs(up[2]) > 0.9) return { kind: "circle", at, radius, colour };
+  const isRound = shape.kind === "cylinder" || shape.kind === "capsule";
+  if (isRound && Math.abs(up[2]) > 0.9) return { kind: "circle", at, radius, colour };
+  if (shape.kind === "capsule") {
+    const ends = [-1, 1].map((side) => (side * (shape.length ?? 0)) / 2);
+    const round = [...Array(ROUND).keys()].map((step) => (2 * Math.PI * step) / ROUND);
+    const points = ends.flatMap((end) => round.map((angle) => /** @type {[number, number]} */ (
+      [end * up[0] + radius * Math.cos(angle), end * up[1] + radius * Math.sin(angle)])));
+    return { kind: "polygon", at, points: hull(points), colour };
+  }
   if (shape.kind === "mesh") {
     const mesh = meshes[shape.mesh ?? ""];
     if (!mesh) return null;

@@ -1,7 +1,7 @@
 // Shapes of links as instances: one mesh for each kind of geometry, so a world of a thousand robots is a few draw calls.
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, DynamicDrawUsage, InstancedMesh, Matrix4,
+  BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, CylinderGeometry, DynamicDrawUsage, InstancedMesh, Matrix4,
   MeshLambertMaterial, Quaternion, SphereGeometry, Vector3,
 } from "three";
 import { FLOATS_PER_LINK, decodeMesh } from "./messages.js";
@@ -23,7 +23,7 @@ export function linkMatrix(poses, link, into) {
   return into.compose(at, turn, one);
 }
 
-/** The matrix of a shape in its link, with its size: geometries are of unit size. @param {Shape} shape */
+/** The matrix of a shape in its link, with its size where its geometry is of unit size. @param {Shape} shape */
 function localMatrix(shape) {
   const size = new Vector3(1, 1, 1);
   if (shape.kind === "box" && shape.half) size.fromArray(shape.half).multiplyScalar(2);
@@ -32,11 +32,15 @@ function localMatrix(shape) {
   return new Matrix4().compose(new Vector3(...shape.position), new Quaternion(...shape.orientation), size);
 }
 
-/** @param {string} kind @param {{vertices: string, triangles: string} | undefined} mesh */
-function geometryOf(kind, mesh) {
+/**
+ * A geometry of unit size, but for that of a mesh and of a capsule, whose ends would not stay round.
+ * @param {Shape} shape @param {{vertices: string, triangles: string} | undefined} mesh
+ */
+function geometryOf({ kind, radius, length }, mesh) {
   if (kind === "box") return new BoxGeometry(1, 1, 1);
   if (kind === "sphere") return new SphereGeometry(1, 24, 16);
   if (kind === "cylinder") return new CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2);
+  if (kind === "capsule") return new CapsuleGeometry(radius, length, 8, 24).rotateX(Math.PI / 2);
   const geometry = new BufferGeometry();
   if (mesh) {
     const { vertices, triangles } = decodeMesh(mesh);
@@ -96,13 +100,15 @@ export function batchesOf(scene, opacity) {
   /** @type {Map<string, Placed[]>} */
   const groups = new Map();
   for (const one of placed) {
-    const key = `${one.shape.kind} ${one.shape.mesh ?? ""} ${one.shape.colour[3] * opacity}`;
+    const { kind, mesh, radius, length, colour } = one.shape;
+    const size = kind === "capsule" ? `${radius} ${length}` : "";
+    const key = `${kind} ${mesh ?? ""} ${size} ${colour[3] * opacity}`;
     const group = groups.get(key);
     if (group) group.push(one);
     else groups.set(key, [one]);
   }
   return [...groups.values()].map((group) => {
-    const { kind, mesh, colour } = group[0].shape;
-    return new Batch(geometryOf(kind, scene.meshes[mesh ?? ""]), group, colour[3] * opacity);
+    const { mesh, colour } = group[0].shape;
+    return new Batch(geometryOf(group[0].shape, scene.meshes[mesh ?? ""]), group, colour[3] * opacity);
   });
 }

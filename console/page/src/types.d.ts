@@ -5,7 +5,7 @@ type Quat = [number, number, number, number];
 type Rgba = [number, number, number, number];
 
 interface Shape {
-  kind: "box" | "sphere" | "cylinder" | "mesh";
+  kind: "box" | "sphere" | "cylinder" | "capsule" | "mesh";
   half?: Vec3;
   radius?: number;
   length?: number;

@@ -13,6 +13,7 @@ import { decodePoses } from "../src/messages.js";
 import { bannerOf, stateOf } from "../src/presence.js";
 import { moreText, oldText } from "../src/network.js";
 import { Ring } from "../src/ring.js";
+import { batchesOf } from "../src/shapes.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
 
@@ -134,6 +135,27 @@ test("a box that is turned is seen from above as it lies", () => {
   assert.deepEqual(at, [3, 4]);
   assert.equal(Math.round(Math.max(...points.map(([x]) => x))), 1);
   assert.equal(Math.round(Math.max(...points.map(([, y]) => y))), 2);
+});
+
+test("a capsule is seen from above as a circle where it stands, as long as its ends where it lies", () => {
+  const capsule = { kind: "capsule", radius: 0.5, length: 2, position: [0, 0, 0], orientation: [0, 0, 0, 1], colour: [1, 0, 0, 1], name: "" };
+  const upright = fromAbove(capsule, [3, 4, 0], [0, 0, 0, 1], {});
+  assert.deepEqual([upright.kind, upright.at, upright.radius], ["circle", [3, 4], 0.5]);
+  const { points } = fromAbove(capsule, [3, 4, 0], [0, Math.SQRT1_2, 0, Math.SQRT1_2], {});
+  const [across, along] = [0, 1].map((axis) => points.map((point) => point[axis])).map((all) => Math.max(...all) - Math.min(...all)).reverse();
+  assert.ok(Math.abs(along - 3) < 1e-9 && Math.abs(across - 1) < 1e-9, `${along} by ${across}`);
+});
+
+test("capsules of one size are drawn together, others apart, each with round ends", () => {
+  const shape = (radius, length) => ({ kind: "capsule", radius, length, position: [0, 0, 0], orientation: [0, 0, 0, 1], colour: [1, 0, 0, 1], name: "" });
+  const scene = { scenery: [shape(0.5, 2), shape(0.5, 2), shape(0.2, 1)], links: [], meshes: {} };
+  const batches = batchesOf(scene, 1);
+  assert.deepEqual(batches.map(({ placed }) => placed.length), [2, 1]);
+  for (const [{ mesh }, high, wide] of [[batches[0], 1.5, 0.5], [batches[1], 0.7, 0.2]]) {
+    mesh.geometry.computeBoundingBox();
+    const { max } = mesh.geometry.boundingBox;
+    assert.ok(Math.abs(max.z - high) < 1e-6 && Math.abs(max.x - wide) < 1e-6, `${max.x}, ${max.z}`);
+  }
 });
 
 test("a run that has ended is said, with its capture, whatever becomes of the console", () => {

@@ -1,0 +1,87 @@
+"""The command `inspect`: what it shows of a URDF file, and of what is none."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
+
+ROOT: Final = Path(__file__).parents[2]
+ARM: Final = ROOT / "deploy" / "models" / "arm.urdf"
+PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
+COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+
+
+def inspected(*arguments: str | Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", COMMAND, "inspect", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def block(language: str) -> str:
+    (text,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    assert isinstance(text, str)
+    return text
+
+
+def test_the_page_shows_what_the_command_prints(tmp_path: Path) -> None:
+    (tmp_path / "turret.urdf").write_text(block("xml"))
+    done = inspected("turret.urdf", folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, block("text"), "")
+
+
+def test_json_has_the_tree_in_si_units() -> None:
+    done = inspected(ARM, "--assets", ROOT / "deploy", "--json")
+    about = json.loads(done.stdout)
+    assert about["file"] == "models/arm.urdf" and about["mass"] == pytest.approx(14.9) and about["free_base"] is None
+    assert len(about["links"]) == 9 and len(about["moving"]) == 7
+    elbow = about["links"][4]
+    assert elbow["name"] == "forearm" and elbow["centre_of_mass"] == [0.0, -0.02, 0.13]
+    joint = elbow["joint"]
+    assert (joint["name"], joint["parent"], joint["axis"]) == ("elbow_pitch", "elbow", [0.0, 1.0, 0.0])
+    assert (joint["limits"], joint["effort"], joint["speed"], joint["damping"]) == ([-2.3, 2.3], 60.0, 2.6, 0.5)
+    assert about["links"][-1]["joint"]["axis"] is None, "a fixed joint has none"
+    tree, problems = read_tree(about["deployment"], locate_in("page"))
+    assert tree is not None and not problems
+    said = plain(tree)["robots"]["arm"]
+    assert (said["model"], said["file"], said["fixed"]) == ("urdf", "models/arm.urdf", True)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("none.urdf", None, "none.urdf: No such file or directory"),
+        ("folder", b"", "folder: no regular file"),
+        ("empty.urdf", b"", "empty.urdf:1: an empty file"),
+        ("text.urdf", b"hello\n", "text.urdf:1: no XML, syntax error"),
+        ("mimic.urdf", ARM.read_bytes().replace(b"<axis", b'<mimic joint="x"/><axis', 1), "a mimic joint: "),
+        (
+            "mesh.urdf",
+            ARM.read_bytes().replace(b"<cylinder", b'<mesh filename="a.stl"/><cylinder', 2),
+            "mesh.urdf:23: a mesh that cannot be read: a.stl: No such file",
+        ),
+    ],
+)
+def test_what_is_no_robot_is_bad_input(tmp_path: Path, name: str, content: bytes | None, what: str) -> None:
+    if name == "folder":
+        (tmp_path / name).mkdir()
+    elif content is not None:
+        (tmp_path / name).write_bytes(content)
+    done = inspected(name, folder=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert what in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_without_permission_is_bad_input(tmp_path: Path) -> None:
+    (tmp_path / "a.urdf").write_bytes(ARM.read_bytes())
+    (tmp_path / "a.urdf").chmod(0)
+    done = inspected("a.urdf", folder=tmp_path)
+    assert done.returncode == 2 and "a.urdf: Permission denied" in done.stderr

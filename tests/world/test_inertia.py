@@ -1,0 +1,140 @@
+"""Masses and inertias against closed forms, numpy's eigenvectors and each other."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from foosim.common.errors import BadValue
+from foosim.world.bodies.hull import convex_hull
+from foosim.world.bodies.inertia import (
+    MassOf,
+    Tensor,
+    about,
+    check_mass,
+    check_moments,
+    combined,
+    placed,
+    principal_of,
+    solid,
+    turned,
+)
+from foosim.world.scene import ORIGIN, UPRIGHT, Box, Capsule, Cylinder, Hull, Sphere, Vector, from_rpy, turn
+
+
+def matrix(tensor: Tensor) -> NDArray[np.float64]:
+    xx, xy, xz, yy, yz, zz = tensor
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def drawn_tensors(count: int) -> list[Tensor]:
+    """Tensors of clouds of points, from needles to balls, of masses from grams to tons."""
+    random = np.random.default_rng(5)
+    found: list[Tensor] = []
+    for _ in range(count):
+        points = random.normal(size=(6, 3)) * 10.0 ** random.uniform(-3, 1, 3)
+        inertia = 10.0 ** random.uniform(-3, 3) * sum(np.dot(p, p) * np.eye(3) - np.outer(p, p) for p in points)
+        found.append(tuple(inertia[np.triu_indices(3)].tolist()))
+    return found
+
+
+def test_principal_moments_are_the_eigenvalues_and_the_axes_give_the_tensor_again() -> None:
+    for tensor in drawn_tensors(400):
+        moments, axes = principal_of(tensor)
+        largest = max(moments)
+        assert np.allclose(sorted(moments), np.linalg.eigh(matrix(tensor))[0], rtol=0, atol=1e-14 * largest)
+        again = turned((moments[0], 0.0, 0.0, moments[1], 0.0, moments[2]), axes)
+        assert np.allclose(again, tensor, rtol=0, atol=1e-14 * largest)
+        assert sum(part * part for part in axes) == pytest.approx(1.0, abs=1e-15) and axes[3] >= 0.0
+
+
+def test_a_diagonal_tensor_has_its_own_moments_unturned() -> None:
+    assert principal_of((3.0, 0.0, 0.0, 1.0, 0.0, 2.0)) == ((3.0, 1.0, 2.0), UPRIGHT)
+    assert principal_of((2.0, 0.0, 0.0, 2.0, 0.0, 2.0)) == ((2.0, 2.0, 2.0), UPRIGHT)
+
+
+def test_equal_moments_with_products_of_inertia_are_told_apart() -> None:
+    moments, axes = principal_of((2.0, 1.0, 0.0, 2.0, 0.0, 4.0))
+    assert sorted(moments) == pytest.approx([1.0, 3.0, 4.0])
+    assert np.allclose(turned((moments[0], 0.0, 0.0, moments[1], 0.0, moments[2]), axes), (2, 1, 0, 2, 0, 4))
+
+
+SOLIDS = (
+    (Box((0.5, 1.0, 1.5)), (2 * (4 + 9) / 12, 2 * (1 + 9) / 12, 2 * (1 + 4) / 12)),
+    (Sphere(0.5), (0.2, 0.2, 0.2)),
+    (Cylinder(0.5, 3.0), (2 * (0.75 + 9) / 12, 2 * (0.75 + 9) / 12, 0.25)),
+)
+
+
+@pytest.mark.parametrize(("geometry", "moments"), SOLIDS)
+def test_solids_have_the_moments_of_handbooks(geometry: Box | Sphere | Cylinder, moments: Vector) -> None:
+    mass, centre, (x, xy, xz, y, yz, z) = solid(geometry, 2.0)
+    assert (mass, centre, xy, xz, yz) == (2.0, ORIGIN, 0.0, 0.0, 0.0)
+    assert (x, y, z) == pytest.approx(moments, rel=1e-15)
+
+
+def test_a_capsule_is_what_its_points_are() -> None:
+    radius, length, step = 0.3, 0.8, 0.01
+    across, along = (np.arange(-reach + step / 2, reach, step) for reach in (0.3, 0.7))
+    x, y, z = (part.ravel() for part in np.meshgrid(across, across, along))
+    beyond = np.maximum(abs(z) - length / 2, 0.0)
+    inside = x * x + y * y + beyond * beyond <= radius * radius
+    x, y, z = x[inside], y[inside], z[inside]
+    _, _, (xx, _, _, yy, _, zz) = solid(Capsule(radius, length), 3.0)
+    of_points = [3.0 * float(np.mean(part)) for part in (y * y + z * z, x * x + z * z, x * x + y * y)]
+    assert (xx, yy, zz) == pytest.approx(of_points, rel=0.005)
+    shortest = solid(Capsule(radius, 1e-9), 3.0).tensor
+    assert shortest == pytest.approx(solid(Sphere(radius), 3.0).tensor, rel=1e-6), "without a length it is a sphere"
+
+
+def test_a_hull_is_the_solid_that_it_bounds() -> None:
+    corners = np.array([[x, y, z] for x in (1, 1.4) for y in (-0.3, 0.3) for z in (2, 3)])
+    mass, centre, tensor = solid(Hull(convex_hull(corners)), 5.0)
+    assert mass == 5.0 and centre == pytest.approx((1.2, 0.0, 2.5), abs=1e-14)
+    assert tensor == pytest.approx(solid(Box((0.2, 0.3, 0.5)), 5.0).tensor, abs=1e-12)
+
+
+def test_parts_make_the_whole_wherever_its_frame_is() -> None:
+    """A box cut in three, turned: the parallel axes of Huygens and Steiner."""
+    orientation = from_rpy(0.3, -1.1, 2.0)
+    parts = [MassOf(1.0, (0.0, 0.0, z), solid(Box((0.1, 0.2, 0.5)), 1.0).tensor) for z in (-1.0, 0.0, 1.0)]
+    whole = combined([placed(part, (4.0, 5.0, 6.0), orientation) for part in parts])
+    expected = turned(solid(Box((0.1, 0.2, 1.5)), 3.0).tensor, orientation)
+    assert whole.mass == 3.0 and whole.centre == pytest.approx((4.0, 5.0, 6.0))
+    assert whole.tensor == pytest.approx(expected, abs=1e-13)
+    assert combined([]).mass == 0.0 and combined(parts[:1]) == parts[0]
+
+
+def test_away_from_the_centre_a_mass_resists_more() -> None:
+    assert about((1.0, 0.0, 0.0, 1.0, 0.0, 1.0), 2.0, (3.0, 4.0, 0.0)) == (33.0, -24.0, 0.0, 19.0, 0.0, 51.0)
+    quarter = turn((0.0, 0.0, 1.0), pi / 2)
+    assert turned((1.0, 0.0, 0.0, 2.0, 0.0, 3.0), quarter) == pytest.approx((2.0, 0.0, 0.0, 1.0, 0.0, 3.0), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("moments", "what"),
+    [
+        ((0.0, 1.0, 1.0), r"moments of 0, 1 and 1 kg m2: each is above 0"),
+        ((-1.0, 1.0, 1.0), r"moments of -1, 1 and 1 kg m2: each is above 0"),
+        ((1.0, 1.0, 2.1), r"no body has one above the sum of both others, 2$"),
+        ((1e-9, 1e-9, 1e-9), r"of 1 kg: a radius of gyration of 3\.16\S+e-05 m, valid are 0\.0001 to 1000 m"),
+        ((1e7, 1e7, 1e7), r"a radius of gyration of 3162\.28 m"),
+    ],
+)
+def test_moments_that_no_body_has_are_refused_with_the_numbers(moments: Vector, what: str) -> None:
+    with pytest.raises(BadValue, match=what):
+        check_moments(1.0, moments)
+
+
+def test_a_thin_plate_whose_numbers_were_rounded_is_a_body() -> None:
+    check_moments(1.0, (1.0, 1.0, 2.0))
+    check_moments(1.0, (0.083, 0.083, 0.167))
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, 1e-7, 1.1e6])
+def test_masses_that_no_robot_has_are_refused(mass: float) -> None:
+    with pytest.raises(BadValue, match=r"kg, valid are 1e-06 to 1e\+06 kg"):
+        check_mass(mass)

@@ -1,0 +1,289 @@
+"""Robots of the model `urdf`: their state and bodies follow from their files, which travel with the deployment."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import nan
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.client.commands import CommandEncoder
+from foosim.common.errors import DeploymentError, Malformed
+from foosim.console.shown.scene_json import scene_content
+from foosim.deployment.assets import pin_assets, read_robot
+from foosim.deployment.loader import load_deployment, with_owners
+from foosim.deployment.schema import Deployment
+from foosim.protocol.asset_transfer import Fetching
+from foosim.world.assembly.world import build_scene, initial_numbers, models_of
+from foosim.world.edits import Push, fitting_edits
+from foosim.world.forms import misfits, registry
+from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import build_layout
+from foosim.world.mesh import AssetError, digest_of
+from foosim.world.models.urdf import arms_of
+from foosim.world.scene import from_rpy
+
+DEPLOY: Final = Path(__file__).parents[2] / "deploy"
+NAME: Final = "table.yaml"
+TEXT: Final = (DEPLOY / NAME).read_text()
+ARM: Final = (DEPLOY / "models" / "arm.urdf").read_bytes()
+SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
+MASS: Final = '<inertial><origin xyz="0.1 0 0"/><mass value="1"/><inertia ixx="0.02" ixy="0.01" iyy="0.02" izz="0.03"/>'
+CART: Final = f"""<robot name="cart">
+  <link name="Hull">{MASS}</inertial>
+    <collision><geometry><mesh filename="../meshes/shard.obj" scale="0.1 0.1 0.1"/></geometry></collision></link>
+  <link name="wheel">{MASS}</inertial>
+    <collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="axle" type="continuous"><parent link="Hull"/><child link="wheel"/><origin xyz="0 0.3 0"/></joint>
+</robot>
+""".encode()
+FILES: Final = {"models/arm.urdf": ARM, "models/cart.urdf": CART, "meshes/shard.obj": SHARD}
+ROBOTS: Final = (
+    "robots.arm={model: urdf, file: models/arm.urdf, at: {x: 3 m, yaw: 90 deg}, fixed: true}",
+    "robots.cart={model: urdf, file: models/cart.urdf, at: {x: -3 m, z: 1 m, roll: 30 deg}, fixed: false, "
+    "speed_limit: 20 m/s}",
+)
+
+
+@pytest.fixture(autouse=True)
+def solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A world that takes rigid models whose reach its islands do not know: nothing is solved here."""
+    monkeypatch.setattr(misfits, "REACHED", (*misfits.REACHED, "urdf"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for path, content in FILES.items():
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    return tmp_path
+
+
+def text_with(*sets: str) -> str:
+    return with_owners(TEXT, NAME, {"n1": ["*"]}, ["players={}", *sets])
+
+
+@pytest.fixture
+def deployment(folder: Path) -> Deployment:
+    text, files = pin_assets(text_with(*ROBOTS), NAME, folder)
+    return load_deployment(text, NAME).with_assets(files)
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_files_of_robots_and_their_meshes_are_pinned_and_travel(folder: Path) -> None:
+    text, files = pin_assets(text_with(*ROBOTS), NAME, folder)
+    assert files == FILES
+    there = load_deployment(text, NAME)
+    assert there.lacks_files and there.files() == {path: digest_of(content) for path, content in FILES.items()}
+    fetching = Fetching(there, {digest_of(content): content for content in FILES.values()})
+    complete = there.with_assets(fetching.contents())
+    assert not complete.lacks_files and complete.asset_files == FILES, "what a capture attaches"
+    assert pin_assets(text, NAME, folder) == (text, files), "pinning twice changes nothing"
+
+
+def test_a_deployment_without_robots_of_files_names_none(folder: Path) -> None:
+    assert pin_assets(text_with(), NAME, folder) == (text_with(), {})
+    assert not load_deployment(text_with(), NAME).lacks_files
+
+
+def test_a_file_that_changed_since_it_was_pinned_is_refused(folder: Path) -> None:
+    text, files = pin_assets(text_with(*ROBOTS), NAME, folder)
+    for path in FILES:
+        with pytest.raises(AssetError, match=rf"^{path}: another file than the digest names"):
+            load_deployment(text, NAME).with_assets({**files, path: files[path] + b"\n"})
+        with pytest.raises(AssetError, match=rf"^{path}: the file of a robot is missing"):
+            load_deployment(text, NAME).with_assets({other: files[other] for other in files if other != path})
+
+
+def test_another_file_than_before_leaves_no_digest_behind(folder: Path) -> None:
+    text, _ = pin_assets(text_with(*ROBOTS), NAME, folder)
+    again, files = pin_assets(
+        with_owners(text, NAME, {"n1": ["*"]}, ["robots.cart.file=models/arm.urdf"]), NAME, folder
+    )
+    assert [*files] == ["models/arm.urdf"] == [*load_deployment(again, NAME).digests]
+
+
+@pytest.mark.parametrize(
+    ("file", "what"),
+    [
+        ("models/none.urdf", r"^models/none\.urdf: No such file or directory"),
+        ("models/bad.urdf", r"^models/bad\.urdf:1: no XML"),
+        ("link.urdf", r"^link\.urdf: a symbolic link"),
+    ],
+)
+def test_a_bad_file_is_refused_at_planning(folder: Path, file: str, what: str) -> None:
+    (folder / "models" / "bad.urdf").write_text("no robot")
+    (folder / "link.urdf").symlink_to(folder / "models" / "arm.urdf")
+    with pytest.raises(AssetError, match=what):
+        pin_assets(text_with(*ROBOTS, f"robots.arm.file={file}"), NAME, folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ("robots.arm.file=../arm.urdf", "a path inside the asset folder has no empty component"),
+        ("robots.arm.file=models/arm.sdf", "no URDF file, which ends with .urdf, 'models/arm.sdf'"),
+        ("robots.arm.fixed=", "robots.arm.fixed: "),
+        ("robots.arm.fixd=true", "unknown key, 'fixd', nearest is 'fixed'"),
+        ("robots.arm.speed_limit=0 m/s", "robots.arm.speed_limit: "),
+    ],
+)
+def test_bad_settings_are_refused_before_any_file_is_read(change: str, what: str) -> None:
+    with pytest.raises(DeploymentError, match=what):
+        text_with(*ROBOTS, change)
+
+
+def test_what_a_component_needs_is_looked_for_in_the_robots_own_state(folder: Path) -> None:
+    """An arm on a fixed base has no position; what state it has is known with the file."""
+    arm = ROBOTS[0].replace("fixed: true", "fixed: true, sensors: {where: {kind: pose, rate: 10 Hz}}")
+    with pytest.raises(DeploymentError) as refused:
+        pin_assets(text_with(arm), NAME, folder)
+    (problem,) = refused.value.problems
+    assert "robots.arm.sensors.where.kind: sensor that an urdf cannot carry, which has no position, heading" in problem
+
+
+def test_a_free_robot_needs_a_mass(folder: Path) -> None:
+    light = ARM.replace(b'<mass value="4"/>', b'<mass value="0"/>', 1)
+    for moment in (b"0.0129", b"0.0162"):
+        light = light.replace(b'="' + moment, b'="0')
+    (folder / "models" / "arm.urdf").write_bytes(light)
+    with pytest.raises(DeploymentError, match=r"robots\.arm\.model: a free robot whose first link base, .*has no mass"):
+        pin_assets(text_with(*ROBOTS, "robots.arm.fixed=false"), NAME, folder)
+    pin_assets(text_with(*ROBOTS), NAME, folder)
+
+
+# --- state -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_state_follows_from_the_file(deployment: Deployment) -> None:
+    layout = build_layout(deployment)
+    arm, cart = layout["arm"], layout["cart"]
+    own = {"quarantined": 1, "down": 1, **CONTACTS, "refused": 1}
+    assert arm.fields == {**dict.fromkeys(JOINTS, 7), **own} and not arm.is_free
+    assert cart.fields == {**BODY, **dict.fromkeys(JOINTS, 1), **own} and cart.is_free
+    assert cart in layout.free and arm not in layout.free
+    push = [Push(name, (1.0, 0.0, 0.0)) for name in ("arm", "cart")]
+    assert fitting_edits(layout, push) == push[1:]
+    again = build_layout(deployment)
+    assert layout.digest == again.digest
+    other = deployment.model_copy(update={"robots": {**deployment.robots, "cart": deployment.robots["arm"]}})
+    assert build_layout(other).digest != layout.digest
+
+
+def test_without_the_file_there_is_no_state(deployment: Deployment) -> None:
+    lacking = load_deployment(text_with(*ROBOTS), NAME)
+    with pytest.raises(Malformed, match=r"urdf: a URDF file whose content is not there, 'models/\w+\.urdf'"):
+        build_layout(lacking)
+    encoder = CommandEncoder(lacking)
+    assert encoder.actuators("arm") == () and encoder.actuators("red.goal"), "clients command robots without files"
+
+
+def test_robots_start_where_they_are_placed(deployment: Deployment) -> None:
+    layout = build_layout(deployment)
+    numbers, scene = initial_numbers(deployment, layout), build_scene(deployment, layout)
+    poses = forward_kinematics(scene.bodies["arm"], layout["arm"], numbers)
+    assert poses[0][1] == (3.0, 0.0, 0.0) and poses[-1][0] == "arm/grip"
+    assert poses[-1][1] == pytest.approx((3.0, 0.0, 1.13))
+    name, place, turned = forward_kinematics(scene.bodies["cart"], layout["cart"], numbers)[0]
+    assert name == "cart/Hull" and place == pytest.approx((-3.0, 0.0, 1.0))
+    assert turned == pytest.approx(from_rpy(0.5235987755982988, 0.0, 0.0))
+    shown = scene_content(deployment, layout, scene)
+    assert {"arm/flange", "cart/Hull"} <= {link for link in str(shown).split("'") if "/" in link}
+
+
+def test_a_joint_starts_at_its_limit_where_0_is_none(folder: Path) -> None:
+    (folder / "models" / "arm.urdf").write_bytes(ARM.replace(b'lower="-2.9"', b'lower="1.5"', 1))
+    text, files = pin_assets(text_with(*ROBOTS), NAME, folder)
+    deployment = load_deployment(text, NAME).with_assets(files)
+    layout = build_layout(deployment)
+    start = layout["arm"].offsets["joint_positions"]
+    assert initial_numbers(deployment, layout)[start : start + 7] == [1.5, *[0.0] * 6]
+
+
+# --- what can be -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("robot", "field", "place", "value", "is_plausible"),
+    [
+        ("arm", "joint_positions", 0, 2.99, True),
+        ("arm", "joint_positions", 0, 3.01, False),
+        ("arm", "joint_positions", 3, -2.35, True),
+        ("arm", "joint_velocities", 6, 35.0, True),
+        ("arm", "joint_velocities", 6, -36.5, False),
+        ("cart", "joint_positions", 0, 500.0, True),
+        ("cart", "joint_velocities", 0, 100.0, True),
+        ("cart", "joint_velocities", 0, 250.0, False),
+        ("cart", "linear_velocity", 2, 19.0, True),
+        ("cart", "linear_velocity", 2, 20.5, False),
+        ("cart", "angular_velocity", 1, 30.0, True),
+        ("cart", "angular_velocity", 1, 300.0, False),
+        ("cart", "position", 0, 99_000.0, True),
+        ("cart", "position", 0, 101_000.0, False),
+    ],
+)
+def test_a_state_is_within_limits_speeds_and_bounds(
+    deployment: Deployment, robot: str, field: str, place: int, value: float, is_plausible: bool
+) -> None:
+    layout = build_layout(deployment)
+    entity = layout[robot]
+    model, numbers = models_of(deployment, layout)[entity.index], initial_numbers(deployment, layout)
+    numbers[entity.offsets[field] + place] = value
+    assert model.is_plausible(numbers, numbers) is is_plausible
+
+
+@pytest.mark.parametrize(
+    ("robot", "field", "way", "is_plausible"),
+    [
+        ("arm", "joint_positions", 0.04, True),
+        ("arm", "joint_positions", 0.06, False),
+        ("cart", "position", 0.03, True),
+        ("cart", "position", 0.05, False),
+    ],
+)
+def test_nothing_gets_farther_in_a_tick_than_its_speed_allows(
+    deployment: Deployment, robot: str, field: str, way: float, is_plausible: bool
+) -> None:
+    """The table's tick is 2 ms: at ten times 2.2 rad/s 0.044 rad, at 20 m/s 4 cm."""
+    assert deployment.tick_ns == 2_000_000
+    layout = build_layout(deployment)
+    entity = layout[robot]
+    model, before = models_of(deployment, layout)[entity.index], initial_numbers(deployment, layout)
+    numbers = before.copy()
+    numbers[entity.offsets[field]] += way
+    assert model.is_plausible(numbers, before) is is_plausible
+    assert not model.is_plausible([nan] * len(numbers), before)
+
+
+def test_what_is_beyond_a_joint_is_within_its_arm(deployment: Deployment) -> None:
+    layout = build_layout(deployment)
+    bodies = build_scene(deployment, layout).bodies
+    arms = arms_of(bodies["cart"])
+    assert 0.1 <= arms[1] < 0.18, "the box around a sphere of 0.1 m about the joint"
+    assert arms[0] >= 0.1 + 0.3 + arms[1] - 1e-12
+    reach = arms_of(bodies["arm"])
+    assert all(one >= other for one, other in pairwise(reach)), "a chain gets shorter outwards"
+
+
+def test_it_is_listed_and_has_its_state_by_its_settings() -> None:
+    found = registry.find_model("urdf")
+    assert found.declared is None and found.can_be_free and found.is_robot and found.is_solved
+
+
+def test_inspecting_reads_meshes_from_the_asset_folder(folder: Path) -> None:
+    robot = read_robot(folder / "models" / "cart.urdf", folder)
+    assert robot.file == "models/cart.urdf" and robot.moving == ("axle",)
+    with pytest.raises(AssetError, match=r"^cart\.urdf:3: a path inside the asset folder has no empty component"):
+        read_robot(folder / "models" / "cart.urdf", None)
+    with pytest.raises(AssetError, match="not in the asset folder"):
+        read_robot(folder / "models" / "cart.urdf", folder / "meshes")
+    (folder / "meshes" / "shard.obj").unlink()
+    with pytest.raises(
+        AssetError, match=r"^models/cart\.urdf:3: a mesh that cannot be read: meshes/shard\.obj: No such"
+    ):
+        read_robot(folder / "models" / "cart.urdf", folder)

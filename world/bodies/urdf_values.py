@@ -1,0 +1,94 @@
+"""Values in a URDF: numbers, vectors, poses and names, each within its bounds; lengths in m, angles in rad.
+
+Source of the format: the XML specification of URDF at wiki.ros.org/urdf/XML.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final, NamedTuple
+
+from foosim.world.bodies.xml_tree import Element
+from foosim.world.scene import ORIGIN, UPRIGHT, Quaternion, Vector, from_rpy
+
+EXTENT_MIN_M: Final = 1e-4
+EXTENT_MAX_M: Final = 1e3
+ANGLE_MAX_RAD: Final = 1e3
+NUMBER_MAX: Final = 1e9
+NAME_LENGTH_MAX: Final = 64
+NAME_RULE: Final = (
+    f"a name has letters, digits, _, - and . (neither of these two at the beginning), at most {NAME_LENGTH_MAX} in all"
+)
+_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_NUMBER_LENGTH_MAX: Final = 40
+
+
+class Placed(NamedTuple):
+    """A pose in a frame around it."""
+
+    position: Vector
+    orientation: Quaternion
+
+
+UNMOVED: Final = Placed(ORIGIN, UPRIGHT)
+
+
+def name_of(element: Element) -> str:
+    """Return the name of a link or joint."""
+    name = text_of(element, "name")
+    if len(name) > NAME_LENGTH_MAX or not _NAME.fullmatch(name):
+        raise element.error(NAME_RULE, name)
+    return name
+
+
+def text_of(element: Element, key: str) -> str:
+    """Return an attribute that there must be."""
+    text = element.attributes.get(key)
+    if text is None:
+        raise element.error(f"{element.tag} without {key}")
+    return text
+
+
+def number_of(element: Element, key: str, low: float, high: float, default: float | None = None) -> float:
+    """Return an attribute that is a number within bounds."""
+    if default is not None and key not in element.attributes:
+        return default
+    value = _number(element, key, text_of(element, key))
+    if not low <= value <= high:
+        raise element.error(f"{key} of {element.tag} is not within {low:g} to {high:g}", element.attributes[key])
+    return value
+
+
+def vector_of(element: Element, key: str, most: float, default: Vector | None = None) -> Vector:
+    """Return an attribute that is three numbers, none of which is farther than `most` from 0."""
+    if default is not None and key not in element.attributes:
+        return default
+    words = text_of(element, key).split()
+    if len(words) != 3:
+        raise element.error(f"{key} of {element.tag} has {len(words)} numbers, it has 3", element.attributes[key])
+    x, y, z = (_number(element, key, word) for word in words)
+    if max(abs(x), abs(y), abs(z)) > most:
+        raise element.error(f"{key} of {element.tag} is not within -{most:g} to {most:g}", element.attributes[key])
+    return x, y, z
+
+
+def placed_by(element: Element) -> Placed:
+    """Return the pose that the origin in an element says: turned about fixed x (roll), then y (pitch), then z (yaw)."""
+    origin = element.one_of("origin")
+    if origin is None:
+        return UNMOVED
+    position = vector_of(origin, "xyz", EXTENT_MAX_M, ORIGIN)
+    roll, pitch, yaw = vector_of(origin, "rpy", ANGLE_MAX_RAD, ORIGIN)
+    return Placed(position, UPRIGHT if roll == pitch == yaw == 0.0 else from_rpy(roll, pitch, yaw))
+
+
+def _number(element: Element, key: str, text: str) -> float:
+    """Return a number; the texts `nan`, `inf` and `1_0`, which Python reads, are none."""
+    word = text.strip()
+    if len(word) > _NUMBER_LENGTH_MAX or not _NUMBER.fullmatch(word):
+        raise element.error(f"{key} of {element.tag} is not a finite number", text)
+    value = float(word)
+    if not abs(value) <= NUMBER_MAX:
+        raise element.error(f"{key} of {element.tag} is not within -{NUMBER_MAX:g} to {NUMBER_MAX:g}", text)
+    return value + 0.0  # -0.0 is 0.0
