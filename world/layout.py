@@ -152,6 +152,8 @@ class Layout:
         """The numbers that refer to entities."""
         self.free = tuple([entity for entity in entities if entity.is_free])
         """Free rigid bodies, in name order."""
+        self.shared: dict[int, tuple[WorldSpec, object]] = {}
+        """What the forms of this layout share, by the identity of the world, which is kept with it."""
         self._digest = b""
 
     def of(self, model: str) -> tuple[Entity, ...]:

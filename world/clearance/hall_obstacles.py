@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from foosim.world.assembly.sections import fixed_shapes
+from foosim.world.fixed_scenery import fixed_shapes
 from foosim.world.models.station import StationRobot
 from foosim.world.parameters.hall import Hall, hall_of
 from foosim.world.scene import Box, Cylinder, Shape, rotate, shape_box
