@@ -32,6 +32,8 @@ MODIFIERS: Final[dict[str, Any]] = {
     "odometry": [{"kind": "bias_walk", "initial": "1 mm", "walk": "1 mm"}, {"kind": "delay", "time": "20 ms"}],
     "battery": [{"kind": "quantise", "step": {"voltage": "100 mV"}}, {"kind": "drop_out", "probability": "20 %"}],
     "proximity": [{"kind": "clip", "low": "10 cm", "high": "2 m"}],
+    "laser_scanner": [],
+    "range": [],
 }
 UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table")}
 """Scenes are those of the kits; one engine computes."""
@@ -49,6 +51,8 @@ def mixed() -> str:
     hall = yaml.safe_load((DEPLOY / "warehouse.yaml").read_text())["hall"]
     sensors = {name: {"kind": name, "rate": "50 Hz", "modifiers": modifiers} for name, modifiers in MODIFIERS.items()}
     sensors["proximity"] |= {"rays": 8, "range": "4 m"}
+    sensors["laser_scanner"] |= {"rays": 19, "range": "4 m", "at": {"z": "80 cm"}}
+    sensors["range"] |= {"range": "4 m", "cone": "20 deg", "at": {"z": "80 cm"}}
     data["hall"] = hall
     data["robots"] |= {
         "rover-1": {"model": "rover", "x": "1.4 m", "y": "0 m", "heading": "170 deg", "sensors": sensors},

@@ -46,8 +46,8 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.heading=90", "robots.rover01.heading: not an angle (a number and one of rad, mrad, deg), 90"),
         ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
         ("robots.rover01.sensors.pose.kind=pos",
-         "robots.rover01.sensors.pose.kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, "
-         "proximity, or any module:Class), 'pos', nearest is 'pose'"),
+         "robots.rover01.sensors.pose.kind: unknown sensor (there are: ball, battery, encoder, "
+         "laser_scanner, odometry, pose, proximity, range, or any module:Class), 'pos', nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
         ("robots.rover01.actuators={drive: {kind: joint_position}}",

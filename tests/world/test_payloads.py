@@ -24,9 +24,11 @@ from foosim.world.forms.registry import names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
 from foosim.world.sensors.encoder import RodPosition
+from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.proximity import Ranges
+from foosim.world.sensors.range import Distance
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
@@ -38,12 +40,25 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "pose": (Pose(1 / 3, -7.5, 3.1), [1 / 3, -7.5, 3.1], ["m", "m", "rad"]),
     "odometry": (WheelTravel(12.5, -0.25), [12.5, -0.25], ["m", "m"]),
     "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
+    "laser_scanner": (Scan((0.5, 30.0)), [0.5, 30.0], ["m"]),
+    "range": (Distance(1.25), [1.25], ["m"]),
     "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
 }
 """A value of each kind, its numbers, and the units of its fields."""
-SIZES = {"encoder": 16, "ball": 24, "joint_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
+SIZES = {
+    "encoder": 16,
+    "ball": 24,
+    "joint_position": 16,
+    "pose": 24,
+    "odometry": 16,
+    "battery": 16,
+    "range": 8,
+    "wheel_speeds": 16,
+}
 """In bytes, of the kinds that have as many numbers always."""
+SEVERAL = ("laser_scanner", "proximity")
+"""The kinds with as many numbers as they have rays."""
 
 
 def codec(kind: str) -> PayloadCodec:
@@ -52,7 +67,7 @@ def codec(kind: str) -> PayloadCodec:
 
 def test_every_kind_is_tested() -> None:
     assert sorted(VALUES) == sorted([*names("sensor"), *names("actuator")])
-    assert {*SIZES, "proximity"} == {*VALUES}
+    assert {*SIZES, *SEVERAL} == {*VALUES}
 
 
 @pytest.mark.parametrize("kind", VALUES)
@@ -74,8 +89,8 @@ def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
     fields = codec(kind).fields
     assert [field.name for field in fields] == list(structs.asdict(value))
     assert [field.unit for field in fields] == units
-    assert [field.is_number for field in fields] == [kind != "proximity"] * len(fields)
-    assert [field.is_several for field in fields] == [kind == "proximity"] * len(fields)
+    assert [field.is_number for field in fields] == [kind not in SEVERAL] * len(fields)
+    assert [field.is_several for field in fields] == [kind in SEVERAL] * len(fields)
 
 
 @given(st.sampled_from(sorted(SIZES)), st.binary(max_size=40))

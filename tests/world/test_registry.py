@@ -235,7 +235,9 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
-    assert names("sensor") == ["ball", "battery", "encoder", "odometry", "pose", "proximity"]
+    assert names("sensor") == [
+        *("ball", "battery", "encoder", "laser_scanner", "odometry", "pose", "proximity", "range")
+    ]
     assert names("actuator") == ["joint_position", "wheel_speeds"]
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
@@ -438,7 +440,8 @@ def test_a_package_that_cannot_be_imported_is_named_and_hurts_nobody_else(site: 
         pytest.fail("a package that leaves takes the process with it")
     assert str(error.value) == (
         f"unknown sensor; {BROKEN[module]} "
-        "(there are: ball, battery, encoder, odometry, pose, proximity, reach, or any module:Class), 'reech', "
+        "(there are: ball, battery, encoder, laser_scanner, odometry, pose, proximity, range, reach, "
+        "or any module:Class), 'reech', "
         "nearest is 'reach'"
     )
     assert find("sensor", "reach").module == "own_gauges" and find("sensor", "encoder").name == "encoder"
@@ -602,8 +605,8 @@ WRONG: Final = (
      [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
        "(is the folder that it is in on PYTHONPATH?), 'own_gone:Idle'")]),
     ("kind: own_gauges.ReachGauge, rate: 100 Hz",
-     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, proximity, "
-       "or any module:Class), 'own_gauges.ReachGauge'")]),
+     [("own_gauges", ".kind: unknown sensor (there are: ball, battery, encoder, laser_scanner, odometry, pose, "
+       "proximity, range, or any module:Class), 'own_gauges.ReachGauge'")]),
 )  # fmt: skip
 """Settings, and what is said of them at which word."""
 
