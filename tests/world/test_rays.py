@@ -232,6 +232,8 @@ def test_many_lines_pass_triangles_where_each_alone_does(mesh: Mesh) -> None:
     rng = np.random.default_rng(21)
     starts, directions = vectors(rng, 200, 1.5).T.copy(), ways(rng, 200).T.copy()
     directions[:, :60] = np.eye(3)[rng.integers(0, 3, 60)].T
+    directions[:, 60:120] = rng.choice((-1.0, 1.0), (3, 60)) / sqrt(3.0)  # no coordinate in which they go farthest
+    directions[1, 80:120] *= 0.5
     starts[:, :60] = np.round(starts[:, :60] * 4.0) / 4.0
     triangles = Triangles(mesh)
     lines, places = triangles.hits_of_many(starts, directions)
@@ -281,6 +283,31 @@ def test_sorted_boxes_are_met_as_all_are_compared() -> None:
     is_met = (low[:, None] <= asked_high[:, :, None]) & (high[:, None] >= asked_low[:, :, None])
     expected = np.nonzero(is_met.all(axis=0))
     assert (asked.tolist(), found.tolist()) == (expected[0].tolist(), expected[1].tolist()) and len(found) > 100
+
+
+def test_a_mesh_beside_its_own_origin_is_met_there() -> None:
+    corners = [(4.0, 0.0, 0.0), (4.0, 1.0, 0.0), (4.0, 0.0, 1.0), (5.0, 0.0, 0.0)]
+    aside = Hull(mesh_of(corners, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]))
+    world = among(thing(aside, (1.0, 2.0, 3.0), turn((0.0, 0.0, 1.0), pi / 2)))
+    start, way = np.array([[0.8, 0.0, 3.2], [-3.0, 6.3, 3.2]]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    assert world.cast(start, way, 9.0).distances == pytest.approx([6.0, 3.5])
+    assert world.clearance(np.array([[0.8, 5.5, 3.2]]), 1.0) == pytest.approx([0.5])
+
+
+def test_rays_from_one_place_pass_each_its_own_entity_and_others_begin_elsewhere() -> None:
+    """Neighbours that share a place, or a coordinate of it, are no one ray."""
+    layout = Layout({"one": "ball", "two": "ball"}, Declared())
+    ball = Shape(Sphere(0.5), "walls", GREY)
+    bodies = {
+        name: Body(name, "ball", (x, 0.0, 0.0), (Link(name, "fixed", (ball,), 1.0, (1.0, 1.0, 1.0)),))
+        for name, x in (("one", 2.0), ("two", 5.0))
+    }
+    world = Caster(Scene(bodies, ()), layout).at([])
+    starts = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.3, 0.0]])
+    ways_ahead = np.array([[1.0, 0.0, 0.0]] * 5)
+    hits = world.cast(starts, ways_ahead, 9.0, np.array([-1, layout["one"].index, layout["two"].index, -1, -1]))
+    assert hits.distances == pytest.approx([1.5, 4.5, 1.5, inf, 1.6])
+    assert hits.things.tolist() == [0, 1, 0, -1, 0]
 
 
 # --- where rays begin and end ----------------------------------------------------------------------------------------
