@@ -9,8 +9,9 @@ from math import ceil, hypot
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.world.clearance.hall_obstacles import Obstacle, obstacles_of
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.parameters.hall import hall_of
+from foosim.world.rays.outlines import Outline
 
 MARGIN_M: Final = 0.2
 """What stays free between a rover and everything along its way."""
@@ -60,7 +61,7 @@ def roadmap_of(deployment: Deployment, cell_m: float) -> Roadmap:
 
 
 @lru_cache(maxsize=4)
-def _roadmap(obstacles: tuple[Obstacle, ...], length: float, width: float, room: float, cell: float) -> Roadmap:
+def _roadmap(obstacles: tuple[Outline, ...], length: float, width: float, room: float, cell: float) -> Roadmap:
     def is_free(x: float, y: float) -> bool:
         return all(obstacle.is_clear(x, y, room) for obstacle in obstacles)
 

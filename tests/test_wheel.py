@@ -116,7 +116,7 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", RUNS)
 def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: Path, name: str) -> None:
     """Equal frames, fates and rows, to the last bit."""
-    assert list(installed.packages.glob("foosim/vhub/line_of_sight/rays.*.so"))
+    assert list(installed.packages.glob("foosim/world/rays/spans.*.so"))
     file, *options = RUNS[name]
     for commands in (installed.commands, INTERPRETED):
         capture = tmp_path / f"{commands.parent.name}.mcap"

@@ -166,6 +166,8 @@ class Layout:
         """Free rigid bodies, in name order."""
         self.couples = any(entity.is_rigid and entity.kind.couples for entity in entities)
         """Whether it has rigid bodies whose islands need a solve of their own."""
+        self.shared: dict[int, tuple[WorldSpec, object]] = {}
+        """What the forms of this layout share, by the identity of the world, which is kept with it."""
         self._digest = b""
 
     def of(self, model: str) -> tuple[Entity, ...]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from foosim.deployment.schema import Deployment
-from foosim.world.assembly.sections import kits_of
 from foosim.world.assembly.world import models_of
+from foosim.world.fixed_scenery import kits_of
 from foosim.world.frame import Frame
 
 

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
+from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.check.differences import Frames
@@ -306,17 +307,26 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
     mast = (
         "class Mast(Own):",
         "    def __init__(self, settings, at): self.at = at",
-        "    def body(self): return None",
-        "    def place(self, view): view.write(self.at.slot('position'), 6.0, 0.0, 0.0)",
+        "    def body(self):",
+        "        pole = Shape(Cylinder(0.1, 1.0), '', (0.5, 0.5, 0.5, 1.0), (0.0, 0.0, 0.5))",
+        "        return Body('mast', 'mast', ORIGIN, (Link('mast', 'free', (pole,), 0.0, ORIGIN),))",
+        "    def place(self, view):",
+        "        view.write(self.at.slot('position'), 6.0, 0.0, 0.0)",
+        "        view.write(self.at.slot('orientation'), 0.0, 0.0, 0.0, 1.0)",
         "    def is_plausible(self, numbers, before): return True",
-        "model('mast', RobotSettings, slots={'position': 3, 'heading': 1}, has_body=False)(Mast)",
+        "model('mast', RobotSettings, slots={'position': 3, 'orientation': 4})(Mast)",
+        "class Ghost(Mast):",
+        "    def body(self): return None",
+        "model('ghost', RobotSettings, slots={'position': 3, 'orientation': 4})(Ghost)",
     )
-    written(site, *mast)
+    written(site, "from foosim.world.scene import ORIGIN, Body, Cylinder, Link, Shape", *mast)
     rays = "{kind: proximity, rate: 50 Hz, rays: 4, range: 3 m}"
     robot = f"robots.mast={{model: 'own_form:Mast', sensors: {{rays: {rays}}}}}"
     text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
     done = rehearse(text, "x.yaml", 20, 1)
     assert not done.json["failed"], done.json["reason"]
+    with pytest.raises(DeploymentError, match=r"robots.mast: .*it sends rays from a robot without a body, 'mast'"):
+        load_deployment(text.replace("own_form:Mast", "own_form:Ghost"), "x.yaml")
 
 
 # --- sensors that speak ----------------------------------------------------------------------------------------------

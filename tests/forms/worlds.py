@@ -158,7 +158,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "odometry"): sensor(HALL, ROVERS, "odometry"),
     ("sensor", "pose"): sensor(HALL, ROVERS, "pose"),
     ("sensor", "pose_3d"): sensor(HALL, ROVERS, "pose_3d", at={"x": "10 cm", "yaw": "30 deg"}),
+    ("sensor", "laser_scanner"): sensor(
+        HALL, ROVERS, "laser_scanner", rays=31, range="5 m", at={"x": "10 cm", "z": "20 cm"}
+    ),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
+    ("sensor", "range"): sensor(HALL, ROVERS, "range", range="3 m", cone="30 deg", at={"z": "20 cm"}),
     ("actuator", "rod_position"): TABLE,
     ("actuator", "wheel_speeds"): HALL,
     ("modifier", "bias_walk"): modifier("bias_walk", {"walk": {"position": "1 mm"}}, {"initial": "10 mm/s"}),

@@ -34,6 +34,8 @@ MODIFIERS: Final[dict[str, Any]] = {
     "proximity": [{"kind": "clip", "low": "10 cm", "high": "2 m"}],
     "pose_3d": [{"kind": "frame_change", "x": "1 m", "yaw": "10 deg"}],
     "gps": [{"kind": "gaussian_noise", "std": {"horizontal": 1e-5}}],
+    "laser_scanner": [],
+    "range": [],
 }
 OF_ROD: Final[dict[str, Any]] = {
     "imu": {"kind": "imu", "rate": "333 Hz", "at": {"link": "spin", "x": "5 cm"}},
@@ -57,6 +59,8 @@ def mixed() -> str:
     hall = yaml.safe_load((DEPLOY / "warehouse.yaml").read_text())["hall"]
     sensors = {name: {"kind": name, "rate": "50 Hz", "modifiers": modifiers} for name, modifiers in MODIFIERS.items()}
     sensors["proximity"] |= {"rays": 8, "range": "4 m"}
+    sensors["laser_scanner"] |= {"rays": 19, "range": "4 m", "at": {"z": "80 cm"}}
+    sensors["range"] |= {"range": "4 m", "cone": "20 deg", "at": {"z": "80 cm"}}
     data["hall"] = hall
     data["origin"] = {"latitude": "52.5 deg", "longitude": "13.4 deg"}
     for rod in ("red.goal", "blue.goal"):

@@ -10,9 +10,9 @@ import pytest
 
 from foosim.vhub.line_of_sight import occlusion
 from foosim.vhub.line_of_sight.occlusion import Geometry
-from foosim.vhub.line_of_sight.rays import box_span
-from foosim.vhub.line_of_sight.solids import TOUCH_M
 from foosim.world.layout import Declared, Layout
+from foosim.world.rays.solids import TOUCH_M
+from foosim.world.rays.spans import box_span
 from foosim.world.scene import Box, Scene, Shape, Vector
 
 GREY: Final = (0.5, 0.5, 0.5, 1.0)

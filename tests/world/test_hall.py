@@ -15,11 +15,12 @@ from foosim.deployment.processes import processes_of
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
-from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacle, obstacles_of
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
+from foosim.world.rays.outlines import Circle, Rectangle, outline
 from foosim.world.scene import Cylinder, Shape
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
@@ -47,7 +48,8 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
         ("robots.rover01.sensors.pose.kind=pos",
          "robots.rover01.sensors.pose.kind: unknown sensor (there are: ball, battery, contact, encoder, gps, imu, "
-         "joint_state, odometry, pose, pose_3d, proximity, or any module:Class), 'pos', nearest is 'pose'"),
+         "joint_state, laser_scanner, odometry, pose, pose_3d, proximity, range, or any module:Class), 'pos', "
+         "nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
         ("robots.rover01.actuators={drive: {kind: rod_position}}",
@@ -173,9 +175,9 @@ def test_obstacles_are_the_scenery_from_above() -> None:
     assert Rectangle(-12.5, 8.75, 1.0, 0.0, 4.25, 0.5) in found and Circle(-17.5, 0.0, 0.2) in found
     assert Circle(-15.0, 0.0, 0.2) in found, "a pillar"
     upright = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 1.5))
-    assert obstacle(upright) == Circle(1.0, 2.0, 0.4)
+    assert outline(upright) == Circle(1.0, 2.0, 0.4)
     lying = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 0.4), (0.5**0.5, 0.0, 0.0, 0.5**0.5))
-    around = obstacle(lying)
+    around = outline(lying)
     assert isinstance(around, Rectangle)
     assert (around.half_along, around.half_across) == pytest.approx((0.4, 1.5))
 

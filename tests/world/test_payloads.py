@@ -28,10 +28,12 @@ from foosim.world.sensors.encoder import RodPosition
 from foosim.world.sensors.gps import GlobalPosition
 from foosim.world.sensors.imu import Inertial
 from foosim.world.sensors.joint_state import JointState
+from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.sensors.odometry import WheelTravel
 from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
+from foosim.world.sensors.range import Distance
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
@@ -43,6 +45,8 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "pose": (Pose(1 / 3, -7.5, 3.1), [1 / 3, -7.5, 3.1], ["m", "m", "rad"]),
     "odometry": (WheelTravel(12.5, -0.25), [12.5, -0.25], ["m", "m"]),
     "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
+    "laser_scanner": (Scan((0.5, 30.0)), [0.5, 30.0], ["m"]),
+    "range": (Distance(1.25), [1.25], ["m"]),
     "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
     "contact": (Touches(2.0, 0.125, -1.0), [2.0, 0.125, -1.0], ["", "N s", ""]),
@@ -55,9 +59,9 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 }  # fmt: skip
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
-SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56}
+SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
 """In bytes, of the kinds that have as many numbers always."""
-SEVERAL = {"proximity", "joint_state"}
+SEVERAL = {"joint_state", "laser_scanner", "proximity"}
 
 
 def codec(kind: str) -> PayloadCodec:

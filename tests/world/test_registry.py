@@ -242,15 +242,7 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     assert names("sensor") == SENSORS
-    assert names("actuator") == [
-        "force",
-        "joint_position",
-        "joint_torque",
-        "joint_velocity",
-        "rod_position",
-        "rotor_speeds",
-        "wheel_speeds",
-    ]
+    assert names("actuator") == ACTUATORS
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]

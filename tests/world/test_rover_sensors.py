@@ -19,8 +19,9 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, actuators_of, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
-from foosim.world.layout import Layout, build_layout
+from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.robot_packets import Delivered
+from foosim.world.scene import turn
 
 PLACED: Final = (
     "robots.rover01.x=2 m",
@@ -30,6 +31,12 @@ PLACED: Final = (
     "scenery={}",
 )
 SENSORS: Final = "robots.rover01.sensors."
+
+
+def turn_to(numbers: list[float], rover: Entity, heading: float) -> None:
+    """Turn a rover as its motion does: its heading and its orientation."""
+    numbers[rover.offsets["heading"]], at = heading, rover.offsets["orientation"]
+    numbers[at : at + 4] = turn((0.0, 0.0, 1.0), heading)
 
 
 class Fitted:
@@ -55,7 +62,7 @@ class Fitted:
         return struct.unpack(f"<{len(raw) // 8}d", raw)
 
     def turn(self, heading: float) -> None:
-        self.numbers[self.rover.offsets["heading"]] = heading
+        turn_to(self.numbers, self.rover, heading)
 
 
 def test_without_noise_pose_odometry_and_battery_are_the_frame(fleet_text: Callable[..., str]) -> None:
@@ -136,7 +143,7 @@ def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callabl
         for rover, (x, y, heading) in zip(fitted.layout.of("rover"), places, strict=True):
             at = rover.offsets["position"]
             fitted.numbers[at : at + 2] = x, y
-            fitted.numbers[rover.offsets["heading"]] = heading
+            turn_to(fitted.numbers, rover, heading)
         alone, view = [fitted.payload(one, tick) for one in sensors], SensingView(tick, fitted.numbers)
         assert sensing.sample(sensors, view) == alone
         assert sensing.sample(sensors[::-1][:7], view) == alone[::-1][:7]

@@ -10,6 +10,7 @@ import pytest
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly import sections
 from foosim.world.assembly.sections import findings_of, gravity_of, physics_of
+from foosim.world.fixed_scenery import kits_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -26,7 +27,7 @@ def test_gravity_is_that_of_the_kit_that_says_it_else_standard_gravity() -> None
 
 
 def test_two_that_say_it_and_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    ((_, kit),) = sections.kits_of(DEPLOYMENT)
+    ((_, kit),) = kits_of(DEPLOYMENT)
     given: list[tuple[str, Any]] = [("table", kit), ("zoo", kit)]
     monkeypatch.setattr(sections, "kits_of", lambda spec: given)
     (twice,) = findings_of(DEPLOYMENT)

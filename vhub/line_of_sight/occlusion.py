@@ -14,38 +14,21 @@ from math import inf, sqrt
 from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.deployment.schema import Deployment
-from foosim.vhub.line_of_sight.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
-from foosim.vhub.line_of_sight.solids import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    MESH,
-    SPHERE,
-    Line,
-    Piece,
-    Solid,
-    chord_of,
-    joined,
-    ray_of,
-)
+from foosim.vhub.line_of_sight.pillars import Pillar, pillars_met_by
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Declared, Layout
 from foosim.world.materials import RadioMaterial
-from foosim.world.mesh import Mesh
+from foosim.world.rays.boxes import MARGIN_M, boxes_around, boxes_met_by
+from foosim.world.rays.solids import Line, Meshes, Piece, Solid, chord_of, joined, ray_of, solid_of
 from foosim.world.scene import (
     ORIGIN,
     Body,
-    Box,
-    Capsule,
-    Cylinder,
-    Hull,
     Link,
     Quaternion,
     Scene,
     Shape,
-    Sphere,
     Vector,
     enclosing,
     rotate,
@@ -86,27 +69,11 @@ class _Groups:
     def __init__(self) -> None:
         self._known: dict[tuple[str, RadioMaterial], int] = {}
         self._named: list[tuple[str, RadioMaterial]] = []
-        self._meshes: dict[bytes, Triangles] = {}
+        self._meshes = Meshes()
 
     def solids(self, shapes: Iterable[Shape], body: str | None = None) -> list[Solid]:
         """Return shapes of a body, or of the scenery, as solids."""
-        return [self._solid(shape, self._number(shape, body)) for shape in shapes]
-
-    def _solid(self, shape: Shape, group: int) -> Solid:
-        geometry, position, orientation = shape.geometry, shape.position, shape.orientation
-        if isinstance(geometry, Box):
-            return Solid(BOX, geometry.half, None, group, position, orientation)
-        if isinstance(geometry, Cylinder):
-            half = geometry.radius, geometry.radius, geometry.length / 2
-            return Solid(CYLINDER, half, None, group, position, orientation)
-        if isinstance(geometry, Sphere):
-            half = geometry.radius, geometry.radius, geometry.radius
-            return Solid(SPHERE, half, None, group, position, orientation)
-        if isinstance(geometry, Capsule):
-            half = geometry.radius, geometry.radius, geometry.length / 2
-            return Solid(CAPSULE, half, None, group, position, orientation)
-        mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
-        return Solid(MESH, ORIGIN, self._prepared(mesh), group, position, orientation)
+        return [solid_of(shape, self._number(shape, body), self._meshes) for shape in shapes]
 
     def _number(self, shape: Shape, body: str | None) -> int:
         key = shape.name if body is None else body, shape.radio
@@ -114,12 +81,6 @@ class _Groups:
         if number == len(self._named):
             self._named.append(key)
         return number
-
-    def _prepared(self, mesh: Mesh) -> Triangles:
-        """Return the triangles of a mesh, those of equal ones once."""
-        if mesh.digest not in self._meshes:
-            self._meshes[mesh.digest] = Triangles(mesh)
-        return self._meshes[mesh.digest]
 
     def crossings(self, line: Line, solids: list[Solid]) -> list[Crossing]:
         """Return what a line crosses of some solids, in their order."""

@@ -1,4 +1,4 @@
-"""What the kits and the scene of a deployment bring: scenery, and what rigid bodies feel."""
+"""What the kits and the scene of a deployment bring for rigid bodies: what they feel, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -8,28 +8,14 @@ from typing import Final
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
+from foosim.world.fixed_scenery import kits_of
 from foosim.world.forms import registry
 from foosim.world.physics import Physics, physics_from
-from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
 STANDARD_GRAVITY: Final = 9.80665
 FELT_BY_NOBODY: Final = ""
 """The surface of scenery that no rigid body feels."""
-
-
-def kits_of(spec: WorldSpec) -> Iterator[tuple[str, object]]:
-    """Yield the kits of a world, made from their sections, by name in name order."""
-    for name, section in sorted(spec.kits.items()):
-        yield name, registry.find("kit", name).made(section, spec)
-
-
-def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
-    """Return the scenery of kits and scene, which never moves."""
-    shapes = [shape for _, kit in kits_of(spec) for shape in kit.shapes()]  # type: ignore[attr-defined]
-    if spec.scene is not None:
-        shapes += registry.find("scene", spec.scene.kind).made(spec.scene)
-    return tuple(shapes)
 
 
 def physics_of(spec: WorldSpec) -> Physics:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from foosim.common.keyed_random import draw_key
-from foosim.world.assembly.sections import fixed_shapes, kits_of
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import (
     EntityRule,
@@ -22,6 +21,7 @@ from foosim.world.components.entities import (
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import ComponentError, Mounting, SolvingView, View, WritableView
+from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import NO_ENTITY

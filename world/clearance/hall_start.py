@@ -10,10 +10,11 @@ from math import floor
 from operator import itemgetter
 
 from foosim.common.finding import Finding
-from foosim.world.clearance.hall_obstacles import Circle, Obstacle, named_obstacles
+from foosim.world.clearance.hall_obstacles import named_obstacles
 from foosim.world.models.rover import RoverRobot
 from foosim.world.models.station import StationRobot
 from foosim.world.parameters.hall import hall_of
+from foosim.world.rays.outlines import Circle, Outline
 from foosim.world.spec import WorldSpec
 
 
@@ -45,7 +46,7 @@ class _Rovers:
         self._squares: dict[tuple[int, int], list[tuple[int, str, Circle]]] = {}
         self._count = 0
 
-    def near(self, x: float, y: float) -> list[tuple[str, Obstacle]]:
+    def near(self, x: float, y: float) -> list[tuple[str, Outline]]:
         """Return those that a rover at a place may be in, in the order in which they were added."""
         east, north = self._square(x, y)
         around = ((east + i, north + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
@@ -68,7 +69,7 @@ def _misplaced(
     name: str,
     subject: str,
     circle: tuple[float, float, float],
-    taken: Sequence[tuple[str, Obstacle]],
+    taken: Sequence[tuple[str, Outline]],
 ) -> Iterator[Finding]:
     """Yield what is wrong with the place of a robot, as a circle (m): the first thing that it is in."""
     x, y, _ = circle

@@ -1,4 +1,4 @@
-"""What forms see of the entities around them: poses of links, who is near, tags, contacts of the last tick.
+"""What forms see of the entities around them: poses of links, who is near, rays, tags, contacts.
 
 All of it follows from the frame; entities are in name order.
 """
@@ -8,10 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.view import View
+from foosim.world.components.view import SensingView, View
+from foosim.world.fixed_scenery import fixed_shapes
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity, Layout
-from foosim.world.scene import Body, Pose, Vector
+from foosim.world.rays.boxes import Floats
+from foosim.world.rays.caster import Caster, Placement
+from foosim.world.rays.casting import Hits
+from foosim.world.scene import Body, Pose, Scene, Vector
 from foosim.world.spec import WorldSpec
 
 
@@ -62,6 +66,34 @@ class Surroundings:
                 if dx * dx + dy * dy + dz * dz <= range_m * range_m:
                     found.append(entity)
         return found
+
+    def rays(
+        self, view: View, origins: Floats, directions: Floats, range_m: Floats | float, ignoring: Entity | None = None
+    ) -> Hits:
+        """Return what rays meet first (`Placement.cast`) of the scenery and of bodies, the entity `ignoring` aside."""
+        return self.placement(view).cast(origins, directions, range_m, None if ignoring is None else ignoring.index)
+
+    def clearance(self, view: View, points: Floats, reach_m: Floats | float, ignoring: Entity | None = None) -> Floats:
+        """Return how far points are from the nearest surface (`Placement.clearance`), the entity `ignoring` aside."""
+        return self.placement(view).clearance(points, reach_m, None if ignoring is None else ignoring.index)
+
+    def placement(self, view: View) -> Placement:
+        """Return the ray caster with all things where they are at the start of the tick."""
+        return self.caster.at(view.start, view.values if isinstance(view, SensingView) else None)
+
+    @property
+    def caster(self) -> Caster:
+        """The ray caster of the layout, which all forms of it share."""
+        _, found = self._layout.shared.get(id(self._spec), (None, None))
+        if found is None:
+            found = self._made_caster()
+            self._layout.shared[id(self._spec)] = self._spec, found
+        assert isinstance(found, Caster)
+        return found
+
+    def _made_caster(self) -> Caster:
+        bodies = {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
+        return Caster(Scene(bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes())), self._layout)
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:

@@ -18,12 +18,13 @@ from math import cos, floor, pi, sin, sqrt
 from typing import Final
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
-from foosim.world.clearance.hall_obstacles import Obstacle, obstacles_of
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Slot, SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.parameters.hall import hall_of
+from foosim.world.rays.outlines import Outline
 from foosim.world.spec import WorldSpec
 
 HALVINGS: Final = 7
@@ -70,7 +71,7 @@ class TwoWheels:
         self._near_m = 2.0 * (hall.rover.radius + GAP_M + hall.rover.drive.speed * spec.tick_ns / 1e9)
         """Rovers that are farther apart cannot meet within the tick."""
         self._slips = {entity.index: wheel_slips(spec, entity.name) for entity in at.entities}
-        self._squares: dict[tuple[int, int], tuple[Obstacle, ...]] = {}
+        self._squares: dict[tuple[int, int], tuple[Outline, ...]] = {}
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these rovers by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
@@ -150,7 +151,7 @@ class TwoWheels:
         radius = self._radius
         return all(obstacle.is_clear(x, y, radius) for obstacle in self._around(x, y))
 
-    def _around(self, x: float, y: float) -> tuple[Obstacle, ...]:
+    def _around(self, x: float, y: float) -> tuple[Outline, ...]:
         """Return the obstacles that a rover in this square metre can touch: few of all, found once for each square."""
         square = floor(x), floor(y)
         found = self._squares.get(square)

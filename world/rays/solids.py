@@ -6,8 +6,23 @@ from collections.abc import Iterable
 from math import sqrt
 from typing import Final
 
-from foosim.vhub.line_of_sight.rays import Span, Triangles, box_span, capsule_span, cylinder_span, sphere_span
-from foosim.world.scene import Quaternion, Vector, multiply, rotate
+from foosim.world.mesh import Mesh
+from foosim.world.rays.spans import Span, box_span, capsule_span, cylinder_span, sphere_span
+from foosim.world.rays.triangles import Triangles
+from foosim.world.scene import (
+    ORIGIN,
+    Box,
+    Capsule,
+    Cylinder,
+    Geometry,
+    Hull,
+    Quaternion,
+    Shape,
+    Sphere,
+    Vector,
+    multiply,
+    rotate,
+)
 
 TOUCH_M: Final = 1e-9
 """A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
@@ -34,6 +49,38 @@ def ray_of(line: Line) -> Ray:
     if length > 0.0:
         return (ax, ay, az), (x / length, y / length, z / length), length
     return (ax, ay, az), (0.0, 0.0, 0.0), length
+
+
+def form_of(geometry: Geometry) -> tuple[int, Vector]:
+    """Return the form of a geometry, and half of the box around it about its own axes; of a mesh the latter is 0.
+
+    Of a capsule it is that of its cylinder, without the half spheres.
+    """
+    if isinstance(geometry, Box):
+        return BOX, geometry.half
+    if isinstance(geometry, Cylinder):
+        return CYLINDER, (geometry.radius, geometry.radius, geometry.length / 2)
+    if isinstance(geometry, Sphere):
+        return SPHERE, (geometry.radius, geometry.radius, geometry.radius)
+    if isinstance(geometry, Capsule):
+        return CAPSULE, (geometry.radius, geometry.radius, geometry.length / 2)
+    return MESH, ORIGIN
+
+
+class Meshes:
+    """Meshes as rays meet them, those of equal ones once."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, Triangles] = {}
+
+    def triangles_of(self, geometry: Geometry) -> Triangles | None:
+        """Return the triangles of a mesh or of a convex hull, None of what has none."""
+        mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
+        if not isinstance(mesh, Mesh):
+            return None
+        if mesh.digest not in self._known:
+            self._known[mesh.digest] = Triangles(mesh)
+        return self._known[mesh.digest]
 
 
 class Solid:
@@ -85,6 +132,12 @@ class Solid:
             return []
         inside = _within(span, length)
         return [] if inside is None else [[inside]]
+
+
+def solid_of(shape: Shape, group: int, meshes: Meshes) -> Solid:
+    """Return a shape as rays meet it."""
+    form, half = form_of(shape.geometry)
+    return Solid(form, half, meshes.triangles_of(shape.geometry), group, shape.position, shape.orientation)
 
 
 def _through_mesh(triangles: Triangles, start: Vector, way: Vector, length: float) -> list[Piece]:

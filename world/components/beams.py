@@ -1,0 +1,104 @@
+"""Beams of sensors: rays fixed to a mount on a robot, which pass its own body; those of many are cast at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from typing import TypeAlias
+
+import numpy as np
+
+from foosim.common.errors import BadValue
+from foosim.world.components.entities import mounting_of
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.surroundings import Surroundings
+from foosim.world.components.view import Mounting, View
+from foosim.world.placing import FIRST_LINK, MountedAt
+from foosim.world.rays.boxes import Floats
+from foosim.world.rays.caster import Placement
+from foosim.world.rays.shapes import rotated
+from foosim.world.rays.solids import Meshes, solid_of
+from foosim.world.scene import Body, Link, Vector, shape_box
+
+Directions: TypeAlias = Sequence[Vector]
+
+
+class Beams:
+    """The beams of one sensor. What it keeps follows from deployment and layout."""
+
+    def __init__(self, at: Mounting, where: MountedAt, directions: Directions, range_m: float) -> None:
+        """`directions` are unit vectors in the mount's frame. Raises BadValue without a body, or without the link."""
+        body_of(at)
+        self.around, self.entity, self.mount = Surroundings(at.spec, at.layout), at.robot, Mounted(at, where)
+        self.directions, self.range_m = tuple(directions), range_m
+
+
+class BeamsTogether:
+    """The beams of several sensors, which all have as many."""
+
+    def __init__(self, several: Sequence[Beams]) -> None:
+        self._several = tuple(several)
+        self.count = len(several[0].directions)
+        self._directions = np.array([one.directions for one in several]).transpose(2, 0, 1)
+        self._ranges = np.repeat(np.array([one.range_m for one in several]), self.count)
+        self._passed = np.repeat(np.array([one.entity.index for one in several], np.int64), self.count)
+
+    def distances(self, view: View) -> Floats:
+        """Return how far it is from each mount to what its beams meet at the start of a tick (m): (sensors, beams).
+
+        It is inf where that is nothing within a sensor's range.
+        """
+        origins, ways = self.lines(view.start)
+        return self._cast(self._several[0].around.placement(view), origins, ways)
+
+    def ends(self, numbers: Sequence[float], nearest: Floats, farthest: Floats) -> Floats:
+        """Return both ends (m) of each beam in a frame, to be drawn, of shape (beams of all, 6).
+
+        They are where it is `nearest` from the mount, and where it meets something or is `farthest`: (sensors, beams).
+        """
+        origins, ways = self.lines(numbers)
+        placement = self._several[0].around.caster.at(numbers)
+        ranges = np.clip(self._cast(placement, origins, ways), nearest, farthest)
+        first, last = (origins[:, :, None] + ways * way for way in (nearest, ranges))
+        return np.concatenate((first, last)).reshape(6, -1).T
+
+    def lines(self, numbers: Sequence[float]) -> tuple[Floats, Floats]:
+        """Return where mounts are (3, sensors) and the ways of beams (3, sensors, beams), in the world frame."""
+        poses = [one.mount.pose(numbers) for one in self._several]
+        turns = np.array([orientation for _, orientation in poses]).T
+        return np.array([place for place, _ in poses]).T, rotated(turns[:, :, None], self._directions)
+
+    def _cast(self, placement: Placement, origins: Floats, ways: Floats) -> Floats:
+        starts = np.repeat(origins.T, self.count, axis=0)
+        hits = placement.cast(starts, ways.reshape(3, -1).T, self._ranges, self._passed)
+        return hits.distances.reshape(-1, self.count)
+
+
+def body_of(at: Mounting) -> Body:
+    """Return the body of the robot that a component is on. Raises BadValue for one that has none."""
+    made = at.robot.kind.made(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
+    body: Body | None = made.body()
+    if body is None:
+        raise BadValue("it sends rays from a robot without a body", at.robot.name)
+    return body
+
+
+def hull_middle(link: Link) -> Vector:
+    """Return the middle of a link's hull, which is its first shape, in its frame. Raises BadValue where it has none."""
+    if not link.shapes:
+        raise BadValue("its rays begin at the hull of a link without shapes", link.name)
+    (lx, ly, lz), (hx, hy, hz) = shape_box(link.shapes[0])
+    return lx + (hx - lx) / 2, ly + (hy - ly) / 2, lz + (hz - lz) / 2
+
+
+def way_out(link: Link, start: Vector, direction: Vector) -> float:
+    """Return how far from its start a ray, in the link's frame, leaves the last of the link's shapes (m)."""
+    meshes = Meshes()
+    pieces = [piece for shape in link.shapes for piece in solid_of(shape, 0, meshes).pieces((start, direction, inf))]
+    return max([piece[-1][1] for piece in pieces], default=0.0)
+
+
+def mounted_at(place: Vector) -> MountedAt:
+    """Return a mount at a place of the first link, turned as that is."""
+    x, y, z = place
+    return FIRST_LINK.model_copy(update={"x": x, "y": y, "z": z})

@@ -1,0 +1,186 @@
+"""The ray caster of a scene: scenery and what else stands is prepared once, what moves is placed for each frame.
+
+Rays and distances are of the shapes of all bodies and of the scenery. A free body whose links do not move about one
+another is placed with all others like it at once; the links of any other by the one forward kinematics. A caster keeps
+what follows from scene and layout, and the places of the newest frame, found again by the bits of all that move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import Entity, Layout
+from foosim.world.rays.boxes import Floats
+from foosim.world.rays.casting import Bundles, Hits, cast
+from foosim.world.rays.clearing import clear_of
+from foosim.world.rays.shapes import NOTHING, Forms, Part, Placed, multiplied, rotated
+from foosim.world.rays.solids import Meshes
+from foosim.world.scene import ORIGIN, UPRIGHT, Body, Link, Pose, Scene, Vector, moved, multiply, rotate, shape_box
+
+Ignoring: TypeAlias = NDArray[np.int64] | int | None
+"""The index of the entity that is passed, one for all or one for each; -1 or None for none."""
+NOBODY: Final = -2
+"""The number of no thing, not even of that which is in place of none."""
+NO_BOXES: Final = (np.zeros((3, 0)), np.zeros((3, 0)))
+
+
+class Caster:
+    """Rays in the frames of one layout.
+
+    `things` are the names of what can be met: those of entities by their index in the layout, then the scenery's.
+    """
+
+    def __init__(self, scene: Scene, layout: Layout) -> None:
+        scenery = list(dict.fromkeys(shape.name for shape in scene.scenery))
+        self.things = (*layout.names, *scenery)
+        number = {name: len(layout.entities) + place for place, name in enumerate(scenery)}
+        standing: list[Part] = []
+        moving: list[Part] = []
+        self._free: list[tuple[Entity, Link]] = []
+        self._jointed: list[tuple[Entity, Body]] = []
+        meshes = Meshes()
+        bodies = [(layout[name], body) for name, body in sorted(scene.bodies.items())]
+        for entity, body in bodies:
+            if body.joints:
+                continue
+            poses = _poses_about_base(body, entity)
+            if body.is_free:
+                frame, parts = len(self._free), moving
+                self._free.append((entity, body.links[0]))
+            else:
+                frame, parts = 0, standing
+            parts += _parts(body, entity, [frame] * len(poses), poses)
+        frames = len(self._free)
+        for entity, body in bodies:
+            if body.joints:
+                self._jointed.append((entity, body))
+                numbers = list(range(frames, frames + len(body.links)))
+                moving += _parts(body, entity, numbers, [("", ORIGIN, UPRIGHT)] * len(numbers))
+                frames += len(body.links)
+        standing += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
+        self._moving = Forms(moving, meshes)
+        self._prepare_frames()
+        still = np.array([ORIGIN]).T, np.array([UPRIGHT]).T
+        boxes = np.array([_box_of(part) for part in standing]).reshape(-1, 2, 3).transpose(1, 2, 0)
+        self._standing = Placed(Forms(standing, meshes), *still, (boxes[0], boxes[1]))
+        self._key: bytes | None = None
+        self._placed = self._standing
+
+    def _prepare_frames(self) -> None:
+        """Note where a frame has the poses of what moves."""
+        at = [entity.offsets for entity, _ in self._free]
+        places = [offsets[name] for name in ("position", "orientation") for offsets in at]
+        counts = [3] * len(at) + [4] * len(at)
+        links = [link for _, link in self._free]
+        back = [(-link.principal[0], -link.principal[1], -link.principal[2], link.principal[3]) for link in links]
+        self._back = np.array(back).reshape(-1, 4).T
+        self._centres = np.array([link.centre_of_mass for link in links]).reshape(-1, 3).T
+        for entity, body in self._jointed:
+            its = [("joint_positions", len(body.joints))]
+            its += [("position", 3), ("orientation", 4)] if body.is_free else []
+            places += [entity.offsets[name] for name, _ in its]
+            counts += [count for _, count in its]
+        self._places = np.array(
+            [start + step for start, count in zip(places, counts, strict=True) for step in range(count)], np.intp
+        )
+
+    def at(self, numbers: Sequence[float], values: Floats | None = None) -> Placement:
+        """Return the caster in a frame of its layout, of these numbers; `values` are the same as an array."""
+        if len(self._places):
+            state = (np.array(numbers) if values is None else values)[self._places]
+            key = state.tobytes()
+            if key != self._key:
+                self._placed, self._key = self._place(state, numbers), key
+            return Placement(self._standing, self._placed)
+        return Placement(self._standing, None)
+
+    def _place(self, state: Floats, numbers: Sequence[float]) -> Placed:
+        free = len(self._free)
+        positions = state[: 3 * free].reshape(-1, 3).T
+        orientations = multiplied(state[3 * free : 7 * free].reshape(-1, 4).T, self._back)
+        positions = positions - rotated(orientations, self._centres)
+        poses = [pose for entity, body in self._jointed for pose in forward_kinematics(body, entity, numbers)]
+        if poses:
+            positions = np.concatenate((positions, np.array([position for _, position, _ in poses]).T), axis=1)
+            orientations = np.concatenate((orientations, np.array([turned for _, _, turned in poses]).T), axis=1)
+        return Placed(self._moving, positions, orientations, NO_BOXES)
+
+
+class Placement:
+    """All things where they are in one frame."""
+
+    def __init__(self, standing: Placed, moving: Placed | None) -> None:
+        self._standing, self._moving = standing, moving
+
+    def cast(self, origins: Floats, directions: Floats, ranges: Floats | float, ignoring: Ignoring = None) -> Hits:
+        """Return what rays meet first: distances (n,) and the numbers of things (n,), inf and -1 where that is nothing.
+
+        `origins` and unit `directions` (n, 3) are in the world frame (m), `ranges` (n,) are how far rays go (m); a ray
+        passes the entity `ignoring`. One that begins inside of something meets it at 0; one that touches something does
+        not meet it. Each has the same bits alone and in any company or order.
+        """
+        count = len(origins)
+        starts, ways = (
+            np.ascontiguousarray(np.asarray(rows, np.float64).reshape(-1, 3).T) for rows in (origins, directions)
+        )
+        far = np.ascontiguousarray(np.broadcast_to(np.asarray(ranges, np.float64), count))
+        bundles = Bundles(starts, ways, far, _passed(ignoring, count))
+        first = cast(self._standing, bundles)
+        if self._moving is None:
+            return first
+        other = cast(self._moving, bundles)
+        is_nearer = other.distances < first.distances
+        return Hits(
+            np.where(is_nearer, other.distances, first.distances), np.where(is_nearer, other.things, first.things)
+        )
+
+    def clearance(self, points: Floats, reach: Floats | float, ignoring: Ignoring = None) -> Floats:
+        """Return how far points (n, 3) are from the nearest surface (m): negative inside, inf beyond `reach`.
+
+        All is in the world frame; the entity `ignoring` does not count. A mesh that is not closed has no inside.
+        Each has the same bits alone and in any company or order.
+        """
+        count = len(points)
+        places = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3).T)
+        far = np.ascontiguousarray(np.broadcast_to(np.asarray(reach, np.float64), count))
+        passed = _passed(ignoring, count)
+        found = clear_of(self._standing, places, far, passed)
+        return found if self._moving is None else np.minimum(found, clear_of(self._moving, places, far, passed))
+
+
+def _passed(ignoring: Ignoring, count: int) -> NDArray[np.int64]:
+    """Return the number of the thing that is passed, of each: one that no thing has, where that is none."""
+    given = np.broadcast_to(np.asarray(NOTHING if ignoring is None else ignoring, np.int64), count)
+    return np.where(given < 0, NOBODY, given)
+
+
+def _poses_about_base(body: Body, entity: Entity) -> list[Pose]:
+    """Return where the links of a body without moving joints are: in the world, or of a free one about its first."""
+    if body.is_free:
+        first = replace(body.links[0], joint="fixed", position=ORIGIN, orientation=UPRIGHT)
+        body = replace(body, position=ORIGIN, orientation=UPRIGHT, links=(first, *body.links[1:]))
+    return forward_kinematics(body, entity, ())
+
+
+def _box_of(part: Part) -> tuple[Vector, Vector]:
+    """Return the least and the greatest coordinates of a shape that stands."""
+    shape, _, _, position, orientation = part
+    turned = multiply(orientation, shape.orientation)
+    return shape_box(
+        replace(shape, position=moved(position, rotate(orientation, shape.position), 1.0), orientation=turned)
+    )
+
+
+def _parts(body: Body, entity: Entity, frames: Sequence[int], poses: Sequence[Pose]) -> list[Part]:
+    """Return the shapes of a body's links, which are fixed to these frames at these poses."""
+    return [
+        (shape, entity.index, frame, position, orientation)
+        for link, frame, (_, position, orientation) in zip(body.links, frames, poses, strict=True)
+        for shape in link.shapes
+    ]

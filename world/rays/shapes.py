@@ -1,0 +1,133 @@
+"""Shapes of a world as arrays, for many rays at once: what they are, where they are, and what is around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.world.mesh import Mesh
+from foosim.world.rays.boxes import MARGIN_M, Floats
+from foosim.world.rays.solids import CAPSULE, CYLINDER, SPHERE, Meshes, form_of
+from foosim.world.rays.sorted_boxes import SortedBoxes
+from foosim.world.rays.triangles import Triangles
+from foosim.world.scene import ORIGIN, Hull, Quaternion, Shape, Vector, moved, multiply, rotate
+
+NOTHING: Final = -1
+"""In place of the number of a thing."""
+
+Part = tuple[Shape, int, int, Vector, Quaternion]
+"""A shape, the number of the thing that it is of, that of the frame that it is fixed to, and the pose of its link in
+that frame."""
+
+
+class Forms:
+    """What m shapes are, and how they are fixed to frames. Of shapes at equal distances the first is met."""
+
+    def __init__(self, parts: Sequence[Part], meshes: Meshes) -> None:
+        count = len(parts)
+        self.forms = np.zeros(count, np.int64)
+        self.half = np.zeros((3, count))
+        self.things = np.array([thing for _, thing, _, _, _ in parts], np.int64)
+        self.frames = np.array([frame for _, _, frame, _, _ in parts], np.int64)
+        self.positions = np.zeros((3, count))
+        self.orientations = np.zeros((4, count))
+        self.middles = np.zeros((3, count))
+        """Of the sphere around each, in its own frame, whose radius is in `radii`."""
+        self.radii = np.zeros(count)
+        self.meshes: list[tuple[Triangles, NDArray[np.bool_]]] = []
+        """Each mesh, and which shapes have it."""
+        having: dict[int, tuple[Triangles, NDArray[np.bool_]]] = {}
+        for number, (shape, _, _, position, orientation) in enumerate(parts):
+            form, half = form_of(shape.geometry)
+            self.forms[number], self.half[:, number] = form, half
+            self.positions[:, number] = moved(position, rotate(orientation, shape.position), 1.0)
+            self.orientations[:, number] = multiply(orientation, shape.orientation)
+            self.middles[:, number], self.radii[number] = _ball_around(shape, form, half)
+            triangles = meshes.triangles_of(shape.geometry)
+            if triangles is not None:
+                mesh = having.setdefault(id(triangles), (triangles, np.zeros(count, np.bool_)))
+                mesh[1][number] = True
+        self.meshes = list(having.values())
+        self.present = frozenset(self.forms.tolist())
+
+
+def _ball_around(shape: Shape, form: int, half: Vector) -> tuple[Vector, float]:
+    """Return the middle, in the shape's frame, and the radius of a sphere around it."""
+    middle, (x, y, z) = ORIGIN, half
+    if form == SPHERE:
+        return middle, x
+    if form == CAPSULE:
+        return middle, x + z
+    if form == CYLINDER:
+        return middle, sqrt(x * x + z * z)
+    geometry = shape.geometry.mesh if isinstance(shape.geometry, Hull) else shape.geometry
+    if isinstance(geometry, Mesh):
+        low, high = geometry.box
+        x, y, z = (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2
+        middle = moved(low, (x, y, z), 1.0)
+    return middle, sqrt(x * x + y * y + z * z)
+
+
+class Placed:
+    """Shapes where they are in the world. What is behind the last of them is none: it is nowhere near anything."""
+
+    def __init__(self, forms: Forms, positions: Floats, orientations: Floats, boxes: tuple[Floats, Floats]) -> None:
+        """`positions` (3, k) and `orientations` (4, k) are those of frames, by number.
+
+        `boxes` are around shapes; where there are none they are made from the spheres around them.
+        """
+        self.forms = forms
+        position, orientation = positions[:, forms.frames], orientations[:, forms.frames]
+        self.positions = position + rotated(orientation, forms.positions)
+        turns = multiplied(orientation, forms.orientations)
+        self.back = _rows(turns)
+        """Turns vectors of the world into those of the shape's frame: three rows, one after the other (9, m)."""
+        middles = self.positions + rotated(turns, forms.middles)
+        low, high = boxes if boxes[0].shape[1] else (middles - forms.radii, middles + forms.radii)
+        self.near = SortedBoxes(low - MARGIN_M, high + MARGIN_M)
+        self.middles = np.concatenate((middles, np.full((3, 1), np.nan)), axis=1)
+        self.radii = np.append(forms.radii + MARGIN_M, 0.0)
+        self.things = np.append(forms.things, NOTHING)
+
+    def local(self, chosen: NDArray[np.intp], vectors: Floats) -> Floats:
+        """Return vectors of the world (3, n) in the frames of the chosen shapes."""
+        rows, (x, y, z) = self.back[:, chosen], vectors
+        return np.stack([rows[one] * x + rows[one + 1] * y + rows[one + 2] * z for one in (0, 3, 6)])
+
+
+def rotated(orientations: Floats, vectors: Floats) -> Floats:
+    """Return `scene.rotate` of many: quaternions (4, n), vectors (3, n)."""
+    (qx, qy, qz, qw), (x, y, z) = orientations, vectors
+    tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
+    return np.stack(
+        (x + qw * tx + (qy * tz - qz * ty), y + qw * ty + (qz * tx - qx * tz), z + qw * tz + (qx * ty - qy * tx))
+    )
+
+
+def multiplied(ones: Floats, others: Floats) -> Floats:
+    """Return `scene.multiply` of many: quaternions (4, n)."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = ones, others
+    return np.stack(
+        (
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        )
+    )
+
+
+def _rows(turns: Floats) -> Floats:
+    """Return the rows of the matrix that takes vectors of the world into frames that are turned so (4, n): (9, n)."""
+    x, y, z, w = turns
+    xx, yy, zz = 1.0 - 2.0 * (y * y + z * z), 1.0 - 2.0 * (x * x + z * z), 1.0 - 2.0 * (x * x + y * y)
+    xy, xz, yz = x * y, x * z, y * z
+    wx, wy, wz = w * x, w * y, w * z
+    first = (xx, 2.0 * (xy + wz), 2.0 * (xz - wy))
+    second = (2.0 * (xy - wz), yy, 2.0 * (yz + wx))
+    third = (2.0 * (xz + wy), 2.0 * (yz - wx), zz)
+    return np.stack((*first, *second, *third))

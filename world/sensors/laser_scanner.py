@@ -1,0 +1,100 @@
+"""A laser scanner: the distances to what stands in the way of beams that sweep a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import pi
+from typing import Annotated, Final
+
+import numpy as np
+from msgspec import Meta, Struct
+from pydantic import Field
+
+from foosim.common import units
+from foosim.common.exact_math import cos, sin
+from foosim.common.spec_base import default
+from foosim.common.units import Quantity
+from foosim.world.components.beams import Beams, BeamsTogether
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.placing import FIRST_LINK, MountedAt
+from foosim.world.rays.boxes import Floats
+from foosim.world.scene import Vector
+
+RAYS_MAX: Final = 1081
+"""Those of a scanner that sees 270 degrees in steps of a quarter of one."""
+FULL_TURN: Final = 2.0 * pi * (1.0 - 1e-9)
+Angle = Annotated[float, Quantity(units.ANGLE, "0 deg", "360 deg")]
+Least = Annotated[float, Quantity(units.LENGTH, "0 m", "100 m")]
+Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "1 km")]
+
+
+class LaserScannerSettings(SensorSettings):
+    """How far it is from `at` to what stands in the way of each of `rays` beams, from `least` to `range`.
+
+    They are in the plane of x and y of the mount, over `angle` in equal steps: the first is farthest to the right of x,
+    the last farthest to the left. Of a full turn the first is behind, and none is there twice; a single one is ahead.
+    """
+
+    rays: Annotated[int, Field(ge=1, le=RAYS_MAX)]
+    range: Range
+    angle: Angle = default("270 deg")
+    least: Least = default("0 m")
+    at: MountedAt = FIRST_LINK
+
+
+class Scan(Struct, frozen=True):
+    """A distance for each beam, from right to left; the sensor's range where nothing is met."""
+
+    distances: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
+
+
+@sensor("laser_scanner", LaserScannerSettings, Scan, several="rays")
+class LaserScanner:
+    """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
+
+    def __init__(self, settings: LaserScannerSettings, at: Mounting) -> None:
+        self.least_m, self.range_m = settings.least, settings.range
+        self.beams = Beams(at, settings.at, list(directions(settings.rays, settings.angle)), settings.range)
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest distance (m); a beam that meets nothing has the greatest."""
+        return {"distances": (min(self.least_m, self.range_m), self.range_m)}
+
+    def sample(self, view: View) -> Scan:
+        return Scan(tuple(LaserScanners([self]).sample(view)[0].tolist()))
+
+    @staticmethod
+    def together(sensors: Sequence[LaserScanner]) -> LaserScanners:
+        """Return these as one; all have as many beams."""
+        return LaserScanners(sensors)
+
+    @staticmethod
+    def rays(sensors: Sequence[LaserScanner], numbers: Sequence[float]) -> Floats:
+        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        far = np.array([[one.range_m] for one in sensors])
+        return BeamsTogether([one.beams for one in sensors]).ends(numbers, np.zeros_like(far), far)
+
+
+class LaserScanners:
+    """Several of them, with as many beams."""
+
+    def __init__(self, sensors: Sequence[LaserScanner]) -> None:
+        self._beams = BeamsTogether([one.beams for one in sensors])
+        self._least = np.array([[one.least_m] for one in sensors])
+        self._ranges = np.array([[one.range_m] for one in sensors])
+
+    def sample(self, view: View) -> Floats:
+        """Return the distances (m), of shape (sensors, beams)."""
+        found: Floats = np.minimum(np.maximum(self._beams.distances(view), self._least), self._ranges)
+        return found
+
+
+def directions(rays: int, angle: float) -> Iterator[Vector]:
+    """Yield unit vectors in the plane of x and y, over an angle (rad) about x, from right to left."""
+    step = angle / rays if angle >= FULL_TURN else angle / max(rays - 1, 1)
+    for ray in range(rays):
+        turned = ray * step - angle / 2.0 if rays > 1 else 0.0
+        yield cos(turned), sin(turned), 0.0

@@ -1,0 +1,108 @@
+"""A range finder, as of ultrasound or infrared: the distance to the nearest of what is in a cone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import pi
+from typing import Annotated, Final
+
+import numpy as np
+from msgspec import Struct
+
+from foosim.common import units
+from foosim.common.exact_math import cos, sin
+from foosim.common.spec_base import default
+from foosim.common.units import Quantity
+from foosim.world.components.beams import Beams, BeamsTogether
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.placing import FIRST_LINK, MountedAt
+from foosim.world.rays.boxes import Floats
+from foosim.world.scene import Vector
+
+CIRCLES: Final = ((0.5, 4), (1.0, 8))
+"""Shares of half of the cone's angle, and the beams at that angle from its axis."""
+Cone = Annotated[float, Quantity(units.ANGLE, "0 deg", "120 deg")]
+Least = Annotated[float, Quantity(units.LENGTH, "0 m", "100 m")]
+Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "1 km")]
+
+
+class RangeSettings(SensorSettings):
+    """How far it is from `at`, along the x axis of the mount, to what is there, from `least` to `range`.
+
+    With a `cone`, whose angle is that from side to side, it is the nearest that 13 beams meet: one along the axis, four
+    half-way to the cone's surface and eight on it. Without one it is a single beam.
+    """
+
+    range: Range
+    least: Least = default("0 m")
+    cone: Cone = default("0 deg")
+    at: MountedAt = FIRST_LINK
+
+
+class Distance(Struct, frozen=True):
+    """A distance; the sensor's range where nothing is met."""
+
+    distance: Metres
+
+
+@sensor("range", RangeSettings, Distance)
+class RangeFinder:
+    """The distance to the nearest that one beam, or a cone of 13, meets, the robot's own body aside."""
+
+    def __init__(self, settings: RangeSettings, at: Mounting) -> None:
+        self.least_m, self.range_m = settings.least, settings.range
+        self.beams = Beams(at, settings.at, list(directions(settings.cone)), settings.range)
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest distance (m); where nothing is met it is the greatest."""
+        return {"distance": (min(self.least_m, self.range_m), self.range_m)}
+
+    def sample(self, view: View) -> Distance:
+        return Distance(float(RangeFinders([self]).sample(view)[0, 0]))
+
+    @staticmethod
+    def together(sensors: Sequence[RangeFinder]) -> RangeFinders:
+        """Return these as one."""
+        return RangeFinders(sensors)
+
+    @staticmethod
+    def rays(sensors: Sequence[RangeFinder], numbers: Sequence[float]) -> Floats:
+        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        found = []
+        for one in sensors:  # some have a cone, others a beam
+            far = np.array([[one.range_m]])
+            found.append(BeamsTogether([one.beams]).ends(numbers, np.zeros_like(far), far))
+        return np.concatenate(found)
+
+
+class RangeFinders:
+    """Several of them: those with a cone are computed together, and those with a single beam."""
+
+    def __init__(self, sensors: Sequence[RangeFinder]) -> None:
+        self._sensors = tuple(sensors)
+        counts = [len(one.beams.directions) for one in sensors]
+        places = [[place for place, its in enumerate(counts) if its == count] for count in sorted(set(counts))]
+        self._groups = [(chosen, BeamsTogether([sensors[place].beams for place in chosen])) for chosen in places]
+        self._least = np.array([[one.least_m] for one in sensors])
+        self._ranges = np.array([[one.range_m] for one in sensors])
+
+    def sample(self, view: View) -> Floats:
+        """Return the distances (m), of shape (sensors, 1)."""
+        nearest = np.empty((len(self._sensors), 1))
+        for chosen, beams in self._groups:
+            nearest[chosen, 0] = beams.distances(view).min(axis=1)
+        found: Floats = np.minimum(np.maximum(nearest, self._least), self._ranges)
+        return found
+
+
+def directions(cone: float) -> Iterator[Vector]:
+    """Yield unit vectors: the x axis, and those of a cone about it of this angle (rad) from side to side."""
+    yield 1.0, 0.0, 0.0
+    for share, beams in CIRCLES if cone > 0.0 else ():
+        aside, along = sin(share * cone / 2.0), cos(share * cone / 2.0)
+        for beam in range(beams):
+            around = 2.0 * pi * beam / beams
+            yield along, aside * cos(around), aside * sin(around)
