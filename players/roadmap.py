@@ -9,7 +9,8 @@ from math import ceil, hypot
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.world.clearance.hall_obstacles import Obstacle, obstacles_of
+from foosim.world.clearance.footprints import Obstacle
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.parameters.hall import hall_of
 
 MARGIN_M: Final = 0.2

@@ -15,9 +15,11 @@ from foosim.deployment.processes import processes_of
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
-from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacle, obstacles_of
+from foosim.world.clearance.footprints import Circle, Rectangle, obstacle
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
+from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.scene import Cylinder, Shape
@@ -46,8 +48,8 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.heading=90", "robots.rover01.heading: not an angle (a number and one of rad, mrad, deg), 90"),
         ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
         ("robots.rover01.sensors.pose.kind=pos",
-         "robots.rover01.sensors.pose.kind: unknown sensor (there are: ball, battery, encoder, odometry, pose, "
-         "proximity, or any module:Class), 'pos', nearest is 'pose'"),
+         "robots.rover01.sensors.pose.kind: unknown sensor (there are: "
+         f"{', '.join(names('sensor'))}, or any module:Class), 'pos', nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
         ("robots.rover01.actuators={drive: {kind: joint_position}}",

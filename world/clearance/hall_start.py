@@ -10,7 +10,8 @@ from math import floor
 from operator import itemgetter
 
 from foosim.common.finding import Finding
-from foosim.world.clearance.hall_obstacles import Circle, Obstacle, named_obstacles
+from foosim.world.clearance.footprints import Circle, Obstacle
+from foosim.world.clearance.hall_obstacles import named_obstacles
 from foosim.world.models.rover import RoverRobot
 from foosim.world.models.station import StationRobot
 from foosim.world.parameters.hall import hall_of

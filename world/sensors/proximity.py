@@ -19,7 +19,8 @@ from pydantic import Field
 
 from foosim.common import units
 from foosim.common.units import Quantity
-from foosim.world.clearance.hall_obstacles import Circle, Rectangle, obstacles_of
+from foosim.world.clearance.footprints import Circle, Rectangle
+from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
