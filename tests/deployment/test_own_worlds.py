@@ -91,6 +91,8 @@ def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
 
 DRONE: Final = "robots.camera={model: 'own_form:Own'}"
 FIELDS: Final = "an omni has x, y, down, refused, quarantined"
+
+
 def installed(form: str) -> str:
     """The names of a form, as messages list them."""
     return ", ".join(registry.names(form))

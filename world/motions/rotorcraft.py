@@ -1,10 +1,14 @@
 """Rotorcraft that fly upright to waypoints, moved by kinematics.
 
 Over the ground and in height the speed that is wanted is the greatest from which a body that moves in steps of dt still
-stops at its goal, with a deceleration a: with n steps left, v = a n dt covers at most d = a dt^2 n (n + 1) / 2, so that
-n = (sqrt(1 + 8 d / (a dt^2)) - 1) / 2; from its last step on it goes straight to the goal. The velocity approaches what
-is wanted by a vector of at most the acceleration times dt. The heading turns the shorter way, at most so fast.
-A rotorcraft that is stopped by an obstacle (`clearance.free_way`) has the velocity of the way that was left to it.
+stops at its goal, with a deceleration a. In m steps, each slower than the one before it by a dt, it covers
+d = m v dt - a dt^2 m (m - 1) / 2; the last one is no faster than a dt where m is the least whole number that is not
+below (sqrt(1 + 8 d / (a dt^2)) - 1) / 2. So v = d / (m dt) + a dt (m - 1) / 2.
+
+The velocity over the ground and that in height approach what is wanted by at most a dt each, where a is the
+acceleration over the square root of 2: one is never kept from braking by the other. The heading turns the shorter way,
+at most so fast. A rotorcraft that is stopped by an obstacle (`clearance.free_way`) has the velocity of
+the way that was left to it.
 """
 
 from __future__ import annotations
@@ -21,13 +25,13 @@ from foosim.world.components.view import SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.models.rotorcraft import RotorcraftRobot
-from foosim.world.moving.arcs import Floats, approached_together, shorter, upright_turn, wrapped
+from foosim.world.moving.arcs import Floats, approached, approached_together, shorter, upright_turn, wrapped
 from foosim.world.moving.columns import Columns
 
 STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "arrived", "blocked")
 """The fields that this motion writes."""
 NO_GOAL: Final[Motors] = ((0.0, 0.0),) * 4
-BRAKE: Final = 0.7071067811865476
+EACH: Final = 0.7071067811865476
 """Which share of the acceleration each of both takes, over the ground and in height: together they have all of it."""
 ARRIVED_M: Final = 1e-6
 """A rotorcraft that is nearer to its waypoint is there: far above rounding."""
@@ -76,7 +80,9 @@ class RotorcraftMotion:
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
             wanted = np.where(has_goal[:, None], self._wanted(goal - place, most), 0.0)
-            velocity = approached_together(velocity, wanted, batch.acceleration * dt)
+            step = batch.acceleration * (EACH * dt)
+            velocity[:, 0:2] = approached_together(velocity[:, 0:2], wanted[:, 0:2], step)
+            velocity[:, 2] = approached(velocity[:, 2], wanted[:, 2], step)
             place, shares, stops = near.free_way(place, velocity * dt)
             velocity = velocity * shares[:, None]
             is_stopped |= stops
@@ -102,9 +108,9 @@ class RotorcraftMotion:
 
     def _fastest(self, way: Floats, most: Floats) -> Floats:
         """Return the greatest speed from which who has this way to go still stops at its end."""
-        dt, brake = self._dt, self._batch.acceleration * BRAKE
-        steps = (np.sqrt(1.0 + 8.0 * way / (brake * dt * dt)) - 1.0) / 2.0
-        found: Floats = np.minimum(np.minimum(brake * steps * dt, way / dt), most)
+        dt, brake = self._dt, self._batch.acceleration * EACH
+        steps = np.maximum(np.ceil((np.sqrt(1.0 + 8.0 * way / (brake * dt * dt)) - 1.0) / 2.0), 1.0)
+        found: Floats = np.minimum(way / (steps * dt) + brake * dt * (steps - 1.0) / 2.0, most)
         return found
 
 
