@@ -19,6 +19,7 @@ from bench import (
     console_seek,
     distributed,
     echo,
+    fleet,
     hub,
     lateness,
     machine,
@@ -83,6 +84,12 @@ BENCHES: Final = (
         "twenty rovers with their controllers and a recording vHub, as fast as it goes",
         with_default(warehouse.warehouse),
         warehouse.lines,
+    ),
+    Bench(
+        "fleet",
+        "robots that move by kinematics, with their poses, in one process",
+        with_default(fleet.fleet),
+        fleet.lines,
     ),
     Bench(
         "certificates",

@@ -56,6 +56,7 @@ from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.layout import doubled_slots
+from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
@@ -295,7 +296,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         between = first(doubled_slots(deployment)) or first(_trial_findings(deployment))
         placed = place_findings(deployment)
-        between = between or first(findings_of(deployment), rules, placed, unfit_components(deployment))
+        between = between or first(
+            findings_of(deployment), _start_findings(deployment), rules, placed, unfit_components(deployment)
+        )
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
 
@@ -307,6 +310,15 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
     from foosim.world.assembly.trial import trial_findings  # brings numpy
 
     return trial_findings(deployment)
+
+
+def _start_findings(deployment: Deployment) -> Iterable[Finding]:
+    """The robots that start in something: those that move by kinematics and are no kit's."""
+    if not any(stands_upright(model) for model in {robot.model for robot in deployment.robots.values()}):
+        return ()
+    from foosim.world.clearance.start import start_findings  # brings numpy
+
+    return start_findings(deployment)
 
 
 def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:

@@ -66,10 +66,7 @@ def _free_pose(link: Link, entity: Entity, numbers: Sequence[float]) -> tuple[Ve
 
 
 def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
-    """Return the velocity (m/s, world frame) of the origin of the link that a body's antenna is on, from the numbers.
-
-    A rover's is that of its wheels, which slip where it is kept from where it goes.
-    """
+    """Return the velocity (m/s, world frame) of the origin of the link that a body's antenna is on."""
     return twist(body, entity, numbers, body.antenna_link % len(body.links)).linear
 
 
@@ -94,7 +91,7 @@ def twist(body: Body, entity: Entity, numbers: Sequence[float], index: int, plac
     while index >= 0:
         link, (_, position, orientation) = body.links[index], poses[index]
         if link.joint == "free":
-            of_base, spin = _free_twist(entity, numbers, orientation, where)
+            of_base, spin = _free_twist(entity, numbers, where)
             linear, angular = moved(linear, of_base, 1.0), moved(angular, spin, 1.0)
         elif link.joint in MOVING:
             axis, speed = rotate(orientation, link.axis), of_joint[index]
@@ -107,12 +104,9 @@ def twist(body: Body, entity: Entity, numbers: Sequence[float], index: int, plac
     return Twist(linear, angular)
 
 
-def _free_twist(entity: Entity, numbers: Sequence[float], orientation: Quaternion, place: Vector) -> Twist:
+def _free_twist(entity: Entity, numbers: Sequence[float], place: Vector) -> Twist:
     """Return how a place moves that is fixed to a free link."""
     offsets = entity.offsets
-    if "wheel_speeds" in offsets:
-        wheels = offsets["wheel_speeds"]
-        return Twist(rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0)), ORIGIN)
     start = offsets["linear_velocity"]
     linear = numbers[start], numbers[start + 1], numbers[start + 2]
     if "angular_velocity" not in offsets:

@@ -78,9 +78,11 @@ def told(*words: str, folder: Path | None = None) -> tuple[str, str]:
 
 TOLD: Final = {
     ("rule", "football"): ["slots of each ball: still_ticks, out_ticks, wait_ticks", "writes: ball"],
-    ("motion", "two_wheels"): [
-        "needs a model with: position, orientation, heading, wheel_speeds, wheel_travel, blocked, charge",
-        "writes: position, orientation, heading, wheel_speeds, wheel_travel, blocked",
+    ("motion", "differential_drive"): [
+        "needs a model with: position, orientation, linear_velocity, angular_velocity, heading, wheel_speeds, "
+        "wheel_travel, blocked",
+        "writes: position, orientation, linear_velocity, angular_velocity, heading, wheel_speeds, wheel_travel, "
+        "blocked",
     ],
     ("model", "rover"): [
         "sensors: by name: of sensors, see components sensor (default {})",
@@ -88,7 +90,7 @@ TOLD: Final = {
         "rules: by name: of entity_rules, see components entity_rule (default {})",
         "tags: a list, each: string (default [])",
         "a robot",
-        "moved by: two_wheels",
+        "moved by: differential_drive",
         "usual actuators: drive (wheel_speeds)",
         "usual rules: battery (battery)",
         "tags: vehicle",
@@ -113,7 +115,7 @@ def test_all_are_told_of_in_json() -> None:
     by_name = {(one["form"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]
     assert (rover["motion"], rover["is_robot"], rover["is_rigid"], rover["tags"]) == (
-        *("two_wheels", True, False),
+        *("differential_drive", True, False),
         ["vehicle"],
     )
     assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"

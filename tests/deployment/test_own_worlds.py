@@ -92,9 +92,16 @@ def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
 
 DRONE: Final = "robots.camera={model: 'own_form:Own'}"
 FIELDS: Final = "an omni has x, y, down, refused, quarantined"
+
+
+def installed(form: str) -> str:
+    """The names of a form, as messages list them."""
+    return ", ".join(registry.names(form))
+
+
 MODELS: Final = {
     "motion('hover', needs=('x',), writes=('y',))": None,
-    "": "a model without its motion: unknown motion (there are: two_wheels, or any module:Class), 'hover'",
+    "": f"a model without its motion: unknown motion (there are: {installed('motion')}, or any module:Class), 'hover'",
     "motion('hover', needs=('x', 'charge'))": f"a model whose motion hover needs charge: {FIELDS}",
     "motion('hover', needs=('refusd',))": "a model whose motion hover needs refusd: "
     f"{FIELDS}, nearest to refusd is refused",
@@ -162,11 +169,11 @@ def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
     [
         ("each={ROBOTS: {'x': 1}, 'rod': {'y': 1}}, writes=('ball',)", ""),
         ("each={'rood': {'y': 1}}", "rule of worlds that remembers something of each rood: unknown model (there are: "
-         "ball, camera, rod, rover, station, urdf), 'rood', nearest is 'rod'"),
-        ("writes=('bal',)", "rule of worlds that writes bal: unknown model (there are: ball, camera, rod, rover, "
-         "station, urdf), 'bal', nearest is 'ball'"),
-        ("writes=(ROBOTS,)", "rule of worlds that writes *: unknown model (there are: ball, camera, rod, rover, "
-         "station, urdf), '*'"),
+         f"{installed('model')}), 'rood', nearest is 'rod'"),
+        ("writes=('bal',)", "rule of worlds that writes bal: unknown model (there are: "
+         f"{installed('model')}), 'bal', nearest is 'ball'"),
+        ("writes=(ROBOTS,)", "rule of worlds that writes *: unknown model (there are: "
+         f"{installed('model')}), '*'"),
     ],
 )  # fmt: skip
 def test_a_rule_of_worlds_names_models_that_there_are(site: Path, about: str, told: str) -> None:
@@ -208,15 +215,15 @@ KITS: Final = {
     "entities={'leo': 'beast'}, addable=('beast',), rules={'feed': {'kind': 'feed', 'count': 2}}": [],
     "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
                                 "are in robots:"],
-    "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: ball, "
-                                  "camera, rod, rover, station, urdf, or any module:Class), 'beest'"],
+    "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: "
+                                  f"{installed('model')}, or any module:Class), 'beest'"],
     "entities={'leo': 'crate'}": ["its entity leo is a rigid model whose reach the islands do not know; valid are "
                                   "rod, ball, and models with a motion"],
     "entities={'world': 'beast'}": ["its entity world has a reserved name"],
     "entities={'ball': 'beast'}": ["its entity ball has a name that is also one of the kit table's"],
     "rules={'football': {'kind': 'feed'}}": ["its rule football has a name that is also one of the kit table's"],
-    "rules={'feed': {'kind': 'fed'}}": ["its rule feed: unknown rule of worlds (there are: football, or any "
-                                        "module:Class), 'fed'"],
+    "rules={'feed': {'kind': 'fed'}}": ["its rule feed: unknown rule of worlds (there are: "
+                                        f"{installed('rule')}, or any module:Class), 'fed'"],
     "rules={'feed': {'kind': 'feed', 'count': 'two'}}": ["its rule feed: count: not a whole number, 'two'"],
     "rules={'feed': {'kind': 'feed', 'coun': 2}}": ["its rule feed: unknown key, 'coun', nearest is 'count'"],
     "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: cannot be imported: ModuleNotFoundError: No module "
@@ -225,8 +232,8 @@ KITS: Final = {
     "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
     "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
                            "place_at and no field position"],
-    "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: ball, camera, "
-                          "rod, rover, station, urdf, or any module:Class), 'lion'"],
+    "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: "
+                          f"{installed('model')}, or any module:Class), 'lion'"],
 }  # fmt: skip
 """Kits, and what is said of a table with each."""
 

@@ -99,7 +99,8 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
         (("kind: pose, rate: 5 Hz, ", "kind: pose, "),
          "5:13: templates.rover.sensors.pose: missing key, 'rate'"),
         (("    model: rover", "    model: rovr"),
-         "3:12: templates.rover.model: unknown model (there are: camera, rod, rover, station, urdf, "
+         "3:12: templates.rover.model: unknown model (there are: camera, "
+         "differential_drive, holonomic, mover, rod, rotorcraft, rover, station, "
           "or any module:Class), 'rovr', "
           "nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
@@ -176,7 +177,8 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
          ["7:57: templates.other.sensors.p.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
           "nearest is '50 Hz'"]),
         ("  other: {model: rower}\n",
-         ["7:18: templates.other.model: unknown model (there are: camera, rod, rover, station, urdf, "
+         ["7:18: templates.other.model: unknown model (there are: camera, "
+         "differential_drive, holonomic, mover, rod, rotorcraft, rover, station, "
            "or any module:Class), 'rower', "
            "nearest is 'rover'"]),
         ("  other: {class: 'a.b:C', rate: 1 Hx}\n",

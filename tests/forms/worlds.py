@@ -89,6 +89,42 @@ def _hall() -> dict[str, Any]:
     }
 
 
+@cache
+def _yard() -> dict[str, Any]:
+    """Robots that move by kinematics, among boxes."""
+    drives = ("one", "two")
+    box = {"length": "1 m", "width": "50 cm", "height": "1 m", "at": {"x": "1 m", "y": "1 m", "yaw": "30 deg"}}
+    path = [{"x": "-2 m", "y": "-2 m"}, {"x": "2 m", "y": "-2 m", "yaw": "90 deg"}]
+    door = {"shape": "box", "length": "40 cm", "width": "20 cm", "height": "1 m", "path": path, "speed": "1 m/s"}
+    robots: dict[str, Any] = {
+        "one": {"model": "differential_drive", "at": {"x": "-1 m"}},
+        "two": {"model": "differential_drive", "at": {"yaw": "90 deg"}, "slip": "5 %"},
+        "base": {"model": "holonomic", "at": {"y": "-1 m"}},
+        "craft": {"model": "rotorcraft", "at": {"y": "2 m"}},
+        "door": {"model": "mover", "loop": True, **door},
+    }
+    players = {
+        **driver(drives, "v_w", (0.8, 2.0), "10 Hz"),
+        "pilot": driver(("base",), "x_y_w", (0.7, 0.7, 2.0), "10 Hz")["driver"],
+        "flight": driver(("craft",), "waypoint", (3.0, 3.0, 0.0, 3.0), "5 Hz")["driver"],
+    }
+    return {
+        "format": 2,
+        "world": "yard",
+        "seed": 1,
+        "tick": "10 ms",
+        "substeps": 1,
+        "engine": "pure",
+        "pace": "fast",
+        "scene": {"kind": "boxes", "boxes": {"box": box}},
+        "rules": {"corner": {"kind": "zone", "length": "2 m", "width": "2 m", "tag": "vehicle"}},
+        "robots": {name: {**robot, "sensors": {}} for name, robot in robots.items()},
+        "players": players,
+        "nodes": {"n": {"robots": ["*"]}},
+        "network": {"links": [LINK]},
+    }
+
+
 class World(NamedTuple):
     """The plain data of a deployment, and the place of the form's settings in it; no place: it has none."""
 
@@ -115,6 +151,7 @@ class World(NamedTuple):
 TABLE: Final = World(_table())
 HALL: Final = World(_hall())
 EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude": "13.4 deg"}})
+YARD: Final = World(_yard())
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -145,7 +182,14 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "rod"): World(TABLE.data, ("robots", "red.goal")),
     ("model", "rover"): World(HALL.data, ("robots", "rover-1")),
     ("model", "station"): World(HALL.data, ("robots", "station")),
-    ("motion", "two_wheels"): HALL,
+    ("model", "differential_drive"): World(YARD.data, ("robots", "two")),
+    ("model", "holonomic"): World(YARD.data, ("robots", "base")),
+    ("model", "mover"): World(YARD.data, ("robots", "door")),
+    ("model", "rotorcraft"): World(YARD.data, ("robots", "craft")),
+    ("motion", "differential_drive"): HALL,
+    ("motion", "holonomic"): YARD,
+    ("motion", "rotorcraft"): YARD,
+    ("motion", "track"): YARD,
     ("sensor", "ball"): sensor(TABLE, ["camera"], "ball"),
     ("sensor", "battery"): sensor(HALL, ROVERS, "battery"),
     ("sensor", "contact"): sensor(TABLE, RODS, "contact"),
@@ -163,7 +207,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
     ("sensor", "range"): sensor(HALL, ROVERS, "range", range="3 m", cone="30 deg", at={"z": "20 cm"}),
+    ("sensor", "velocity"): sensor(YARD, ["one", "base", "craft"], "velocity", at={"x": "20 cm"}),
     ("actuator", "rod_position"): TABLE,
+    ("actuator", "v_w"): YARD,
+    ("actuator", "waypoint"): YARD,
+    ("actuator", "x_y_w"): YARD,
     ("actuator", "wheel_speeds"): HALL,
     ("modifier", "bias_walk"): modifier("bias_walk", {"walk": {"position": "1 mm"}}, {"initial": "10 mm/s"}),
     ("modifier", "clip"): modifier("clip", {"high": {"position": "1 m"}}, {"low": "-1 m/s", "high": "500 mm/s"}),
@@ -173,7 +221,12 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("modifier", "gaussian_noise"): modifier("gaussian_noise", {"std": {"heading": "1 deg"}}, {"std": "10 mm/s"}),
     ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
     ("rule", "football"): TABLE,
+    ("rule", "zone"): World(YARD.data, ("rules", "corner")),
     ("entity_rule", "battery"): HALL,
+    ("scene", "boxes"): World(YARD.data, ("scene",)),
+    ("scene", "empty"): World(
+        YARD.with_(("scene",), {"kind": "empty", "length": "9 m", "width": "9 m"}).data, ("scene",)
+    ),
     ("scene", "football_table"): scene(HALL, "football_table", {key: TABLE.data["table"][key] for key in SCENE}),
     ("scene", "hall"): scene(TABLE, "hall", {key: HALL.data["hall"][key] for key in ("length", "width", "walls")}),
     ("kit", "hall"): World(HALL.data, ("hall",)),

@@ -43,8 +43,15 @@ OF_ROD: Final[dict[str, Any]] = {
     "touch": {"kind": "contact", "rate": "7 Hz"},
 }
 """Sensors of the rod of each goal, at rates that are not whole ticks."""
-UNUSED: Final = {("engine", "pure"), ("scene", "hall"), ("scene", "football_table")}
+UNUSED: Final = {
+    ("engine", "pure"),
+    ("scene", "hall"),
+    ("scene", "football_table"),
+    ("scene", "boxes"),
+    ("scene", "empty"),
+}
 """Scenes are those of the kits; one engine computes."""
+WALK: Final = [{"x": "-5 m", "y": "-2 m"}, {"x": "-5 m", "y": "2 m", "yaw": "180 deg"}]
 
 
 def written(data: dict[str, Any]) -> str:
@@ -69,7 +76,13 @@ def mixed() -> str:
         "rover-1": {"model": "rover", "x": "1.4 m", "y": "0 m", "heading": "170 deg", "sensors": sensors},
         "rover-2": {"model": "rover", "x": "-1.6 m", "y": "1 m", "charge": "50 %", "sensors": sensors},
         "charger": {"model": "station", "x": "-3 m", "y": "1 m"},
+        "tug": {"model": "differential_drive", "at": {"x": "-5 m", "y": "-3 m"}, "tags": ["guest"]},
+        "omni": {"model": "holonomic", "at": {"x": "-4 m", "y": "-3 m"}},
+        "craft": {"model": "rotorcraft", "at": {"x": "-3 m", "y": "-3 m"}},
+        "walker": {"model": "mover", "shape": "sphere", "radius": "30 cm", "path": WALK, "speed": "1 m/s"},
     }
+    data["robots"]["tug"]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}}
+    data["rules"] = {"corner": {"kind": "zone", "length": "9 m", "width": "9 m", "tag": "guest"}}
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
     for player in data["players"].values():
         player.pop("process", None)

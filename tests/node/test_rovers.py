@@ -19,7 +19,7 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.motions.two_wheels import wheel_slips
+from foosim.world.moving.wheels import slips_of, wheels_of
 from foosim.world.parameters.hall import hall_of
 
 EMPTY: Final = (
@@ -145,9 +145,9 @@ def test_wheels_approach_their_speed_as_fast_as_the_motor_can(fleet_text: Callab
 def test_a_wheel_that_slips_rolls_less_far_than_it_turns(fleet_text: Callable[..., str]) -> None:
     hall = Hall(fleet_text(1, *EMPTY, "hall.rover.drive.slip=20 %"))
     (rover,) = hall.rovers
-    slips = wheel_slips(hall.deployment, rover.name)
+    slips = wheels_of(hall.deployment, hall.layout, rover).slips
     assert 0.0 < min(slips) < max(slips) < 0.2
-    assert slips != wheel_slips(hall.deployment, "rover02"), "each rover has its own"
+    assert slips != slips_of(hall.deployment, "rover02", 0.2), "each rover has its own"
     hall.want(rover, 0.5, 0.5)
     hall.step()
     assert hall.at(rover, "wheel_travel") == pytest.approx(0.01)

@@ -18,6 +18,7 @@ from foosim.world.assembly.world import build_scene, initial_numbers, world_stat
 from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
 from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
+from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.rays.outlines import Circle, Rectangle, outline
@@ -47,9 +48,8 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.heading=90", "robots.rover01.heading: not an angle (a number and one of rad, mrad, deg), 90"),
         ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
         ("robots.rover01.sensors.pose.kind=pos",
-         "robots.rover01.sensors.pose.kind: unknown sensor (there are: ball, battery, contact, encoder, gps, imu, "
-         "joint_state, laser_scanner, odometry, pose, pose_3d, proximity, range, or any module:Class), 'pos', "
-         "nearest is 'pose'"),
+         "robots.rover01.sensors.pose.kind: unknown sensor (there are: "
+         f"{', '.join(names('sensor'))}, or any module:Class), 'pos', nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
         ("robots.rover01.actuators={drive: {kind: rod_position}}",

@@ -67,9 +67,9 @@ def test_the_table_has_its_entities() -> None:
     assert [entity.name for entity in LAYOUT.of("ball")] == [BALL]
     assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
     models = [find_model(name) for name in names("model")]
-    assert {model.name for model in models if model.is_solved and model.is_robot} == {"rod", "rover", "urdf"}
+    assert {model.name for model in models if model.is_solved and model.is_robot and model.kit} == {"rod", "rover"}
     assert LAYOUT.declared.addable == ("ball",) and find_model("ball").can_be_free and not find_model("ball").is_robot
-    assert {model.name for model in models if model.actuators} == {"rod", "rover"}
+    assert {model.name for model in models if model.actuators and model.kit} == {"rod", "rover"}
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 
 

@@ -17,7 +17,10 @@ from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.rod_position import Command
+from foosim.world.actuators.v_w import Motion
+from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.actuators.wheel_speeds import Drive
+from foosim.world.actuators.x_y_w import Velocity as Base
 from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import names
@@ -34,6 +37,7 @@ from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 from foosim.world.sensors.range import Distance
+from foosim.world.sensors.velocity import Velocity
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
@@ -48,6 +52,14 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "laser_scanner": (Scan((0.5, 30.0)), [0.5, 30.0], ["m"]),
     "range": (Distance(1.25), [1.25], ["m"]),
     "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
+    "v_w": (Motion(0.5, -1.2), [0.5, -1.2], ["m/s", "rad/s"]),
+    "x_y_w": (Base(0.5, -1.2, 0.1), [0.5, -1.2, 0.1], ["m/s", "m/s", "rad/s"]),
+    "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3), [0.5, -1.2, 9.0, 1 / 3], ["m", "m", "m", "rad"]),
+    "velocity": (
+        Velocity(0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0),
+        [0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0],
+        ["m/s", "m/s", "m/s", "rad/s", "rad/s", "rad/s"],
+    ),
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
     "contact": (Touches(2.0, 0.125, -1.0), [2.0, 0.125, -1.0], ["", "N s", ""]),
     "gps": (GlobalPosition(52.5, -13.25, 1 / 3), [52.5, -13.25, 1 / 3], ["deg", "deg", "m"]),
@@ -60,6 +72,7 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
+SIZES |= {"v_w": 16, "x_y_w": 24, "waypoint": 32, "velocity": 48}
 """In bytes, of the kinds that have as many numbers always."""
 SEVERAL = {"joint_state", "laser_scanner", "proximity"}
 

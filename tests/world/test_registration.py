@@ -12,6 +12,7 @@ import pytest
 from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.forms import registry
+from foosim.world.forms.misfits import models_of
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
 from tests.own_forms import folder_on_path, problems, written
@@ -161,7 +162,7 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
         ("", ["down", "refused"]),
         ("slots={'x': 1}", ["x", "down", "refused"]),
         ("slots={'refused': 1, 'x': 2}", ["refused", "x", "down"]),
-        ("slots={'x': 1}, motion='two_wheels'", ["x", "down", "refused", "quarantined"]),
+        ("slots={'x': 1}, motion='differential_drive'", ["x", "down", "refused", "quarantined"]),
         ("slots={'x': 1}, is_rigid=True, is_robot=False", ["x", "quarantined"]),
         ("slots={'x': 1}, is_robot=False", ["x"]),
     ],
@@ -229,9 +230,9 @@ def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) ->
     registry._entry_points.cache_clear()
     line = len((site / "own_form.py").read_text().splitlines())
     why = f"own_form of worn 0.3 cannot be imported: RuntimeError: at import (own_form.py:{line})"
+    robots = ", ".join(model.name for model in models_of(robots=True))
     assert problems("robots.camera.model=zeppelin") == [
-        f"robots.camera.model: unknown model; {why} (there are: camera, rod, rover, station, urdf, "
-        "or any module:Class), 'zeppelin'"
+        f"robots.camera.model: unknown model; {why} (there are: {robots}, or any module:Class), 'zeppelin'"
     ]
     assert problems("zoo={fence: 1 m}") == [f"unknown key; {why}, 'zoo'"]
     assert problems("capture.zoo=3") == ["capture: unknown key, 'zoo'"]
@@ -240,5 +241,5 @@ def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) ->
         "'laps'"
     ]
     assert problems("rules={own: {kind: laps}}") == [
-        f"rules.own.kind: unknown rule of worlds; {why} (there are: football, or any module:Class), 'laps'"
+        f"rules.own.kind: unknown rule of worlds; {why} (there are: football, zone, or any module:Class), 'laps'"
     ]

@@ -45,7 +45,7 @@ class Slides:
             view.write(velocity, speed, 0.0, 0.0)
 
 
-@model("mover", Mover, motion="own_forms:Slides", actuators={"speed": {"kind": "own_forms:Speed"}}, slots={
+@model("slider", Mover, motion="own_forms:Slides", actuators={"speed": {"kind": "own_forms:Speed"}}, slots={
     "position": 3, "orientation": 4, "velocity": 3, "quarantined": 1, "down": 1, "refused": 1})
 class Moves:
     def __init__(self, settings, at):
@@ -53,7 +53,7 @@ class Moves:
 
     def body(self):
         shape = Shape(Box((0.1, 0.1, 0.1)), "", GREY)
-        return Body(self.at.robot.name, "mover", (0.0, 0.0, 0.0), (Link("hull", "free", (shape,), 0.0, (0.0,) * 3),))
+        return Body(self.at.robot.name, "slider", (0.0, 0.0, 0.0), (Link("hull", "free", (shape,), 0.0, (0.0,) * 3),))
 
     def place(self, view):
         view.write(self.at.slot("position"), 3.0, 2.0, 0.1)

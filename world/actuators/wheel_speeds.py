@@ -1,4 +1,4 @@
-"""A rover's drive: the rims of both wheels approach their set-points of speed as fast as the motors accelerate."""
+"""The drive of two wheels: the rims of both approach their set-points of speed as fast as the motors accelerate."""
 
 from __future__ import annotations
 
@@ -8,28 +8,29 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.parameters.hall import hall_of
+from foosim.world.moving.wheels import wheels_of
 
 
 class WheelSpeedsSettings(ActuatorSettings):
-    """Turns the two wheels of a rover; speed and acceleration are those of the hall's rovers."""
+    """Turns the two wheels of a robot; speed and acceleration are those of its model."""
 
 
 class Drive(Struct, frozen=True):
-    """The set-points of a rover's wheels; both positive is ahead, a faster right one turns left."""
+    """The set-points of both wheels; both positive is ahead, a faster right one turns left."""
 
     left: MetresPerSecond
     right: MetresPerSecond
 
 
-@actuator("wheel_speeds", WheelSpeedsSettings, Drive, slots={"set_point": 2}, needs=("wheel_speeds",), kit="hall")
+@actuator("wheel_speeds", WheelSpeedsSettings, Drive, slots={"set_point": 2}, needs=("wheel_speeds",))
 class DriveActuator:
-    """The two wheels of a rover."""
+    """The two wheels of a robot."""
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
-        drive = hall_of(at.spec).rover.drive
+        """Raises BadValue where the robot's model does not say what its wheels are."""
+        wheels = wheels_of(at.spec, at.layout, at.robot)
         self._set_point = at.slot("set_point")
-        self._speed, self._acceleration = drive.speed, drive.acceleration
+        self._speed, self._acceleration = wheels.speed, wheels.acceleration
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest speed of each wheel (m/s); a command beyond is held within."""

@@ -136,7 +136,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [registry.find("kit", name).made for name in sorted(spec.kits)]
     found = [f"no {failed}" for failed in [status.get("failed")] if failed]
-    for one in made:
+    for one in dict.fromkeys(made):
         if hasattr(one, "text"):
             try:
                 found.append(one.text(status))

@@ -1,7 +1,7 @@
-"""Outlines of rovers: the outlines of walls, stations and scenery, seen from above (`rays.outlines`).
+"""Obstacles of rovers: outlines of walls, stations and scenery, seen from above (`rays.outlines`), with names.
 
-What is higher than a rover with its antenna, or below the floor, is none. The walls of the hall are obstacles like all
-others, so that nothing leaves it.
+A base station is a circle. What is higher than a rover with its antenna, or below the floor, is none. The walls of the
+hall are obstacles like all others, so that nothing leaves it.
 """
 
 from __future__ import annotations

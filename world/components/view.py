@@ -122,6 +122,13 @@ class WritableView(View):
             check_write(slot, values)
         self._written[slot.at : slot.at + size] = values
 
+    def write_rows(self, slots: Sequence[Slot], rows: Sequence[list[float]]) -> None:
+        """Write a row to each of these slots: of as many numbers as it has, all of them finite."""
+        written = self._written
+        for slot, row in zip(slots, rows, strict=True):
+            assert slot.is_own and len(row) == slot.size, slot
+            written[slot.at : slot.at + slot.size] = row
+
 
 class SolvingView(WritableView):
     """A view in which entities go on: `numbers` are those at the start of the tick, what is written is at its end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Final
 
 from foosim.common import units
@@ -12,6 +13,8 @@ from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
 from foosim.world.materials import METAL, PLASTIC
+from foosim.world.moving.upright import Upright
+from foosim.world.moving.wheels import Wheels, slips_of
 from foosim.world.parameters.hall import Place, hall_of
 from foosim.world.parameters.hall_bodies import DARK, mast, standing
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Shape, turn
@@ -39,6 +42,8 @@ class RoverRobot(RobotSettings):
     slots={
         "position": 3,
         "orientation": 4,
+        "linear_velocity": 3,
+        "angular_velocity": 3,
         "heading": 1,
         "wheel_speeds": 2,
         "wheel_travel": 2,
@@ -48,7 +53,7 @@ class RoverRobot(RobotSettings):
         "charge": 1,
         "refused": 1,
     },
-    motion="two_wheels",
+    motion="differential_drive",
     kit="hall",
     actuators={"drive": {"kind": "wheel_speeds"}},
     rules={"battery": {"kind": "battery"}},
@@ -78,7 +83,18 @@ class Rover:
         mark = Box((rover.radius / 4, rover.radius / 8, rover.height / 16))
         ahead = Shape(mark, "rover", DARK, (rover.radius / 2, 0.0, rover.height + rover.height / 16), radio=PLASTIC)
         shapes = (hull, ahead, *mast(rover.height, rover.antenna_height, "rover"))
-        return standing(self._at.robot.name, "rover", ORIGIN, "free", shapes, rover.antenna_height)
+        body = standing(self._at.robot.name, "rover", ORIGIN, "free", shapes, rover.antenna_height)
+        return replace(body, speed_limit=rover.drive.speed)
+
+    def upright(self) -> Upright:
+        """Return what it is to obstacles: its hull, as high as it is with its antenna."""
+        return Upright(self._rover.radius, 0.0, max(self._rover.height, self._rover.antenna_height))
+
+    def wheels(self) -> Wheels:
+        """Return its wheels, which slip each by a share of its own."""
+        drive = self._rover.drive
+        slips = slips_of(self._at.spec, self._at.robot.name, drive.slip)
+        return Wheels(drive.track, drive.speed, drive.acceleration, 2.0 * drive.speed / drive.track, slips)
 
     def place(self, view: WritableView) -> None:
         """Set it to its start, at rest, with the deployment's charge."""

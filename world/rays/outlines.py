@@ -1,15 +1,15 @@
 """Clearance of discs that stay on a floor: shapes as they are seen from above, one test at a time.
 
-An upright box is a rectangle, an upright cylinder is a circle; whatever is tilted, and anything else, is the rectangle
-around it. Only + - * / and comparisons decide what is free. Neighbour: `clearing`, for many places among shapes as they
-are in space.
+An upright box is a rectangle; a sphere, an upright cylinder and an upright capsule are circles; whatever is tilted, a
+hull and a mesh are the rectangle around them. Only + - * / and comparisons decide what is free. Neighbour: `clearing`,
+for many places among shapes as they are in space.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from foosim.world.scene import Box, Cylinder, Shape, rotate, shape_box
+from foosim.world.scene import Box, Capsule, Cylinder, Shape, Sphere, rotate, shape_box
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def outline(shape: Shape) -> Outline:
     x, y, _ = shape.position
     is_upright = shape.orientation[0] == 0.0 and shape.orientation[1] == 0.0
     geometry = shape.geometry
-    if is_upright and isinstance(geometry, Cylinder):
+    if isinstance(geometry, Sphere) or (is_upright and isinstance(geometry, Cylinder | Capsule)):
         return Circle(x, y, geometry.radius)
     if is_upright and isinstance(geometry, Box):
         along_x, along_y, _ = rotate(shape.orientation, (1.0, 0.0, 0.0))

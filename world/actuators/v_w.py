@@ -1,0 +1,71 @@
+"""A robot on two wheels by its speed and how fast it turns.
+
+The wheels' set-points are v - w track / 2 and v + w track / 2 (Siegwart, Nourbakhsh, Scaramuzza, *Introduction to
+Autonomous Mobile Robots*, section 3.2). Where a wheel would be faster than it can be, both are slower by one factor:
+the robot goes along the arc that was asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.quantities import MetresPerSecond
+from foosim.world.forms.registry import actuator
+from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.moving.wheels import wheels_of
+
+
+class VWSettings(ActuatorSettings):
+    """Drives a robot on two wheels by speed and turn rate; the limits are those of its model."""
+
+
+class Motion(Struct, frozen=True):
+    """The speed ahead, and how fast the robot turns to the left."""
+
+    linear: MetresPerSecond
+    angular: Annotated[float, Meta(extra={"unit": "rad/s"})]
+
+
+@actuator("v_w", VWSettings, Motion, slots={"set_point": 2}, needs=("wheel_speeds",))
+class MotionActuator:
+    """The two wheels of a robot, as one motion."""
+
+    def __init__(self, settings: VWSettings, at: Mounting) -> None:
+        """Raises BadValue where the robot's model does not say what its wheels are."""
+        self._wheels = wheels_of(at.spec, at.layout, at.robot)
+        self._set_point = at.slot("set_point")
+        self._at, self._half_track = self._set_point.at, self._wheels.track / 2.0
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and greatest speed (m/s) and turn rate (rad/s) that are accepted."""
+        speed, rate = self._wheels.speed, self._wheels.turn_rate
+        return {"linear": (-speed, speed), "angular": (-rate, rate)}
+
+    def accept(self, command: Motion, view: WritableView) -> bool:
+        """Take a motion; one that is out of its limits is refused."""
+        if abs(command.linear) > self._wheels.speed or abs(command.angular) > self._wheels.turn_rate:
+            return False
+        view.write(self._set_point, command.linear, command.angular)
+        return True
+
+    def hold(self, view: WritableView) -> None:
+        """Stop the wheels."""
+        view.write(self._set_point, 0.0, 0.0)
+
+    def stir(self, view: WritableView) -> None:
+        """Drive in a curve, for the small run that tells engines apart."""
+        view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
+
+    def command(self, view: View) -> tuple[tuple[float, float], ...]:
+        """Return (target speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
+        linear, aside = view.numbers[self._at], view.numbers[self._at + 1] * self._half_track
+        left, right = linear - aside, linear + aside
+        most, acceleration = self._wheels.speed, self._wheels.acceleration
+        fastest = max(abs(left), abs(right))
+        if fastest > most:
+            share = most / fastest
+            left, right = left * share, right * share
+        return (left, acceleration), (right, acceleration)

@@ -1,0 +1,79 @@
+"""A rotorcraft by the place and the heading that it is to come to."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from msgspec import Struct
+
+from foosim.common.exact_math import PI
+from foosim.world.components.entities import Motors
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.registry import actuator
+from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.models.rotorcraft import RotorcraftRobot
+
+FAR_M: Final = 100_000.0
+"""How far from the origin a waypoint is at most, in x and in y; as far as anything is put in a deployment."""
+YAW_RAD_MAX: Final = 2.0 * PI
+
+
+class WaypointSettings(ActuatorSettings):
+    """Sends a rotorcraft to waypoints; its speeds and its ceiling are those of its model."""
+
+
+class Waypoint(Struct, frozen=True):
+    """Where to come to in the world, and `yaw`, the heading there, from +x towards +y."""
+
+    x: Metres
+    y: Metres
+    z: Metres
+    yaw: Radians
+
+
+@actuator("waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4}, needs=("arrived",))
+class WaypointActuator:
+    """Keeps the last waypoint that it was told; without any the rotorcraft brakes, and hovers where it is."""
+
+    def __init__(self, settings: WaypointSettings, at: Mounting) -> None:
+        robot = at.spec.robots[at.robot.name]
+        assert isinstance(robot, RotorcraftRobot), f"{at.robot.name} is no rotorcraft"
+        self._robot = robot
+        self._given, self._target = at.slot("given"), at.slot("target")
+        self._position, self._heading = at.slot("position"), at.slot("heading")
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and greatest of each coordinate (m) and of the yaw (rad) that are accepted."""
+        level = (-FAR_M, FAR_M)
+        return {"x": level, "y": level, "z": (0.0, self._robot.ceiling), "yaw": (-YAW_RAD_MAX, YAW_RAD_MAX)}
+
+    def accept(self, command: Waypoint, view: WritableView) -> bool:
+        """Take a waypoint; one that is out of its limits is refused."""
+        is_level = abs(command.x) <= FAR_M and abs(command.y) <= FAR_M and abs(command.yaw) <= YAW_RAD_MAX
+        if not (is_level and 0.0 <= command.z <= self._robot.ceiling):
+            return False
+        self._set(view, command.x, command.y, command.z, command.yaw)
+        return True
+
+    def _set(self, view: WritableView, x: float, y: float, z: float, yaw: float) -> None:
+        view.write(self._given, 1.0)
+        view.write(self._target, x, y, z, yaw)
+
+    def hold(self, view: WritableView) -> None:
+        """Make the present place the waypoint."""
+        x, y, z = view.read(self._position)
+        self._set(view, x, y, z, view.read(self._heading)[0])
+
+    def stir(self, view: WritableView) -> None:
+        """Fly askew and up, for the small run that tells engines apart."""
+        x, y, z = view.read(self._position)
+        self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
+
+    def command(self, view: View) -> Motors:
+        """Return place (m) and heading (rad) to come to, each with the greatest speed there (m/s, rad/s), if any."""
+        if view.numbers[self._given.at] == 0.0:
+            return ()
+        x, y, z, yaw = view.read(self._target)
+        its = self._robot
+        return (x, its.speed), (y, its.speed), (z, its.climb), (yaw, its.turn_rate)

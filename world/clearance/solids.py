@@ -1,0 +1,160 @@
+"""What stands in the way of upright bodies: each shape as a footprint with a band of heights, as columns of numbers.
+
+A footprint is a rectangle grown by a radius: `rays.outlines.Rectangle` has the radius 0, `Circle` has sides of 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from math import floor
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.world.fixed_scenery import fixed_shapes
+from foosim.world.rays.outlines import Rectangle, outline
+from foosim.world.scene import Shape, shape_box
+from foosim.world.scenery import scenery_shape
+from foosim.world.spec import WorldSpec
+
+Floats: TypeAlias = NDArray[np.float64]
+Places: TypeAlias = NDArray[np.int64]
+CELL_M: Final = 1.0
+CELLS_OF_ONE_MAX: Final = 4096
+"""What is in the reach of more cells is compared with everybody."""
+CELLS_MAX: Final = 2**20
+"""Cells lie this far from the origin at most, in either direction; what is farther out is in the last one."""
+STRIDE: Final = 2**22
+
+
+class Solids(NamedTuple):
+    """Footprints and heights (m): middle, unit vector along the first side, half of both sides, radius, band."""
+
+    x: Floats
+    y: Floats
+    along_x: Floats
+    along_y: Floats
+    half_along: Floats
+    half_across: Floats
+    radius: Floats
+    low: Floats
+    high: Floats
+
+    def at(self, chosen: Places | NDArray[np.bool_]) -> Solids:
+        """Return those that are chosen."""
+        return Solids(*(column[chosen] for column in self))
+
+    def beside(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Return how far a place beside each is beyond its first and its second sides; negative between them."""
+        east, north = x - self.x, y - self.y
+        along = np.abs(east * self.along_x + north * self.along_y) - self.half_along
+        across = np.abs(north * self.along_x - east * self.along_y) - self.half_across
+        return along, across
+
+
+def solid(shape: Shape) -> tuple[float, ...]:
+    """Return a shape in the world as a row of `Solids`."""
+    low, high = shape_box(shape)
+    seen = outline(shape)
+    if isinstance(seen, Rectangle):
+        sides = seen.along_x, seen.along_y, seen.half_along, seen.half_across, 0.0
+    else:
+        sides = 1.0, 0.0, 0.0, 0.0, seen.radius
+    return seen.x, seen.y, *sides, low[2], high[2]
+
+
+def solids(rows: Iterable[tuple[float, ...]]) -> Solids:
+    """Return rows as columns."""
+    return Solids(*np.array([*rows], float).reshape(-1, len(Solids._fields)).T.copy())
+
+
+def joined(parts: Iterable[Solids]) -> Solids:
+    """Return several one behind the other."""
+    return Solids(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def distance(along: Floats, across: Floats) -> Floats:
+    """Return how far places are from rectangles, of what `Solids.beside` returned; negative inside."""
+    outside_along, outside_across = np.maximum(along, 0.0), np.maximum(across, 0.0)
+    outside = np.sqrt(outside_along * outside_along + outside_across * outside_across)
+    return np.where((along <= 0.0) & (across <= 0.0), np.maximum(along, across), outside)
+
+
+def scenery_of(spec: WorldSpec) -> Iterator[Shape]:
+    """Yield the scenery of a world; meshes whose files were not given are left out."""
+    yield from fixed_shapes(spec)
+    for name, thing in sorted(spec.scenery.items()):
+        mesh = spec.mesh_of(name)
+        if thing.shape != "mesh" or mesh is not None:
+            yield scenery_shape(name, thing, mesh)
+
+
+def cells_of(x: Floats, y: Floats, side: float) -> Places:
+    """Return the numbers of the cells of a grid that places are in; the next cell in x has the next number."""
+    column = np.clip(np.floor(x / side), -CELLS_MAX, CELLS_MAX).astype(np.int64)
+    row = np.clip(np.floor(y / side), -CELLS_MAX, CELLS_MAX).astype(np.int64)
+    return row * STRIDE + column
+
+
+def ranges(starts: Places, ends: Places) -> tuple[Places, Places]:
+    """Return the numbers of several ranges one behind the other, and beside each the index of its range."""
+    counts = ends - starts
+    which = np.repeat(np.arange(len(starts)), counts)
+    first = np.cumsum(counts) - counts
+    return np.arange(len(which)) - first[which] + starts[which], which
+
+
+class Standing:
+    """What never moves, by the cells of a grid in which somebody who reaches `reach_m` far may meet it."""
+
+    def __init__(self, rows: Iterable[tuple[float, ...]], reach_m: float) -> None:
+        self.solids = solids(rows)
+        cells: dict[int, list[int]] = {}
+        everywhere: list[int] = []
+        for number, row in enumerate(zip(*(column.tolist() for column in self.solids), strict=True)):
+            x, y, along_x, along_y, half_along, half_across, radius, _, _ = row
+            half_x = abs(along_x) * half_along + abs(along_y) * half_across + radius + reach_m
+            half_y = abs(along_y) * half_along + abs(along_x) * half_across + radius + reach_m
+            columns = range(floor((x - half_x) / CELL_M), floor((x + half_x) / CELL_M) + 1)
+            lines = range(floor((y - half_y) / CELL_M), floor((y + half_y) / CELL_M) + 1)
+            is_beyond = max(abs(columns[0]), abs(columns[-1]), abs(lines[0]), abs(lines[-1])) >= CELLS_MAX
+            if is_beyond or len(columns) * len(lines) > CELLS_OF_ONE_MAX:
+                everywhere.append(number)
+                continue
+            for line in lines:
+                for column in columns:
+                    cells.setdefault(line * STRIDE + column, []).append(number)
+        self._everywhere = np.array(everywhere, np.int64)
+        keys = sorted(cells)
+        self._keys = np.array(keys, np.int64)
+        self._members = np.array([number for key in keys for number in cells[key]], np.int64)
+        self._ends = np.cumsum(np.array([len(cells[key]) for key in keys], np.int64))
+
+    def near(self, x: Floats, y: Floats) -> tuple[Places, Places]:
+        """Return pairs: the index of a place, and that of something that may be in its reach."""
+        count = len(x)
+        who = np.repeat(np.arange(count), len(self._everywhere))
+        what = np.tile(self._everywhere, count)
+        if not len(self._keys):
+            return who, what
+        cells = cells_of(x, y, CELL_M)
+        at = np.minimum(np.searchsorted(self._keys, cells), len(self._keys) - 1)
+        there = np.flatnonzero(self._keys[at] == cells)
+        ends = self._ends[at[there]]
+        starts = np.where(at[there] == 0, 0, self._ends[at[there] - 1])
+        members, which = ranges(starts, ends)
+        return np.concatenate((who, there[which])), np.concatenate((what, self._members[members]))
+
+
+def pairs_near(own: Floats, others: Floats, reach_m: float) -> tuple[Places, Places]:
+    """Return pairs of places of two kinds, shape (n, 2 or more), that are no farther apart in x and y than the reach.
+
+    Some that are farther apart are among them: all in neighbouring cells of a grid are.
+    """
+    cells = cells_of(others[:, 0], others[:, 1], reach_m)
+    order = np.argsort(cells, kind="stable")
+    ordered, mine = cells[order], cells_of(own[:, 0], own[:, 1], reach_m)
+    rows = np.concatenate((mine - STRIDE, mine, mine + STRIDE))
+    found, which = ranges(np.searchsorted(ordered, rows - 1), np.searchsorted(ordered, rows + 1, "right"))
+    return which % len(own), order[found]

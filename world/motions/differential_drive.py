@@ -1,0 +1,109 @@
+"""Robots on two driven wheels, moved by kinematics.
+
+A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
+From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an arc
+(`moving.arcs`), as far as nothing is in the way (`clearance.free_way`). It turns on the spot where all is blocked, with
+its wheels slipping. Of a robot with a `charge` the wheels stop where that is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from typing import Final
+
+import numpy as np
+
+from foosim.world.clearance.free_way import FreeWay
+from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.view import SolvingView
+from foosim.world.forms.registry import motion
+from foosim.world.layout import Entity
+from foosim.world.moving.arcs import Floats, approached, upright_turn, way_along_arc, wrapped
+from foosim.world.moving.columns import Columns
+from foosim.world.moving.wheels import wheels_of
+
+STATE: Final = (
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "heading",
+    "wheel_speeds",
+    "wheel_travel",
+    "blocked",
+)
+"""The fields that this motion writes."""
+STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
+
+
+class _Batch:
+    """Robots that one node moves in a tick."""
+
+    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+        self.entities = list(entities)
+        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
+        self.rows = way.rows(entities)
+        wheels = [wheels_of(at.spec, at.layout, entity) for entity in entities]
+        self.track = np.array([its.track for its in wheels])
+        self.rolls = np.array([[1.0 - its.slips[0], 1.0 - its.slips[1]] for its in wheels])
+        self.charges = [(row, its.offsets["charge"]) for row, its in enumerate(entities) if "charge" in its.offsets]
+        """Rows of those that have a charge, and its places."""
+
+
+@motion("differential_drive", needs=STATE, writes=STATE)
+class DifferentialDrive:
+    """Along arcs, as far as nothing is in the way."""
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._at = at
+        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
+        self._substeps = at.spec.substeps
+        self._way = FreeWay(at)
+        self._batch = _Batch(at, self._way, at.entities)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
+        """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
+        if self._batch.entities != entities:
+            self._batch = _Batch(self._at, self._way, entities)
+        batch, dt, count = self._batch, self._dt, len(entities)
+        state = batch.state.read(view.numbers)
+        place, heading = state[:, 0:3].copy(), state[:, 13].copy()
+        speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
+        asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
+        asked = asked.reshape(count, 2, 2)
+        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        for row, charge in batch.charges:
+            if not view.numbers[charge] > 0.0:
+                targets[row] = 0.0
+        near = self._way.near(batch.rows, view)
+        is_stopped = np.zeros(count, bool)
+        for _ in range(self._substeps):
+            speeds = approached(speeds, targets, rates * dt)
+            travel = travel + speeds * dt
+            ground = speeds * batch.rolls
+            ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / batch.track * dt
+            ways = np.zeros((count, 3))
+            ways[:, 0], ways[:, 1] = way_along_arc(ahead * dt, np.zeros(count), turned, heading)
+            place, shares, stops = near.free_way(place, ways)
+            is_stopped |= stops
+            heading = wrapped(heading + turned)
+        _write(batch, view, place, heading, ahead * shares, turned / dt, (speeds, travel, is_stopped))
+
+
+def _write(
+    batch: _Batch,
+    view: SolvingView,
+    place: Floats,
+    heading: Floats,
+    ahead: Floats,
+    turn_rate: Floats,
+    rest: tuple[Floats, Floats, Floats],
+) -> None:
+    state = np.zeros((len(place), batch.state.width))
+    z, w = upright_turn(heading)
+    state[:, 0:3], state[:, 5], state[:, 6] = place, z, w
+    state[:, 7], state[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
+    state[:, 12], state[:, 13] = turn_rate, heading
+    state[:, 14:16], state[:, 16:18], state[:, 18] = rest
+    batch.state.write(view, state)

@@ -1,0 +1,89 @@
+"""Bases that go in any direction, moved by kinematics.
+
+The velocity in the base's own frame approaches what is asked of it: the vector in the plane with at most one
+acceleration, the turning with another. With it the base goes along an arc (`moving.arcs`), as far as nothing is in the
+way (`clearance.free_way`); it turns where it is blocked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from typing import Final
+
+import numpy as np
+
+from foosim.world.clearance.free_way import FreeWay
+from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.view import SolvingView
+from foosim.world.forms.registry import motion
+from foosim.world.layout import Entity
+from foosim.world.moving.arcs import approached, approached_together, upright_turn, way_along_arc, wrapped
+from foosim.world.moving.columns import Columns
+
+STATE: Final = (
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "heading",
+    "base_velocity",
+    "blocked",
+)
+"""The fields that this motion writes."""
+STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+
+
+class _Batch:
+    """Bases that one node moves in a tick."""
+
+    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+        self.entities = list(entities)
+        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
+        self.rows = way.rows(entities)
+
+
+@motion("holonomic", needs=STATE, writes=STATE)
+class HolonomicMotion:
+    """In any direction, along arcs, as far as nothing is in the way."""
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._at = at
+        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
+        self._substeps = at.spec.substeps
+        self._way = FreeWay(at)
+        self._batch = _Batch(at, self._way, at.entities)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
+        """Advance these bases by a tick.
+
+        Motors are three: the speeds ahead and to the left (m/s), and turning left (rad/s), each with the greatest
+        acceleration (m/s2, rad/s2); that of the first holds for the vector of the first two.
+        """
+        if self._batch.entities != entities:
+            self._batch = _Batch(self._at, self._way, entities)
+        batch, dt, count = self._batch, self._dt, len(entities)
+        state = batch.state.read(view.numbers)
+        place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
+        asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
+        asked = asked.reshape(count, 3, 2)
+        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        near = self._way.near(batch.rows, view)
+        is_stopped = np.zeros(count, bool)
+        for _ in range(self._substeps):
+            velocity[:, 0:2] = approached_together(velocity[:, 0:2], targets[:, 0:2], rates[:, 0] * dt)
+            velocity[:, 2] = approached(velocity[:, 2], targets[:, 2], rates[:, 2] * dt)
+            turned = velocity[:, 2] * dt
+            ways = np.zeros((count, 3))
+            ways[:, 0], ways[:, 1] = way_along_arc(velocity[:, 0] * dt, velocity[:, 1] * dt, turned, heading)
+            place, shares, stops = near.free_way(place, ways)
+            is_stopped |= stops
+            heading = wrapped(heading + turned)
+        z, w = upright_turn(heading)
+        s, c = 2.0 * z * w, 1.0 - 2.0 * z * z
+        ahead, left = velocity[:, 0] * shares, velocity[:, 1] * shares
+        after = np.zeros((count, batch.state.width))
+        after[:, 0:3], after[:, 5], after[:, 6] = place, z, w
+        after[:, 7], after[:, 8] = ahead * c - left * s, ahead * s + left * c
+        after[:, 12], after[:, 13], after[:, 14:17], after[:, 17] = velocity[:, 2], heading, velocity, is_stopped
+        batch.state.write(view, after)

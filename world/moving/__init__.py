@@ -1,0 +1,1 @@
+"""What motions have in common: upright bodies, wheels, arcs, paths, and the numbers of many entities at once."""

@@ -1,0 +1,67 @@
+"""Bodies that move upright, as they meet obstacles: cylinders on their places.
+
+A model whose robots move by kinematics may say what its cylinder is by a method `upright()`; of any other it is the
+one around its body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+from foosim.world.components.entities import mounting_of
+from foosim.world.forms import registry
+from foosim.world.layout import Entity, Layout
+from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
+from foosim.world.spec import WorldSpec
+
+
+@dataclass(frozen=True, slots=True)
+class Upright:
+    """A cylinder with a vertical axis through the place of an entity: its radius, from `low` to `high` above it (m)."""
+
+    radius: float
+    low: float
+    high: float
+
+
+def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
+    """Return an entity as its model."""
+    return entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
+
+
+def stands_upright(kind: str) -> bool:
+    """Whether robots of a model move by kinematics and say what their cylinder is, and are no kit's."""
+    model = registry.find_model(kind)
+    return (
+        bool(model.motion) and not model.kit and hasattr(model.made, "upright") and "position" in (model.declared or ())
+    )
+
+
+def upright_of(model: Any) -> Upright:
+    """Return the cylinder of a model of an entity that has a body."""
+    if hasattr(model, "upright"):
+        found: Upright = model.upright()
+        return found
+    body = model.body()
+    assert body is not None, "what has no body meets nothing"
+    return around(body)
+
+
+def around(body: Body) -> Upright:
+    """Return the cylinder around the first link of a body that stands upright."""
+    radii, lows, highs = [], [], []
+    for shape in body.links[0].shapes:
+        low, high = shape_box(shape)
+        lows.append(low[2])
+        highs.append(high[2])
+        x, y, _ = shape.position
+        geometry = shape.geometry
+        is_upright = shape.orientation[0] == 0.0 and shape.orientation[1] == 0.0
+        if isinstance(geometry, Sphere) or (is_upright and isinstance(geometry, Cylinder | Capsule)):
+            radii.append(sqrt(x * x + y * y) + geometry.radius)
+        else:
+            reach_x, reach_y = max(abs(low[0]), abs(high[0])), max(abs(low[1]), abs(high[1]))
+            radii.append(sqrt(reach_x * reach_x + reach_y * reach_y))
+    return Upright(max(radii), min(lows), max(highs))

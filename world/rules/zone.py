@@ -1,0 +1,107 @@
+"""A zone on the ground: which entities with a tag are in it, before each tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+
+from pydantic import model_validator
+
+from foosim.common import units
+from foosim.common.errors import BadValue
+from foosim.common.exact_math import cos, sin
+from foosim.common.units import Quantity, custom_error
+from foosim.world.components.entities import Marked, MarkKind, RuleMounting
+from foosim.world.components.surroundings import Surroundings
+from foosim.world.components.view import View, WritableView
+from foosim.world.forms.registry import rule
+from foosim.world.forms.settings import RuleSettings, Tag
+from foosim.world.parameters.vehicles import UprightAt
+from foosim.world.placing import ORIGIN_OF_WORLD
+
+if TYPE_CHECKING:
+    from foosim.world.frame import Frame
+
+Side = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 km")]
+SIZES: Final = {"box": ("length", "width"), "circle": ("radius",)}
+"""The sizes that each shape has."""
+FULL: Final = "zone"
+
+
+class ZoneSettings(RuleSettings):
+    """Counts the entities with a `tag` whose place is in a zone, seen from above.
+
+    A box has `length` along its x and `width` along y, a circle has `radius`; `at` is the middle, and of a box its yaw.
+    The place of an entity is that of its first link.
+    """
+
+    shape: Literal["box", "circle"] = "box"
+    at: UprightAt = ORIGIN_OF_WORLD
+    length: Side | None = None
+    width: Side | None = None
+    radius: Side | None = None
+    tag: Tag
+
+    @model_validator(mode="after")
+    def _has_its_sizes(self) -> Self:
+        sizes = SIZES[self.shape]
+        for key in ("length", "width", "radius"):
+            if (getattr(self, key) is None) is (key in sizes):
+                problem = "is missing" if key in sizes else "is not one of them"
+                raise custom_error(BadValue(f"a {self.shape} has {' and '.join(sizes)}: {key} {problem}"))
+        return self
+
+
+@rule("zone", ZoneSettings, slots={"count": 1, "all_in": 1})
+class Zone:
+    """How many are in a zone (`count`), and whether all of them are, which are at least one (`all_in`)."""
+
+    mark_kinds: Final = {FULL: MarkKind("score", "zones with all in them")}
+
+    def __init__(self, settings: ZoneSettings, at: RuleMounting) -> None:
+        self._name = at.name
+        self._count, self._all_in = at.slot("count"), at.slot("all_in")
+        self._around = Surroundings(at.spec, at.layout)
+        self._entities = self._around.tagged(settings.tag)
+        self._x, self._y, _ = settings.at.position
+        self._cos, self._sin = cos(settings.at.yaw), sin(settings.at.yaw)
+        self._half = (settings.length or 0.0) / 2.0, (settings.width or 0.0) / 2.0
+        self._radius = settings.radius
+
+    def apply(self, view: WritableView) -> None:
+        """Count."""
+        inside = sum(self._has(place[0], place[1]) for place in self._places(view))
+        view.write(self._count, float(inside))
+        view.write(self._all_in, float(0 < inside == len(self._entities)))
+
+    def _places(self, view: View) -> Iterator[tuple[float, float, float]]:
+        for entity in self._entities:
+            place = self._around.position(view, entity)
+            if place is not None:
+                yield place
+
+    def _has(self, x: float, y: float) -> bool:
+        """Whether a place is in the zone, its edge with it."""
+        east, north = x - self._x, y - self._y
+        if self._radius is not None:
+            return east * east + north * north <= self._radius * self._radius
+        along, across = east * self._cos + north * self._sin, north * self._cos - east * self._sin
+        return abs(along) <= self._half[0] and abs(across) <= self._half[1]
+
+    def status(self, view: View) -> dict[str, Any]:
+        """Return how many are in the zone and how many there are, and whether that is all."""
+        (count,), (all_in,) = view.read(self._count), view.read(self._all_in)
+        found = {"in": int(count), "of": len(self._entities), "all_in": bool(all_in)}
+        return {f"zone {self._name}": found}
+
+    @staticmethod
+    def text(status: dict[str, Any]) -> str:
+        """Return `goal: 2 of 3 in the zone`, for all zones of a world."""
+        zones = {key.partition(" ")[2]: its for key, its in status.items() if key.startswith("zone ")}
+        return ", ".join(f"{its['in']} of {its['of']} in the zone {name}" for name, its in zones.items())
+
+    def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
+        """Yield that all are in it from then on."""
+        field = f"{self._name}.all_in"
+        if before.at("world", field) == 0.0 < after.at("world", field):
+            yield after.tick, FULL, f"all are in the zone {self._name}"

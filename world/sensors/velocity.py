@@ -1,0 +1,55 @@
+"""How fast a place on a robot moves, and how fast it turns."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta, Struct
+
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.view import Mounting, View
+from foosim.world.forms.quantities import MetresPerSecond
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+from foosim.world.placing import FIRST_LINK, MountedAt
+from foosim.world.scene import rotate
+
+RadiansPerSecond = Annotated[float, Meta(extra={"unit": "rad/s"})]
+
+
+class VelocitySettings(SensorSettings):
+    """How fast the mount of the sensor moves and turns, in the `frame` of the mount itself or of the world."""
+
+    at: MountedAt = FIRST_LINK
+    frame: Literal["own", "world"] = "own"
+
+
+class Velocity(Struct, frozen=True):
+    """The velocity of a place, and how fast what it is fixed to turns about each axis."""
+
+    x: MetresPerSecond
+    y: MetresPerSecond
+    z: MetresPerSecond
+    angular_x: RadiansPerSecond
+    angular_y: RadiansPerSecond
+    angular_z: RadiansPerSecond
+
+    groups: ClassVar = {"linear": ("x", "y", "z"), "angular": ("angular_x", "angular_y", "angular_z")}
+
+
+@sensor("velocity", VelocitySettings, Velocity, needs=("position", "orientation", "linear_velocity"))
+class VelocitySensor:
+    """Velocity and turn rate of the mount: as it moves over the ground, with what the wheels slip."""
+
+    def __init__(self, settings: VelocitySettings, at: Mounting) -> None:
+        """Raises BadValue for a link that the robot does not have."""
+        self._mounted = Mounted(at, settings.at)
+        self._is_own = settings.frame == "own"
+
+    def sample(self, view: View) -> Velocity:
+        linear, angular = self._mounted.twist(view.numbers)
+        if self._is_own:
+            _, (x, y, z, w) = self._mounted.pose(view.numbers)
+            back = (-x, -y, -z, w)
+            linear, angular = rotate(back, linear), rotate(back, angular)
+        return Velocity(*linear, *angular)
