@@ -91,6 +91,8 @@ class NodeCore:
         """Why no run can continue here: a component has raised."""
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
+        self.is_watched = False
+        """Whether forms that write to the frame otherwise than by their views are errors: a check asks for that."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -141,6 +143,8 @@ class NodeCore:
             if channel.name not in self._readers:
                 raise Malformed(f"a node does not read the channel {channel.name}")
             self._readers[channel.name](self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
+        except ComponentError as error:
+            self.fail(error)
         except Malformed as error:
             self._refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
@@ -230,7 +234,7 @@ class NodeCore:
         assert self.deployment is not None
         stepper = self._steppers.get(layout.digest)
         if stepper is None:
-            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout)
+            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout, is_watched=self.is_watched)
         return stepper
 
     def make_anew(self) -> None:

@@ -20,6 +20,7 @@ from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
+from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -51,10 +52,12 @@ class Work:
 class Stepper:
     """The pure step of one deployment and layout: everything a tick needs but the engine."""
 
-    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+    def __init__(self, deployment: Deployment, layout: Layout, *, is_watched: bool = False) -> None:
+        """`is_watched`: forms that write to the frame otherwise than by their views are errors."""
         self.deployment = deployment
         self.layout = layout
-        self.world = World(deployment, layout)
+        self.world = World(deployment, layout, is_watched=is_watched)
+        self._is_watched = is_watched
         self.substeps = deployment.substeps
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
@@ -81,7 +84,7 @@ class Stepper:
         tick, outboxes, numbers = frame.tick, frame.outboxes, frame.numbers
         awake = [robot for robot in robots if numbers[robot.offsets["down"]] == 0.0]
         due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick, numbers)] for robot in awake}
-        view = SensingView(tick, numbers, frame.values)
+        view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = iter(self._sensing.sample([one for sensors in due.values() for one in sensors], view))
         for robot in awake:
             sends: list[tuple[str, str, bytes]] = []
@@ -107,7 +110,7 @@ class Stepper:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
         is_same = layout is self.layout or layout.digest == self.layout.digest
-        world = self.world if is_same else World(self.deployment, layout)
+        world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)
         world.apply_rules(numbers, frame.tick)
         return layout, numbers
 
@@ -177,8 +180,13 @@ class Stepper:
             view = View(work.tick, numbers, start=start)
             driven = [entity for entity in rigid if entity.index in world.actuators]
             engine.load(rigid, numbers)
-            engine.command(driven, world.motors(driven, view))
-            engine.step(self.substeps)
+            asked = world.motors(driven, view)
+            try:
+                engine.command(driven, asked)
+                engine.step(self.substeps)
+            except Exception:
+                world.check_motors(driven, asked, work.tick)
+                raise
             engine.read(rigid, numbers)
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick)

@@ -17,7 +17,7 @@ import pytest
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.component_check import broken_laws, used_form
+from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, used_form
 from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
@@ -288,6 +288,21 @@ def test_a_sensor_without_one_finite_reading_is_found(planted: Path, value: str,
     """One that has none at times is as it should be."""
     source = SENSOR.format(value=value).replace("view.write(self.kept", "(self.kept")
     assert broken(planted, source, OF_ROD) == said
+
+
+def test_readings_that_were_not_finite_or_none_are_noted(planted: Path) -> None:
+    """They may be meant, so that nothing is broken; a sensor that gives none was not compared."""
+    source = SENSOR.format(value="1.0 if view.tick % 10 else float('inf')").replace(
+        "view.write(self.kept", "(self.kept"
+    )
+    (planted / "own_form.py").write_text(HEAD + source)
+    drops = "robots.red.attack.sensors.encoder.modifiers=[{kind: drop_out, probability: 100 %}]"
+    check = ComponentCheck(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, drops]), TABLE.name, 40)
+    assert list(check.broken()) == [] and check.compared == check.sensors - 1
+    assert check.notes == [
+        "sensor encoder of red.attack never gives a reading: its modifiers drop each of 8",
+        "sensor own of red.goal has a number that is not finite in 4 of its 8 readings",
+    ]
 
 
 def test_the_end_says_how_many_sensors_were_compared(planted: Path) -> None:

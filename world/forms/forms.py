@@ -142,9 +142,9 @@ class Component(Form):
             return self.slots
         try:
             found: Any = self.slots(settings, carrier)
-        except BadValue:
+        except (BadValue, KeyboardInterrupt):
             raise
-        except Exception as error:
+        except BaseException as error:  # SystemExit, too: a function may do anything
             raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", self.name) from error
         problem = slots_problem(found, is_sensor=self.form == "sensor")
         if problem:
