@@ -84,10 +84,10 @@ def _is_own(frame: FrameType, module: str) -> bool:
     if package == OURS:
         return False
     file = frame.f_code.co_filename
-    return package == module.partition(".")[0] or not (file.startswith("<") or _in_library(file))
+    return package == module.partition(".")[0] or not (file.startswith("<") or in_library(file))
 
 
-def _in_library(file: str) -> bool:
+def in_library(file: str) -> bool:
     """Whether a file is one of Python's own modules or of an installed package."""
     import sysconfig  # takes longer than all else here, and few processes ask
 
