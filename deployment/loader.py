@@ -53,7 +53,7 @@ from foosim.deployment.text.yaml import (
 from foosim.deployment.timing_checks import check_timing
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
-from foosim.world.layout import doubled_slots
+from foosim.world.layout import doubled_slots, unheard
 
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
@@ -280,7 +280,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-        between = first(doubled_slots(deployment)) or first(_trial_findings(deployment))
+        between = first(doubled_slots(deployment)) or first(unheard(deployment)) or first(_trial_findings(deployment))
         between = between or first(findings_of(deployment), rules, place_findings(deployment))
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]

@@ -15,7 +15,7 @@ from typing import Final
 import pytest
 
 from foosim.cli.rehearse import elsewhere
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, used_form
 from foosim.rehearsal.check.differences import Frames
@@ -256,6 +256,65 @@ def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) 
     assert sum(touched.values()) > 0, "the ball meets a rod"
     last = frames.frames[-1]
     assert {rod: last.at(rod, "own.samples") for rod in rods} == {rod: 1.0 + touched[rod] for rod in rods}
+
+
+ALARMS: Final = """
+
+@sensor("own", Settings, Number, slots={"alarm": 1}, speaks="SPEAKS")
+class Own:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def sample(self, view):
+        view.write(self.alarm, float(view.tick % 10 == 0))
+        return Number(0.0)
+
+
+class Alarming(EntityRuleSettings):
+    pass
+
+
+@entity_rule("own", Alarming, slots={"alarm": 1})
+class Alarms:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def apply(self, view):
+        view.write(self.alarm, float(view.tick % 7 == 0))
+"""
+HEARD: Final = {
+    "alarm": [*range(0, 31, 5), 1, 11, 21],
+    "beeps.alarm": [*range(0, 31, 5), 1, 8, 15, 22, 29],
+}
+
+
+@pytest.mark.parametrize("speaks", HEARD)
+def test_a_sensor_speaks_by_a_slot_of_its_own_or_of_a_rule(planted: Path, speaks: str) -> None:
+    """Its own slot is set for the tick after the one at which it measures, a rule's for the tick after it applied."""
+    head = HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+        "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+    )
+    (planted / "own_form.py").write_text(head + ALARMS.replace("SPEAKS", speaks))
+    rules = "robots.red.goal.rules={beeps: {kind: 'own_form:Alarms'}}"
+    frames = Frames()
+    done = rehearse(TABLE.read_text(), TABLE.name, 31, 2, [*SETS, OF_ROD, rules], Settings(on_commit=frames))
+    assert not done.json["failed"]
+    measured = [frame.at("red.goal", "own.samples") for frame in frames.frames]
+    ticks = [tick for tick, (before, now) in enumerate(zip([0.0, *measured], measured, strict=False)) if now > before]
+    assert ticks == sorted(set(HEARD[speaks]))
+
+
+def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path) -> None:
+    (planted / "own_form.py").write_text(
+        HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+            "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+        )
+        + ALARMS.replace("SPEAKS", "beeps.alarm")
+    )
+    with pytest.raises(
+        DeploymentError, match=r"speaks by beeps\.alarm, which red\.goal does not have: it is a slot of"
+    ):
+        load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "seed=5"]), TABLE.name)
 
 
 # --- the command -----------------------------------------------------------------------------------------------------

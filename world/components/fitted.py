@@ -26,7 +26,7 @@ from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import FLOAT, PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, least_period_ns, modifier_labels
+from foosim.world.layout import Entity, Layout, least_period_ns, modifier_labels, slot_that_speaks
 from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
@@ -200,7 +200,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(settings.kind, "sensor"),
                 modifiers,
                 0 if numbers is None else numbers.size,
-                robot.offsets[component.speaks] if component.speaks else -1,
+                robot.offsets[slot_that_speaks(robot, channel, component.speaks)] if component.speaks else -1,
             )
         )
     return tuple(fitted)

@@ -122,7 +122,8 @@ class Component(Form):
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
     that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
     reading has, if it has several. `moves` says that an actuator commands the motors of its robot: one of a robot may.
-    `speaks` is a field of the robot: a sensor also measures at each tick at whose start its first number is not 0.
+    `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
+    tick at whose start its first number is not 0.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
     """

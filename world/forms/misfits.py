@@ -78,7 +78,7 @@ def component_problems(form: Form, model: Model) -> Iterator[str]:
     """Yield what a robot of a model does not have that a component or rule of it needs."""
     word = word_of(form.form)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and form.speaks and form.speaks not in needs:
+    if isinstance(form, Component) and _speaks_by_model(form) and form.speaks not in needs:
         needs = (*needs, form.speaks)
     missing = [field for field in needs if field not in model.slots]
     if missing:
@@ -92,6 +92,12 @@ def component_problems(form: Form, model: Model) -> Iterator[str]:
         yield f"{word} that writes {', '.join(written)}: {fields_of(model, written)}"
     if not model.is_solved:
         yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
+
+
+def _speaks_by_model(sensor: Component) -> bool:
+    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`layout.unheard`)."""
+    is_own = callable(sensor.slots) or sensor.speaks in sensor.slots
+    return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
 
 
 def rule_problems(rule: WorldRule) -> Iterator[str]:
