@@ -20,6 +20,7 @@ from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.check.component_check import ComponentCheck
 from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
@@ -340,6 +341,21 @@ def test_a_form_that_leaves_ends_a_rehearsal_in_order(world: World) -> None:
     world.module.acts["sensor"] = leave
     done = rehearse(world.text, TABLE.name, 40, 2).json
     assert done["failed"] and f"{OWN} failed at tick 25: SystemExit: 0 (" in done["reason"] and done["ticks"] <= TICK
+
+
+def test_the_result_and_the_supervisors_log_have_form_and_traceback(world: World) -> None:
+    world.module.acts["sensor"] = fails
+    logged: list[str] = []
+    settings = Settings(on_log=lambda process, level, text: logged.append(text) if process == "supervisor" else None)
+    done = rehearse(world.text, TABLE.name, 40, 2, settings=settings).json
+    form = done["failed_form"]
+    assert (form["entity"], form["component"], form["tick"]) == ("red.goal", "sensor own", TICK)
+    assert form["traceback"].startswith("Traceback") and form["traceback"].endswith("ValueError: no more\n")
+    assert any(form["traceback"] in text for text in logged)
+
+
+def test_a_run_without_such_a_form_has_none(world: World) -> None:
+    assert rehearse(world.text, TABLE.name, 5, 1).json["failed_form"] is None
 
 
 COMMANDS: Final = {
