@@ -13,7 +13,6 @@ from contextlib import suppress
 from functools import cache
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec, resolve_name
-from pathlib import Path
 from typing import Any
 
 from foosim.world.forms.failures import OURS, in_library
@@ -111,7 +110,8 @@ def _folder(top: str) -> str:
     if spec is None:
         return ""
     places = [*(spec.submodule_search_locations or ())]
-    return str(Path(places[0] if places else spec.origin or "").parent) if places or spec.has_location else ""
+    place = places[0] if places else (spec.origin or "") if spec.has_location else ""
+    return place.rpartition("/")[0]
 
 
 @cache
