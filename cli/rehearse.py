@@ -235,6 +235,8 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
             raise
     if not is_broken:
         print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
+    for note in check.notes:
+        print(f"{label}: {note}")
     if not check.has_failed:
         print(f"{label}: {check.compared} of {check.sensors} sensors measured, and were compared alone and with others")
     return FAILED if is_broken else DONE

@@ -46,6 +46,10 @@ class BadValue(Refused):
         self.nearest = nearest
 
 
+class NotFinite(BadValue):
+    """A number in a value is not finite."""
+
+
 def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
     """Return `read` of a text; a BadValue that it raises names the place, such as an option."""
     try:

@@ -94,7 +94,9 @@ def _kits(view: View) -> Iterator[Finding]:
         check = getattr(kit.made, "check", None)
         try:
             yield from [*check(view)] if check is not None else []
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # SystemExit, too: a kit may do anything
             if kit.module.startswith(OWN):
                 raise
             yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", key, at="key")

@@ -338,7 +338,9 @@ def _unfit(
             check(settings, numbers)
     except BadValue as error:
         yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
-    except Exception as error:  # noqa: BLE001  # of whoever wrote the modifier
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # noqa: BLE001  # of whoever wrote the modifier
         yield Finding(place, f"its check failed: {type(error).__name__}: {error}", settings.kind)
     else:
         yield from _unknown_slots(component, settings, carrier, place)

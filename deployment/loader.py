@@ -55,7 +55,7 @@ from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
-from foosim.world.layout import doubled_slots
+from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32
@@ -294,7 +294,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-        between = first(doubled_slots(deployment)) or first(_trial_findings(deployment))
+        between = first(doubled_slots(deployment)) or first(unheard(deployment)) or first(_trial_findings(deployment))
         placed = place_findings(deployment)
         between = between or first(
             findings_of(deployment), _start_findings(deployment), rules, placed, unfit_components(deployment)

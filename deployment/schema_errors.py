@@ -77,6 +77,9 @@ def settings_findings(error: ValidationError, settings: type[BaseModel], under: 
     for detail in error.errors(include_url=False):
         if _is_cause(detail):
             finding = _finding(detail, detail["loc"], root)
+            if finding.what == UNKNOWN and finding.nearest is None:
+                valid = ", ".join(root.follow(detail["loc"][:-1])[1].get("properties", ()))
+                finding = replace(finding, what=f"{UNKNOWN} (there are: {valid or 'none'})")
             yield replace(finding, location=(*under, *finding.location))
 
 
@@ -84,7 +87,11 @@ def _with_failures(finding: Finding) -> Finding:
     """Return the finding of a key that no kit has with why packages, of which one might, could not be imported."""
     if finding.what != UNKNOWN or len(finding.location) > 1:
         return finding
-    return replace(finding, what="; ".join([UNKNOWN, *registry.load_entry_points()]))
+    failures = registry.load_entry_points()
+    key = finding.location[-1]
+    if not failures and finding.nearest is None and isinstance(key, str) and names.is_name(key):
+        failures = ["no package that is installed here has a kit of this name"]
+    return replace(finding, what="; ".join([UNKNOWN, *failures]))
 
 
 def _is_cause(detail: ErrorDetails) -> bool:

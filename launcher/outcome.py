@@ -33,6 +33,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     "capture": None,
     "reason": None,
     "failed": True,
+    "failed_form": None,
 }
 
 

@@ -34,6 +34,7 @@ from foosim.protocol.messages import (
     Deliveries,
     End,
     Epoch,
+    FailedForm,
     Heartbeat,
     Order,
     Part,
@@ -78,6 +79,11 @@ class _Term:
     mine: tuple[Entity, ...]
 
 
+def _sendable(text: str) -> str:
+    """Return a text without what UTF-8 does not have: an error of a user's code may say anything."""
+    return text.encode(errors="replace").decode()
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NodeCore:
     """One node's state machine. `actions` are performed next by the shell, `work` is solved next."""
@@ -89,8 +95,11 @@ class NodeCore:
         self.work: Work | None = None
         self.failure = ""
         """Why no run can continue here: a component has raised."""
+        self._failed: FailedForm | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
+        self.is_watched = False
+        """Whether forms that write to the frame otherwise than by their views are errors: a check asks for that."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -141,6 +150,8 @@ class NodeCore:
             if channel.name not in self._readers:
                 raise Malformed(f"a node does not read the channel {channel.name}")
             self._readers[channel.name](self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
+        except ComponentError as error:
+            self.fail(error)
         except Malformed as error:
             self._refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
@@ -165,9 +176,11 @@ class NodeCore:
 
     def fail(self, error: ComponentError) -> None:
         """A component has raised: compute no more, and have the run end, since the next owner would meet it, too."""
-        self.failure = str(error)[: limits.TEXT_LENGTH_MAX]
+        self.failure = _sendable(str(error))[: limits.TEXT_LENGTH_MAX]
         self.work = None
-        trace = "".join(traceback.format_exception(error.cause))
+        trace = _sendable("".join(traceback.format_exception(error.cause)))
+        component, end = error.component[: limits.TEXT_LENGTH_MAX], trace[-limits.TEXT_LENGTH_MAX :]
+        self._failed = FailedForm(error.entity, component, error.tick, end)
         self.actions.append(Log("error", f"{error}\n{trace}"))
         self.actions.append(Publish(channels.HEARTBEAT, self.name, encode(self._heartbeat())))
 
@@ -230,7 +243,7 @@ class NodeCore:
         assert self.deployment is not None
         stepper = self._steppers.get(layout.digest)
         if stepper is None:
-            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout)
+            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout, is_watched=self.is_watched)
         return stepper
 
     def make_anew(self) -> None:
@@ -539,4 +552,5 @@ class NodeCore:
         not_finite = sum((stepper.not_finite for stepper in self._steppers.values()), Counter[str]())
         counts = {"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender(), "not_finite": not_finite}
         report = encode_json(counts)
-        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, self.failure, self.busy, report)
+        lacks, lost = self.waiting_for, self.failure
+        return Heartbeat(self.name, tick, self.epoch, lacks, lost, self.busy, report, self._failed)

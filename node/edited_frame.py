@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
+from typing import Any
 
 from foosim.world.assembly.world import body_of, model_of
 from foosim.world.components.fitted import actuators_of
-from foosim.world.components.view import WritableView
+from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after, removed
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
@@ -23,7 +24,9 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, 
     view = WritableView(frame.tick, numbers)
     for change in fitting_edits(frame.layout, edits):
         if isinstance(change, Add) and change.name in layout:
-            model_of(spec, layout, layout[change.name]).place_at(view, change.position, change.velocity)  # type: ignore[attr-defined]
+            made: Any = model_of(spec, layout, layout[change.name])
+            what = f"model {change.model}"
+            called(what, change.name, view.tick, made.place_at, view, change.position, change.velocity)
         elif isinstance(change, Push) and change.name in layout:
             _push(numbers, layout, change, spec)
         elif isinstance(change, Freeze | Thaw):
@@ -71,10 +74,7 @@ def _take_out(view: WritableView, numbers: list[float], spec: WorldSpec, layout:
     robot = layout[change.name]
     numbers[robot.offsets["down"]] = float(isinstance(change, Freeze))
     for one in actuators_of(spec, layout, robot):
-        try:
-            one.actuator.hold(view)
-        except Exception as error:
-            raise one.failed(view.tick, error) from error
+        called(f"actuator {one.channel}", robot.name, view.tick, one.actuator.hold, view)
         for field, at in robot.offsets.items():
             if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
                 numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

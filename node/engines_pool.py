@@ -65,6 +65,10 @@ class Solver:
         except StopIteration as end:
             self._building = None
             self._take(layout, end.value)
+        except ComponentError as error:
+            self._building = None
+            self._told += 1
+            self._core.fail(error)
         return True
 
     @property
@@ -96,12 +100,15 @@ class Solver:
 
     def rebuild(self) -> None:
         """Replace every engine, and all that computes beside it, by new ones: nothing that matters is lost."""
-        self._core.make_anew()
-        for layout in self._core.layouts_wanted:
-            old = self._engines.pop(layout.digest, None)
-            if old is not None:
-                old.close()
-                self._engines[layout.digest] = self._make(layout)
+        try:
+            self._core.make_anew()
+            for layout in self._core.layouts_wanted:
+                old = self._engines.pop(layout.digest, None)
+                if old is not None:
+                    old.close()
+                    self._engines[layout.digest] = self._make(layout)
+        except ComponentError as error:
+            self._core.fail(error)
 
     def _make(self, layout: Layout) -> AnyEngine:
         """Build an engine at once."""

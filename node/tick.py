@@ -22,6 +22,7 @@ from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
+from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -55,10 +56,12 @@ class Work:
 class Stepper:
     """The pure step of one deployment and layout: everything a tick needs but the engine."""
 
-    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+    def __init__(self, deployment: Deployment, layout: Layout, *, is_watched: bool = False) -> None:
+        """`is_watched`: forms that write to the frame otherwise than by their views are errors."""
         self.deployment = deployment
         self.layout = layout
-        self.world = World(deployment, layout)
+        self.world = World(deployment, layout, is_watched=is_watched)
+        self._is_watched = is_watched
         self.substeps = deployment.substeps
         self.rest = Rest(deployment, layout)
         self._by_island = layout.couples
@@ -87,7 +90,7 @@ class Stepper:
         tick, outboxes, numbers = frame.tick, frame.outboxes, frame.numbers
         awake = [robot for robot in robots if numbers[robot.offsets["down"]] == 0.0]
         due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick, numbers)] for robot in awake}
-        view = SensingView(tick, numbers, frame.values)
+        view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = iter(self._sensing.sample([one for sensors in due.values() for one in sensors], view))
         for robot in awake:
             sends: list[tuple[str, str, bytes]] = []
@@ -113,7 +116,7 @@ class Stepper:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
         is_same = layout is self.layout or layout.digest == self.layout.digest
-        world = self.world if is_same else World(self.deployment, layout)
+        world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)
         world.apply_rules(numbers, frame.tick)
         if edits or world.has_rules:
             wake_edited(frame, layout, numbers)
@@ -197,8 +200,13 @@ class Stepper:
         view = View(work.tick, numbers, start=start)
         driven = [entity for entity in bodies if entity.index in world.actuators]
         engine.load(bodies, numbers)
-        engine.command(driven, world.motors(driven, view))
-        engine.step(self.substeps)
+        asked = world.motors(driven, view)
+        try:
+            engine.command(driven, asked)
+            engine.step(self.substeps)
+        except Exception:
+            world.check_motors(driven, asked, work.tick)
+            raise
         engine.read(bodies, numbers)
 
     def _solve_islands(self, engine: IslandEngine, work: Work, start: Sequence[float]) -> None:

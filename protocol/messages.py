@@ -28,6 +28,16 @@ class FormVersion(Item, frozen=True):
     version: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
 
 
+class FailedForm(Item, frozen=True):
+    """A form has raised: which `component` of which `entity` (empty of what is none's alone), at which tick, and the
+    end of its traceback."""
+
+    entity: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
+    component: Text
+    tick: Counter
+    traceback: Text
+
+
 class Order(Message, frozen=True):
     """Permission to compute `tick`, with its edits, and the `following` ticks, without edits."""
 
@@ -128,7 +138,7 @@ the run has ended and that the vHub closes the capture."""
 class Heartbeat(Message, frozen=True):
     """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` is the reason why the
     run cannot continue (a client is lost, a component has raised), `busy` is its load (0 to 1), `report` is JSON for
-    display.
+    display, `failed` the form that has raised.
 
     The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 
@@ -139,6 +149,7 @@ class Heartbeat(Message, frozen=True):
     lost: Text
     busy: float
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
+    failed: FailedForm | None = None
 
 
 # --- simulation plane: membership -----------------------------------------------------------------------------------
@@ -229,11 +240,12 @@ class Tempo(Message, frozen=True):
 
 
 class End(Message, frozen=True):
-    """The run is over after `tick` ticks."""
+    """The run is over after `tick` ticks; `form` is the one that has raised, where that is why."""
 
     tick: Counter
     reason: Text
     failed: bool
+    form: FailedForm | None = None
 
 
 class Farewell(Message, frozen=True):

@@ -88,6 +88,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    is_watched: bool = False
+    """Whether forms that write to the frame otherwise than by their views are errors."""
     keeps_journals: bool = False
     """Whether the supervisor's journal is kept, so that it can be restarted."""
     restart_ns: int = 0

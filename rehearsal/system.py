@@ -139,6 +139,7 @@ class System:
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
+        core.is_watched = self.settings.is_watched
         # The processes of a rehearsal are one: the small run of one node is that of all.
         solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 

@@ -24,6 +24,7 @@ from foosim.protocol.messages import (
     Commit,
     Deliveries,
     End,
+    FailedForm,
     Farewell,
     Fetch,
     Heartbeat,
@@ -203,7 +204,7 @@ class SupervisorCore:
         self.closing.on_standstill(stood_ns, now_ns)
         self.failover.on_standstill(stood_ns)
 
-    def finish(self, reason: str, failed: bool, tick: int | None = None) -> None:
+    def finish(self, reason: str, failed: bool, tick: int | None = None, form: FailedForm | None = None) -> None:
         """End the run in order, once: at the last committed tick, or at an earlier one that is the last in the capture.
 
         A run that was only resumed is abandoned.
@@ -215,7 +216,7 @@ class SupervisorCore:
             state.finished = True
             state.log("error", f"the run does not go on from tick {state.frame.tick}: {reason}")
             return
-        state.end = End(state.frame.tick if tick is None else tick, reason, failed)
+        state.end = End(state.frame.tick if tick is None else tick, reason, failed, form)
         self.closing.ended(self.progress.now_ns)
         state.log("error" if failed else "info", f"run ends at tick {state.frame.tick}: {reason}")
         state.journal(state.end)
@@ -482,7 +483,14 @@ class SupervisorCore:
             if is_hub:
                 state.publish_tempo()
         if heartbeat.lost and state.end is None and (is_hub or self._is_of_now(heartbeat)):
-            self.fail(heartbeat.lost)
+            self._fail_by(heartbeat)
+
+    def _fail_by(self, heartbeat: Heartbeat) -> None:
+        """A process has said why the run cannot go on; the traceback of a form that has raised is logged here, too."""
+        form = heartbeat.failed
+        if form is not None:
+            self.state.log("error", f"{heartbeat.lost}\n{form.traceback}")
+        self.finish(heartbeat.lost, failed=True, form=form)
 
     def _is_of_now(self, heartbeat: Heartbeat) -> bool:
         """Whether a node's heartbeat is of the present epoch, at a tick that a node can have reached."""

@@ -30,6 +30,7 @@ from foosim.supervisor.records import RequestRecord, asked
 from foosim.supervisor.state import RunState
 from foosim.supervisor.viewing import Viewing, chosen
 from foosim.world.assembly.world import addition, body_of
+from foosim.world.components.view import ComponentError
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.world.layout import Layout
 
@@ -224,10 +225,13 @@ class Requests:
             raise Refused(f"name {show(name)} is taken; taken are {', '.join(sorted(taken))}")
         if len(taken) >= limits.ENTITIES_MAX:
             raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
-        usual, check = addition(self._state.deployment, layout, name, model)
-        position = _vector(arguments, "position", usual)
-        velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
-        check(position, velocity)
+        try:
+            usual, check = addition(self._state.deployment, layout, name, model)
+            position = _vector(arguments, "position", usual)
+            velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
+            check(position, velocity)
+        except ComponentError as error:
+            raise Refused(str(error)) from error
         self._wait_for_engines(request, Add(name, model, position, velocity))
 
     def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:

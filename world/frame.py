@@ -36,6 +36,7 @@ class Frame:
         assert values.dtype == np.float64 and values.flags.c_contiguous
         self.tick = tick
         self.layout = layout
+        values.setflags(write=False)  # forms get it
         self.values = values
         self.numbers: list[float] = values.tolist()
         """The values as Python floats; whoever edits copies the list first."""
@@ -44,6 +45,7 @@ class Frame:
 
     def take(self, values: NDArray[np.float64]) -> None:
         """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
+        values.setflags(write=False)
         self.values, self.numbers, self._digest = values, values.tolist(), b""
 
     @property

@@ -362,6 +362,27 @@ def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings
     return spec.tick_ns if sensor.speaks else spec.schedule(settings).least_ticks * spec.tick_ns
 
 
+def slot_that_speaks(robot: Entity, channel: str, field: str) -> str:
+    """Return the slot of a robot that makes a sensor of it measure: its own, else the robot's."""
+    own = f"{channel}.{field}"
+    return own if robot.offsets.get(own, -1) >= robot.split else field
+
+
+def unheard(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the sensors that speak by a slot that their robot does not have."""
+    layout: Layout | None = None
+    for name, robot in spec.robots.items():
+        for channel, settings in robot.sensors.items():
+            speaks = registry.find_component("sensor", settings.kind).speaks
+            if not speaks:
+                continue
+            layout = layout or build_layout(spec)
+            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
+                valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
+                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
+                yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
+
+
 def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:
     """Return the slots of a robot that are not of its model."""
     solver: dict[str, int] = {}

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from foosim.common.names import CHANNEL_ECHO
 from foosim.world.forms import registry
 from foosim.world.frame import Frame
+from foosim.world.layout import slot_that_speaks
 from foosim.world.robot_packets import Delivered
 from foosim.world.spec import WorldSpec
 
@@ -24,13 +25,13 @@ class Sampling:
         self._schedules = tuple(sorted({spec.schedule(sensor) for sensor in sensors}))
         self._speaking = sorted(
             {
-                (name, speaks)
+                (name, channel, speaks)
                 for name, robot in spec.robots.items()
-                for sensor in robot.sensors.values()
+                for channel, sensor in robot.sensors.items()
                 if (speaks := registry.find_component("sensor", sensor.kind).speaks)
             }
         )
-        """Robots, and the field of each that makes a sensor of it measure."""
+        """Robots with a sensor that speaks, its channel, and the field that makes it measure."""
         self._layout = b""
         self._places: list[int] = []
 
@@ -52,7 +53,11 @@ class Sampling:
         layout = frame.layout
         if layout.digest != self._layout:
             self._layout = layout.digest
-            self._places = [layout[name].offsets[field] for name, field in self._speaking if name in layout]
+            self._places = [
+                layout[name].offsets[slot_that_speaks(layout[name], channel, field)]
+                for name, channel, field in self._speaking
+                if name in layout
+            ]
         return any(frame.numbers[place] != 0.0 for place in self._places)
 
 

@@ -28,6 +28,7 @@ from foosim.rehearsal.check.differences import (
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.assembly.used_forms import forms_of
+from foosim.world.components.view import ComponentError
 from foosim.world.forms.forms import Form
 from foosim.world.frame import Frame
 
@@ -93,6 +94,8 @@ class ComponentCheck:
     compared: int = 0
     has_failed: bool = False
     """How many sensors the deployment has, of how many readings were compared, whether it does not even run."""
+    notes: list[str] = field(default_factory=list)
+    """What breaks no law, and may be meant."""
 
     def __post_init__(self) -> None:
         self._begun = 0
@@ -109,7 +112,7 @@ class ComponentCheck:
     def broken(self) -> Iterator[str]:
         """Yield which laws the deployment's forms break, in words, as each is found."""
         self.begin("on one node")
-        first, alone = self._rehearsed(self.text, 1)
+        first, alone = self._rehearsed(self.text, 1, is_watched=True)
         self.has_failed = first.json["failed"]
         if self.has_failed:
             yield str(first.json["reason"])
@@ -124,8 +127,14 @@ class ComponentCheck:
                 yield f"{shared} the world is another one: {where}"
         senses = Senses(self.text, self.name, self.files)
         readings = Readings()
-        yield from alone_and_together(senses, alone, readings)
-        self.sensors, self.compared = senses.count, len(readings.sampled)
+        try:
+            yield from alone_and_together(senses, alone, readings)
+        except ComponentError as error:
+            self.has_failed = True
+            yield str(error)
+            return
+        self.notes += readings.notes()
+        self.sensors, self.compared = senses.count, sum(count > 0 for count in readings.given.values())
         for what, other in self._changed:
             self.begin(what.removesuffix(","))
             beside, frames = self._rehearsed(other, 1)
@@ -135,10 +144,10 @@ class ComponentCheck:
                 yield f"{what} the world is another one: {where or beside.json['reason']}"
 
     def _rehearsed(
-        self, text: str, nodes: int, prepare: Callable[[System], None] | None = None
+        self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_watched: bool = False
     ) -> tuple[Rehearsed, list[Frame]]:
         frames = Frames()
-        settings = Settings(on_commit=frames)
+        settings = Settings(on_commit=frames, is_watched=is_watched)
         return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames.frames
 
 

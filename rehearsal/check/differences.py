@@ -10,6 +10,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
+from foosim.world.components.watching import ReadOnly
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 
@@ -71,10 +72,12 @@ class Senses:
 
 @dataclass
 class Readings:
-    """How often each sensor was sampled, and how often a number of that was not finite, by what it is called."""
+    """How often each sensor was sampled, how often a number of that was not finite and how often there was a reading,
+    by what it is called."""
 
     sampled: Counter[str] = field(default_factory=Counter)
     not_finite: Counter[str] = field(default_factory=Counter)
+    given: Counter[str] = field(default_factory=Counter)
 
     def bad(self) -> Iterator[str]:
         """Yield the sensors of which no reading is one."""
@@ -82,21 +85,34 @@ class Readings:
             if self.not_finite[label] == count:
                 yield f"{label} has a number that is not finite in each of its {count} readings"
 
+    def notes(self) -> Iterator[str]:
+        """Yield what may be as it is meant: readings that were not finite, sensors whose readings were all dropped."""
+        for label, count in self.sampled.items():
+            if 0 < self.not_finite[label] < count:
+                yield f"{label} has a number that is not finite in {self.not_finite[label]} of its {count} readings"
+            elif not self.given[label] and not self.not_finite[label]:
+                yield f"{label} never gives a reading: its modifiers drop each of {count}"
+
 
 def alone_and_together(senses: Senses, frames: Sequence[Frame], readings: Readings) -> Iterator[str]:
-    """Yield the sensors whose readings are others beside their like than alone, and those that never give any."""
+    """Yield the sensors whose readings are others beside their like than alone, and those that never give any.
+
+    Raises ComponentError.
+    """
     told: set[str] = set()
     for frame in frames:
         due = senses.due(frame)
-        view = SensingView(frame.tick, frame.numbers, frame.values)
+        numbers = ReadOnly(frame.numbers)
+        view = SensingView(frame.tick, numbers, frame.values)
         together = Sensing().sample(due, view)
         readings.sampled.update(map(_label, due))
         readings.not_finite.update(map(_label, view.not_finite))
         for one, payload in zip(due, together, strict=True):
-            its = SensingView(frame.tick, frame.numbers, frame.values)
+            its = SensingView(frame.tick, numbers, frame.values)
             (alone,) = Sensing().sample([one], its)
             written = {at: number for at, number in its.written.items() if view.written.get(at) != number}
             label = _label(one)
+            readings.given[label] += payload is not None
             if (alone != payload or written) and label not in told:
                 told.add(label)
                 yield f"{label} gives another reading alone than with others, at tick {frame.tick}"

@@ -12,8 +12,12 @@ from typing import Any, Final
 import pytest
 from jsonschema import Draft202012Validator
 
+from foosim.cli.components import chosen
+from foosim.common.errors import DeploymentError, UnknownName
+from foosim.deployment.loader import apply_sets
 from foosim.world.forms.registry import FORMS, names
 
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 COMMAND: Final = "from foosim.cli.supervisor import main; main()"
 BOUNDED: Final = '''
 from typing import Annotated
@@ -141,3 +145,13 @@ def test_what_modules_print_is_not_in_the_output(site: Path) -> None:
     out, err = told("schema", folder=site)
     Draft202012Validator.check_schema(json.loads(out))
     assert "bounded" in out and err == "said at import\n"
+
+
+def test_a_name_in_place_of_a_form_is_told_its_form() -> None:
+    with pytest.raises(UnknownName, match=r"unknown form; is it sensor pose\? \(there are: "):
+        chosen("pose", None)
+
+
+def test_a_section_without_its_package_says_that_there_is_none() -> None:
+    with pytest.raises(DeploymentError, match="unknown key; no package that is installed here has a kit of this name"):
+        apply_sets(TABLE.read_text(), TABLE.name, ["zzyard={side: 8 m}"])

@@ -104,7 +104,8 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
           "or any module:Class), 'rovr', "
           "nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
-         "4:5: templates.rover: unknown key, 'colour'"),
+         "4:5: templates.rover: unknown key (there are: model, sensors, actuators, rules, tags, x, y, heading, charge)"
+         ", 'colour'"),
         (("      pose:", "      echo:"),
          "5:7: robots.r0.sensors: a reserved name, 'echo'"),
         (("    model: rover", "    model: rover\n    heading: 400 deg"),

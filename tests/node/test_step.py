@@ -62,7 +62,7 @@ def command(slide: float, spin: float) -> bytes:
 def test_a_layout_that_is_equal_has_its_world_already(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each commit that comes by the wire brings a layout of its own; a world is made for one that differs."""
 
-    def made(*_: object) -> None:
+    def made(*_: object, **more: object) -> None:
         raise AssertionError("a world is made in a tick")
 
     monkeypatch.setattr("foosim.node.tick.World", made)

@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from foosim.protocol import fingerprint
@@ -39,3 +40,16 @@ def test_one_last_bit_in_4096_points_changes_it(name: str, monkeypatch: pytest.M
     monkeypatch.setattr(math, name, nearly)
     assert fresh() != fingerprint.library_fingerprint()
     assert len(calls) == 4096
+
+
+@pytest.mark.parametrize("name", ["sin", "cos", "exp", "log", "sqrt", "arctan2", "hypot"])
+def test_one_last_bit_of_numpy_changes_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = getattr(np, name)
+
+    def nearly(*arguments: object) -> np.ndarray:
+        values: np.ndarray = right(*arguments)
+        values[2048] = np.nextafter(values[2048], np.inf)
+        return values
+
+    monkeypatch.setattr(np, name, nearly)
+    assert fresh() != fingerprint.library_fingerprint()

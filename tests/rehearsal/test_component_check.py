@@ -15,9 +15,9 @@ from typing import Final
 import pytest
 
 from foosim.cli.rehearse import elsewhere
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.component_check import broken_laws, used_form
+from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, used_form
 from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
@@ -258,6 +258,65 @@ def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) 
     assert {rod: last.at(rod, "own.samples") for rod in rods} == {rod: 1.0 + touched[rod] for rod in rods}
 
 
+ALARMS: Final = """
+
+@sensor("own", Settings, Number, slots={"alarm": 1}, speaks="SPEAKS")
+class Own:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def sample(self, view):
+        view.write(self.alarm, float(view.tick % 10 == 0))
+        return Number(0.0)
+
+
+class Alarming(EntityRuleSettings):
+    pass
+
+
+@entity_rule("own", Alarming, slots={"alarm": 1})
+class Alarms:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def apply(self, view):
+        view.write(self.alarm, float(view.tick % 7 == 0))
+"""
+HEARD: Final = {
+    "alarm": [*range(0, 31, 5), 1, 11, 21],
+    "beeps.alarm": [*range(0, 31, 5), 1, 8, 15, 22, 29],
+}
+
+
+@pytest.mark.parametrize("speaks", HEARD)
+def test_a_sensor_speaks_by_a_slot_of_its_own_or_of_a_rule(planted: Path, speaks: str) -> None:
+    """Its own slot is set for the tick after the one at which it measures, a rule's for the tick after it applied."""
+    head = HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+        "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+    )
+    (planted / "own_form.py").write_text(head + ALARMS.replace("SPEAKS", speaks))
+    rules = "robots.red.goal.rules={beeps: {kind: 'own_form:Alarms'}}"
+    frames = Frames()
+    done = rehearse(TABLE.read_text(), TABLE.name, 31, 2, [*SETS, OF_ROD, rules], Settings(on_commit=frames))
+    assert not done.json["failed"]
+    measured = [frame.at("red.goal", "own.samples") for frame in frames.frames]
+    ticks = [tick for tick, (before, now) in enumerate(zip([0.0, *measured], measured, strict=False)) if now > before]
+    assert ticks == sorted(set(HEARD[speaks]))
+
+
+def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path) -> None:
+    (planted / "own_form.py").write_text(
+        HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+            "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+        )
+        + ALARMS.replace("SPEAKS", "beeps.alarm")
+    )
+    with pytest.raises(
+        DeploymentError, match=r"speaks by beeps\.alarm, which red\.goal does not have: it is a slot of"
+    ):
+        load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "seed=5"]), TABLE.name)
+
+
 # --- the command -----------------------------------------------------------------------------------------------------
 
 COMMAND: Final = "from foosim.cli.supervisor import main; main()"
@@ -288,6 +347,21 @@ def test_a_sensor_without_one_finite_reading_is_found(planted: Path, value: str,
     """One that has none at times is as it should be."""
     source = SENSOR.format(value=value).replace("view.write(self.kept", "(self.kept")
     assert broken(planted, source, OF_ROD) == said
+
+
+def test_readings_that_were_not_finite_or_none_are_noted(planted: Path) -> None:
+    """They may be meant, so that nothing is broken; a sensor that gives none was not compared."""
+    source = SENSOR.format(value="1.0 if view.tick % 10 else float('inf')").replace(
+        "view.write(self.kept", "(self.kept"
+    )
+    (planted / "own_form.py").write_text(HEAD + source)
+    drops = "robots.red.attack.sensors.encoder.modifiers=[{kind: drop_out, probability: 100 %}]"
+    check = ComponentCheck(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, drops]), TABLE.name, 40)
+    assert list(check.broken()) == [] and check.compared == check.sensors - 1
+    assert check.notes == [
+        "sensor encoder of red.attack never gives a reading: its modifiers drop each of 8",
+        "sensor own of red.goal has a number that is not finite in 4 of its 8 readings",
+    ]
 
 
 def test_the_end_says_how_many_sensors_were_compared(planted: Path) -> None:

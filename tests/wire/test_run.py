@@ -459,6 +459,31 @@ def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, mo
     assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
 
 
+FACTOR: Final = "FACTOR = {}\n"
+SCALED: Final = DOZES.replace("import time", "import time, factor").replace("Nothing(0.0)", "Nothing(factor.FACTOR)")
+
+
+def test_a_node_with_another_source_of_a_form_is_refused(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a module that the form's own module imports; the node with the same source takes part."""
+    other = house.folder / "other"
+    other.mkdir()
+    for folder, number in ((house.folder, 1.0), (other, 2.0)):
+        (folder / "scaled.py").write_text(SCALED.replace("view.tick == 10", "False"))
+        (folder / "factor.py").write_text(FACTOR.format(number))
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    own = "robots.red.goal.sensors.own={kind: 'scaled:Dozes', rate: 100 Hz}"
+    up = house.up(
+        *("--json", "--set", own, "--set", "engine=pure", "--set", "nodes.blue.launch=manual"),
+        *("--for", "60 ms", "--no-capture"),
+    )
+    line = house.read_until(up.stderr, "waiting for node blue; start it on its machine: ")
+    command = line.split(": ", 1)[1].split()
+    code, err = altered_node(house, f"import sys; sys.path.insert(0, {str(other)!r})", "blue", command[4])
+    assert code == 3 and "sensor scaled:Dozes has version " in err and "install the same on all machines" in err, err
+    assert house.end(house.start(*command))[0] == 0
+    assert house.end(up)[0] == 0
+
+
 def free_port() -> int:
     """A port that was free a moment ago, and whose next one was."""
     with socket.socket() as one, socket.socket() as other:

@@ -305,8 +305,8 @@ def test_a_class_of_any_module_is_found_by_its_path() -> None:
 
 
 REFUSED: Final = {
-    "own_gauges:Idle": "not registered as a sensor",
-    "own_gauges:ReachSettings": "not registered as a sensor",
+    "own_gauges:Idle": "not registered as a sensor; own_gauges registers ReachGauge",
+    "own_gauges:ReachSettings": "not registered as a sensor; own_gauges registers ReachGauge",
     "own_winch:Winch": "not registered as a sensor",
     "json:dumps": "not registered as a sensor",
     "own_gone:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
@@ -604,7 +604,7 @@ WRONG: Final = (
      [("2 kg", ".grain: not a length (a number and one of m, cm, mm, um, km), '2 kg', nearest is '2 km'"),
       ("3 mm", ".rate: not a rate (a number and one of Hz, kHz, mHz), '3 mm'")]),
     ("rate: 100 Hz, kind: 'own_gauges:Idle'",
-     [("'own", ".kind: not registered as a sensor, 'own_gauges:Idle'")]),
+     [("'own", ".kind: not registered as a sensor; own_gauges registers ReachGauge, 'own_gauges:Idle'")]),
     ("kind: 'own_gone:Idle', rate: 100 Hz",
      [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
        "(is the folder that it is in on PYTHONPATH?), 'own_gone:Idle'")]),

@@ -218,13 +218,13 @@ BROKEN: Final = {
         "for value in values]",
         "for value in values[1:]]",
         "robots.rover-1.sensors:",
-        "8 bytes, places has 16",
+        "where a list of 2 numbers, or None, is needed (own_forms.py:",
     ),
     "numbers that are texts": (
         "value / 2.0",
         "'half'",
         "robots.rover-1.sensors:",
-        "required argument is not a float",
+        "apply gives ['half', 'half'], where a list of 2 numbers, or None, is needed (own_forms.py:",
     ),
     "limits of no field": (
         '{"speed": (',

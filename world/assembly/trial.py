@@ -19,11 +19,12 @@ from foosim.world.assembly.world import NO_TEXT, World, initial_numbers, model_o
 from foosim.world.components.fitted import FittedActuator, FittedSensor, actuators_of, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, WritableView
+from foosim.world.components.watching import ReadOnly, Watched, places_of, watched_actuator
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Kit, Model
 from foosim.world.frame import Frame
-from foosim.world.layout import WORLD, Entity, build_layout
+from foosim.world.layout import WORLD, Entity, Layout, build_layout
 from foosim.world.scene import Body, Shape
 from foosim.world.spec import WorldSpec
 
@@ -40,7 +41,9 @@ def trial_findings(spec: WorldSpec) -> Iterator[Finding]:
     """Yield why the forms of a world cannot work, each at its place in the deployment."""
     try:
         trial = _Trial(spec)
-    except Exception as error:  # noqa: BLE001  # of what other people's forms declare
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # noqa: BLE001  # of what other people's forms declare
         yield Finding((), f"the layout fails: {failure_of(error)}", ABSENT)
         return
     for step in (trial.try_sections, trial.try_models, trial.try_rules, trial.try_components, trial.try_tick):
@@ -65,7 +68,9 @@ class _Trial:
             said = str(error)
         except _Unmet as error:
             said = f"{what}: {error}"
-        except Exception as error:  # noqa: BLE001  # other people's code may raise anything
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001  # other people's code may raise anything: SystemExit, too
             said = f"{what} fails: {failure_of(error)}"
         self.found.append(
             Finding(location, said, location[-1] if location else ABSENT, at="key" if location else "value")
@@ -100,7 +105,9 @@ class _Trial:
             what = f"model {entity.model} of {entity.name}"
             model = self._attempt(location, what, model_of, self._spec, self._layout, entity)
             if model is not None:
-                self._attempt(location, f"{what}: place", lambda its=model: its.place(WritableView(0, numbers)))
+                places = places_of(entity, *entity.offsets)
+                watched: Any = Watched(model, self._layout, places)
+                self._attempt(location, f"{what}: place", watched.place, WritableView(0, numbers))
                 self._attempt(location, f"{what}: body", _check_body, model, entity)
                 self._attempt(location, f"{what}: is_plausible", _check_plausible, model, numbers)
 
@@ -125,7 +132,7 @@ class _Trial:
             what = f"actuators of {robot.name}"
             for one in self._attempt((*place, "actuators"), what, actuators_of, spec, layout, robot) or ():
                 what = f"actuator {one.channel} of {robot.name}"
-                self._attempt((*place, "actuators", one.channel), what, _check_actuator, one, numbers)
+                self._attempt((*place, "actuators", one.channel), what, _check_actuator, one, layout, numbers)
         if not self.found:
             self._attempt(("robots",), "sensors that are read together", _check_readings, everyone, numbers)
 
@@ -137,12 +144,13 @@ class _Trial:
 
     def _tick(self) -> None:
         spec, layout = self._spec, self._layout
-        world, numbers = World(spec, layout), initial_numbers(spec, layout)
+        world, numbers = World(spec, layout, is_watched=True), initial_numbers(spec, layout)
         world.apply_rules(numbers, TICK)
         start = numbers.copy()
         moved = [entity for entity in layout.entities if entity.is_solved]
         world.move(moved, start, numbers, TICK)
         world.apply_entity_rules(moved, start, numbers, TICK)
+        world.plausible(moved, numbers, start, TICK)
         for entity in layout.entities:
             for field, at in entity.offsets.items():
                 values = numbers[at : at + entity.counts[field]]
@@ -220,13 +228,15 @@ def _check_plausible(model: Any, numbers: Sequence[float]) -> None:
 
 
 def _check_readings(sensors: Sequence[FittedSensor], numbers: Sequence[float]) -> None:
-    view = SensingView(TICK, list(numbers), np.array(numbers))
+    view = SensingView(TICK, ReadOnly(numbers), np.array(numbers))
+    view.values.setflags(write=False)
     for one, payload in zip(sensors, Sensing().sample(sensors, view), strict=True):
         if payload is not None:
             one.codec.decode(payload)
 
 
-def _check_actuator(one: FittedActuator, numbers: Sequence[float]) -> None:
+def _check_actuator(fitted: FittedActuator, layout: Layout, numbers: Sequence[float]) -> None:
+    one = watched_actuator(fitted, layout)
     fields = {field.name for field in one.codec.fields}
     for name, bounds in one.actuator.limits().items():
         _need(name in fields, f"limits of fields of the command ({', '.join(sorted(fields))})", name)

@@ -6,12 +6,12 @@ that it was made with.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from hashlib import blake2b
-from importlib.util import find_spec
-from typing import Final
+from typing import Any, Final
 
+from foosim.world.assembly.sources import sources_of
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Form, Model
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
@@ -63,20 +63,19 @@ def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> I
 def foreign_versions(spec: WorldSpec) -> dict[str, str]:
     """Return the versions of the forms of a world that are not foosim's own, by form and class.
 
-    A version is that of the package, if there is one, and a digest of the source of the module.
+    A version is that of the package, if there is one, and a digest of its sources (`sources`).
     """
     foreign = [form for form in forms_of(spec) if not form.module.startswith(OWN)]
-    return {f"{form.form} {form.module}:{form.made.__qualname__}": _version(form.module) for form in foreign}
+    return {f"{form.form} {form.module}:{form.made.__qualname__}": _version(form.made) for form in foreign}
 
 
 @cache
-def _version(module: str) -> str:
-    found = find_spec(module)
-    read = None if found is None else getattr(found.loader, "get_source", None)
-    source = (read(module) or "") if read is not None else ""
-    digest = blake2b(source.encode(), digest_size=DIGEST_BYTES).hexdigest()
-    version = _package_version(module.partition(".")[0])
-    return f"{version} {digest}".lstrip()
+def _version(made: Callable[..., Any]) -> str:
+    digest = blake2b(digest_size=DIGEST_BYTES)
+    for module, source in sources_of(made).items():
+        digest.update(f"{len(module)} {module} {len(source)} ".encode() + source)
+    version = _package_version(made.__module__.partition(".")[0])
+    return f"{version} {digest.hexdigest()}".lstrip()
 
 
 def _package_version(package: str) -> str:

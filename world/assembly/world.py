@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from foosim.common.errors import Refused
 from foosim.common.keyed_random import draw_key
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import (
@@ -20,10 +21,11 @@ from foosim.world.components.entities import (
     mounting_of,
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of
-from foosim.world.components.view import ComponentError, Mounting, SolvingView, View, WritableView
+from foosim.world.components.view import Mounting, SolvingView, View, WritableView, called, component_error
+from foosim.world.components.watching import Watched, places_of, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
-from foosim.world.forms.failures import failure_of
+from foosim.world.forms.failures import WrongResult, failure_of
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_motion, find_rule, world_rules
@@ -36,10 +38,8 @@ NO_TEXT: Final = "no text of"
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
     """Return an entity as its model. Raises ComponentError."""
-    try:
-        model: Model = entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
-    except Exception as error:
-        raise ComponentError(f"model {entity.model} of {entity.name}", 0, error) from error
+    settings, at = spec.settings_of(entity.name), mounting_of(spec, layout, entity)
+    model: Model = called(f"model {entity.model}", entity.name, 0, entity.kind.made, settings, at)
     return model
 
 
@@ -49,8 +49,8 @@ def models_of(spec: WorldSpec, layout: Layout) -> dict[int, Model]:
 
 
 def body_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Body:
-    """Return the body of an entity that has one."""
-    body = model_of(spec, layout, entity).body()
+    """Return the body of an entity that has one. Raises ComponentError."""
+    body = called(f"model {entity.model}", entity.name, 0, model_of(spec, layout, entity).body)
     assert body is not None, entity
     return body
 
@@ -61,20 +61,18 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     for label, settings in world_rules(spec).items():
         found = find_rule(settings)
         at = RuleMounting(spec, layout, label, draw_key(spec.seed, "rule", label), frozenset(found.writes))
-        try:
-            rules[label] = found.made(settings, at)
-        except Exception as error:
-            raise ComponentError(f"rule {label} of the world", 0, error) from error
+        rules[label] = called(f"rule {label}", WORLD, 0, found.made, settings, at)
     return rules
 
 
 def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
-    """Return the scene of a layout's bodies in the deployment's world."""
+    """Return the scene of a layout's bodies in the deployment's world. Raises ComponentError."""
     bodies: dict[str, Body] = {}
     for index, model in models_of(spec, layout).items():
-        body = model.body()
+        entity = layout.entities[index]
+        body = called(f"model {entity.model}", entity.name, 0, model.body)
         if body is not None:
-            bodies[layout.entities[index].name] = body
+            bodies[entity.name] = body
     return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
 
 
@@ -86,32 +84,34 @@ def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
     view = WritableView(0, numbers)
     for index, model in models_of(spec, layout).items():
         entity = layout.entities[index]
-        _calling(f"model {entity.model} of {entity.name}", model.place, view)
+        called(f"model {entity.model}", entity.name, 0, model.place, view)
     for label, rule in rules_of(spec, layout).items():
         if hasattr(rule, "place"):
-            _calling(f"rule {label} of the world", rule.place, view)
+            called(f"rule {label}", WORLD, 0, rule.place, view)
     return numbers
-
-
-def _calling(what: str, call: Callable[[WritableView], None], view: WritableView) -> None:
-    try:
-        call(view)
-    except Exception as error:
-        raise ComponentError(what, view.tick, error) from error
 
 
 def addition(spec: WorldSpec, layout: Layout, name: str, model: str) -> tuple[Vector, Callable[[Vector, Vector], None]]:
     """Return where another entity of a model is put if nothing is said (m), and what checks a place and a velocity.
 
-    The latter raises BadValue.
+    The latter raises BadValue. Both raise ComponentError.
     """
     after = Layout({**layout.models, name: model}, layout.declared)
     made: Any = model_of(spec, after, after[name])
     numbers = [0.0] * after.size
-    made.place(WritableView(0, numbers))
+    called(f"model {model}", name, 0, made.place, WritableView(0, numbers))
     start = after[name].offsets["position"]
     x, y, z = numbers[start : start + 3]
-    return (x, y, z), made.check_place
+
+    def check(position: Vector, velocity: Vector) -> None:
+        try:
+            made.check_place(position, velocity)
+        except Refused:
+            raise
+        except BaseException as error:
+            raise component_error(f"model {model}", name, 0, error) from error
+
+    return (x, y, z), check
 
 
 def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
@@ -126,7 +126,9 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
         if hasattr(one, "status"):
             try:
                 status |= one.status(seen)
-            except Exception as error:  # noqa: BLE001  # a run goes on without it
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # noqa: BLE001  # a run goes on without it
                 status |= {"failed": f"status of {what}: {failure_of(error)}"}
     return status
 
@@ -140,7 +142,9 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
         if hasattr(one, "text"):
             try:
                 found.append(one.text(status))
-            except Exception as error:  # noqa: BLE001  # without its part of the status, for one
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # noqa: BLE001  # without its part of the status, for one
                 found.append(f"{NO_TEXT} {one.__qualname__}: {failure_of(error)}")
     return [text for text in found if text]
 
@@ -178,9 +182,10 @@ class WorldMarks:
 class World:
     """What computes the ticks of one layout, but for the engine. Raises ComponentError for a form that raises."""
 
-    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+    def __init__(self, spec: WorldSpec, layout: Layout, *, is_watched: bool = False) -> None:
+        """`is_watched`: forms that write to the frame otherwise than by their views are errors (`watching`)."""
         self._spec, self._layout = spec, layout
-        self.models = models_of(spec, layout)
+        self.models: dict[int, Model] = models_of(spec, layout)
         self._rules = rules_of(spec, layout)
         self.has_rules = bool(self._rules)
         fitted = {robot.index: actuators_of(spec, layout, robot) for robot in layout.robots}
@@ -193,6 +198,43 @@ class World:
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
+        if is_watched:
+            self._watch()
+
+    def _watch(self) -> None:
+        """Put what compares frames around all forms."""
+        spec, layout = self._spec, self._layout
+        entities = layout.entities
+        self.models = {
+            index: Watched(model, layout, places_of(entities[index], *entities[index].offsets))
+            for index, model in self.models.items()
+        }
+        for label, settings in world_rules(spec).items():
+            writes = find_rule(settings).writes
+            places = [
+                place
+                for entity in entities
+                for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
+            ]
+            self._rules[label] = Watched(self._rules[label], layout, places)
+        self.actuators = {
+            index: tuple(watched_actuator(one, layout) for one in its) for index, its in self.actuators.items()
+        }
+        self._only = {index: self.actuators[index][0] for index in self._only}
+        for name, motion in self._motions.items():
+            moved = [entity for entity in entities if self._motion_of.get(entity.index) == name]
+            writes = find_motion(moved[0].kind).writes
+            places = [place for entity in moved for place in places_of(entity, *writes, component="motion")]
+            self._motions[name] = Watched(motion, layout, places)
+        for index, its in self._entity_rules.items():
+            robot, rules = entities[index], spec.robots[entities[index].name].rules
+            self._entity_rules[index] = tuple(
+                (
+                    label,
+                    Watched(rule, layout, places_of(robot, *find_entity_rule(rules[label]).writes, component=label)),
+                )
+                for label, rule in its
+            )
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
@@ -200,8 +242,8 @@ class World:
         for label, rule in self._rules.items():
             try:
                 rule.apply(view)
-            except Exception as error:
-                raise ComponentError(f"rule {label} of the world", tick, error) from error
+            except BaseException as error:
+                raise component_error(f"rule {label}", WORLD, tick, error) from error
 
     def move(self, entities: Sequence[Entity], start: Sequence[float], numbers: list[float], tick: int) -> None:
         """Move those of these entities that go on by motions: `start` are the numbers at the tick's start."""
@@ -214,12 +256,13 @@ class World:
             return
         view, asking = SolvingView(tick, start, numbers), View(tick, numbers, start=start)
         for name, moving in sorted(groups.items()):
+            asked = self.motors(moving, asking)
             try:
-                self._motions[name].move(moving, self.motors(moving, asking), view)
-            except ComponentError:
-                raise
-            except Exception as error:
-                raise ComponentError(f"motion {name}", tick, error) from error
+                self._motions[name].move(moving, asked, view)
+            except BaseException as error:
+                if not isinstance(error, KeyboardInterrupt):
+                    self.check_motors(moving, asked, tick)
+                raise component_error(f"motion {name}", "", tick, error) from error
 
     def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
         """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""
@@ -231,7 +274,7 @@ class World:
                 continue
             try:
                 found.append(one.actuator.command(view))
-            except Exception as error:
+            except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return found
 
@@ -253,16 +296,28 @@ class World:
                     motors[joint] = Motor(*motor)
                 if hasattr(one.actuator, "wrench"):
                     wrench = added(wrench, one.actuator.wrench(view))
-            except Exception as error:
+            except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return Drives(tuple(motors), wrench)
+
+    def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
+        """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""
+        for entity, motors in zip(entities, asked, strict=True):
+            actuators = [one for one in self.actuators.get(entity.index, ()) if one.moves]
+            if not actuators:
+                continue
+            count = entity.counts.get("joint_positions") if entity.is_rigid else None
+            what = "a tuple of (target, greatest force)" + ("" if count is None else f" for {count} motors")
+            if not _are_motors(motors, count):
+                error = WrongResult(actuators[0].actuator.command, what, motors)
+                raise actuators[0].failed(tick, error) from error
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
         asked = NO_MOTORS
         for one in self.actuators.get(entity.index, ()):
             try:
                 asked += one.actuator.command(view)
-            except Exception as error:
+            except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return asked
 
@@ -277,8 +332,8 @@ class World:
             for label, rule in self._entity_rules.get(entity.index, ()):
                 try:
                     rule.apply(view)
-                except Exception as error:
-                    raise ComponentError(f"rule {label} of {entity.name}", tick, error) from error
+                except BaseException as error:
+                    raise component_error(f"rule {label}", entity.name, tick, error) from error
 
     def plausible(
         self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
@@ -287,21 +342,25 @@ class World:
         models = self.models
         for entity in entities:
             try:
-                if not models[entity.index].is_plausible(numbers, before):
+                is_plausible = models[entity.index].is_plausible(numbers, before)
+                if is_plausible is False:
                     return False
-            except Exception as error:
-                raise ComponentError(f"model {entity.model} of {entity.name}", tick, error) from error
+                if is_plausible is not True:
+                    raise WrongResult(models[entity.index].is_plausible, "True or False", is_plausible)
+            except BaseException as error:
+                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
         return True
 
     def stir(self, numbers: list[float]) -> None:
-        """Set a world at rest in motion, for the fixed small run that tells engines apart."""
+        """Set a world at rest in motion, for the fixed small run that tells engines apart. Raises ComponentError."""
         view = WritableView(0, numbers)
         for index, model in self.models.items():
-            if hasattr(model, "stir") and self._layout.entities[index].name in self._layout.declared.names:
-                model.stir(view)
+            entity = self._layout.entities[index]
+            if hasattr(model, "stir") and entity.name in self._layout.declared.names:
+                called(f"model {entity.model}", entity.name, 0, model.stir, view)
         for fitted in self.actuators.values():
             for one in fitted:
-                one.actuator.stir(view)
+                called(f"actuator {one.channel}", one.robot, 0, one.actuator.stir, view)
 
 
 def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
@@ -312,11 +371,19 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
     motions: dict[str, Motion] = {}
     for name, entities in sorted(moving.items()):
         found = find_motion(entities[0].kind)
-        try:
-            motions[name] = found.made(MotionMounting(spec, layout, name, tuple(entities), frozenset(found.writes)))
-        except Exception as error:
-            raise ComponentError(f"motion {name}", 0, error) from error
+        at = MotionMounting(spec, layout, name, tuple(entities), frozenset(found.writes))
+        motions[name] = called(f"motion {name}", "", 0, found.made, at)
     return motions
+
+
+def _are_motors(asked: object, count: int | None) -> bool:
+    """Whether that is what an actuator can ask of so many motors, or of any number."""
+    return (
+        isinstance(asked, tuple)
+        and count in (None, len(asked))
+        and all(isinstance(one, tuple) and len(one) == 2 for one in asked)
+        and all(isinstance(number, int | float) for one in asked for number in one)
+    )
 
 
 def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
@@ -324,9 +391,6 @@ def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tu
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found = find_entity_rule(settings)
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
-        try:
-            made = found.made(settings, Mounting(spec, layout, robot, label, key, frozenset(found.writes)))
-        except Exception as error:
-            raise ComponentError(f"rule {label} of {robot.name}", 0, error) from error
-        rules.append((label, made))
+        at = Mounting(spec, layout, robot, label, key, frozenset(found.writes))
+        rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))
     return tuple(rules)

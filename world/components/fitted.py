@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final, NamedTuple
@@ -17,13 +17,16 @@ from foosim.world.components.view import (
     Mounting,
     Sensor,
     WritableView,
+    called,
+    component_error,
 )
 from foosim.world.forms import registry
+from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.forms import SAMPLES, Component
-from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.payloads import FLOAT, PayloadCodec
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, modifier_labels
+from foosim.world.layout import Entity, Layout, modifier_labels, slot_that_speaks
 from foosim.world.spec import WorldSpec
 
 NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
@@ -34,18 +37,43 @@ class FittedModifier:
     """A modifier of one sensor or actuator: its name, and which robot's it is, for messages."""
 
     what: str
+    robot: str
     modifier: Modifier
+    apply_command: Callable[[list[float], WritableView], list[float] | None]
+    """What takes a command: `accept` where there is one, else `apply`."""
+    due: Callable[[WritableView], list[float] | None] | None
+    """What returns a command that had to wait; None of a modifier that lets none wait."""
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a reading. Raises ComponentError."""
+        return self._checked(len(values), view, self.modifier.apply, values, view)
+
+    def accept(self, values: list[float], view: WritableView) -> list[float] | None:
+        """Return what becomes of the numbers of a command; None where it is dropped or waits. Raises ComponentError."""
+        return self._checked(len(values), view, self.apply_command, values, view)
+
+    def take_due(self, size: int, view: WritableView) -> list[float] | None:
+        """Return the numbers of a command whose time has come, of so many. Raises ComponentError."""
+        return None if self.due is None else self._checked(size, view, self.due, view)
+
+    def _checked(
+        self, size: int, view: WritableView, call: Callable[..., list[float] | None], *arguments: Any
+    ) -> list[float] | None:
         try:
-            return self.modifier.apply(values, view)
-        except Exception as error:
+            values = call(*arguments)
+            if values is None or (
+                type(values) is list
+                and len(values) == size
+                and (FLOAT.issuperset(map(type, values)) or all(isinstance(one, int | float) for one in values))
+            ):
+                return values
+            raise WrongResult(call, f"a list of {size} numbers, or None,", values)
+        except BaseException as error:
             raise self.failed(view.tick, error) from error
 
-    def failed(self, tick: int, error: Exception) -> ComponentError:
+    def failed(self, tick: int, error: BaseException) -> ComponentError:
         """Return the error of a modifier that has raised."""
-        return ComponentError(self.what, tick, error)
+        return component_error(self.what, self.robot, tick, error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,9 +104,16 @@ class FittedSensor:
     def sample(self, view: WritableView) -> Any:
         """Return what is measured. Raises ComponentError."""
         try:
-            return self.sensor.sample(view)
-        except Exception as error:
-            raise ComponentError(f"sensor {self.channel} of {self.robot}", view.tick, error) from error
+            reading = self.sensor.sample(view)
+            if isinstance(reading, self.codec.kind):
+                return reading
+            raise WrongResult(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
+        except BaseException as error:
+            raise self.failed(view.tick, error) from error
+
+    def failed(self, tick: int, error: BaseException) -> ComponentError:
+        """Return the error of a sensor that has raised, or whose reading is none."""
+        return component_error(f"sensor {self.channel}", self.robot, tick, error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,11 +125,15 @@ class FittedActuator:
     actuator: Actuator
     codec: PayloadCodec
     modifiers: tuple[FittedModifier, ...]
+    size: int
+    """How many numbers a command has; 0 of one that is not all numbers."""
+    moves: bool = True
+    """Whether it commands the motors of its robot."""
 
     @property
     def has_waiting(self) -> bool:
         """Whether commands may have to wait for their tick."""
-        return any(hasattr(one.modifier, "due") for one in self.modifiers)
+        return any(one.due is not None for one in self.modifiers)
 
     def accept(self, payload: bytes, view: WritableView) -> bool:
         """Take a command; False when it is refused. Raises ComponentError."""
@@ -110,25 +149,16 @@ class FittedActuator:
     def take_due(self, view: WritableView) -> None:
         """Take the commands whose time has come. Raises ComponentError."""
         for place, one in enumerate(self.modifiers):
-            due = getattr(one.modifier, "due", None)
-            if due is not None:
-                try:
-                    values = due(view)
-                except Exception as error:
-                    raise one.failed(view.tick, error) from error
-                if values is not None:
-                    self._go_on(place + 1, values, view)
+            values = one.take_due(self.size, view)
+            if values is not None:
+                self._go_on(place + 1, values, view)
 
     def _go_on(self, place: int, values: list[float], view: WritableView) -> bool:
         """Take a command that has come to this place among the modifiers; dropping or delaying one is no refusal."""
         left: list[float] | None = values
         for one in self.modifiers[place:]:
             assert left is not None
-            try:
-                accept = getattr(one.modifier, "accept", one.modifier.apply)
-                left = accept(left, view)
-            except Exception as error:
-                raise one.failed(view.tick, error) from error
+            left = one.accept(left, view)
             if left is None:
                 return True
         assert left is not None
@@ -136,13 +166,16 @@ class FittedActuator:
 
     def _take(self, command: Any, view: WritableView) -> bool:
         try:
-            return self.actuator.accept(command, view)
-        except Exception as error:
+            is_taken = self.actuator.accept(command, view)
+            if is_taken is True or is_taken is False:
+                return is_taken
+            raise WrongResult(self.actuator.accept, "True or False", is_taken)
+        except BaseException as error:
             raise self.failed(view.tick, error) from error
 
-    def failed(self, tick: int, error: Exception) -> ComponentError:
+    def failed(self, tick: int, error: BaseException) -> ComponentError:
         """Return the error of an actuator that has raised."""
-        return ComponentError(f"actuator {self.channel} of {self.robot}", tick, error)
+        return component_error(f"actuator {self.channel}", self.robot, tick, error)
 
 
 # --- making ----------------------------------------------------------------------------------------------------------
@@ -169,7 +202,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(settings.kind, "sensor"),
                 modifiers,
                 0 if numbers is None else numbers.size,
-                robot.offsets[component.speaks] if component.speaks else -1,
+                robot.offsets[slot_that_speaks(robot, channel, component.speaks)] if component.speaks else -1,
             )
         )
     return tuple(fitted)
@@ -183,16 +216,16 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "actuator", robot.name, channel))
         made = _made(component, settings, mounting)
         modifiers = tuple(_modifiers(component, settings, mounting, made, Spacing(1, spec.tick_ns / 1e9)))
-        fitted.append(FittedActuator(robot.name, channel, made, codec_of(settings.kind, "actuator"), modifiers))
+        numbers = numbers_of(component, settings, robot.counts)
+        size = 0 if numbers is None else numbers.size
+        codec = codec_of(settings.kind, "actuator")
+        fitted.append(FittedActuator(robot.name, channel, made, codec, modifiers, size, component.moves))
     return tuple(fitted)
 
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:
     at = mounting if isinstance(mounting, Mounting) else mounting.mounting
-    try:
-        return component.made(settings, mounting)
-    except Exception as error:
-        raise ComponentError(f"{component.form} {at.name} of {at.robot.name}", 0, error) from error
+    return called(f"{component.form} {at.name}", at.robot.name, 0, component.made, settings, mounting)
 
 
 class Spacing(NamedTuple):
@@ -222,12 +255,23 @@ def _modifiers(
     numbers = numbers_of(component, settings, mounting.robot.counts)
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
-    limits = made.limits() if component.form == "sensor" and hasattr(made, "limits") else NO_LIMITS
+    limits = NO_LIMITS
+    if component.form == "sensor" and hasattr(made, "limits"):
+        limits = called(f"sensor {channel}", robot.name, 0, _limits, made)
     bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
         key = draw_key(spec.seed, component.form, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
-        made_modifier = _made(registry.find_component("modifier", its.kind), its, at)
-        yield FittedModifier(f"modifier {label} of {robot.name} {channel}", made_modifier)
+        one = _made(registry.find_component("modifier", its.kind), its, at)
+        accept, due = getattr(one, "accept", one.apply), getattr(one, "due", None)
+        yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, accept, due)
+
+
+def _limits(made: Any) -> Mapping[str, tuple[float, float]]:
+    """Return the bounds of a sensor's readings. Raises WrongResult."""
+    limits = made.limits()
+    if not (isinstance(limits, Mapping) and all(isinstance(its, tuple) and len(its) == 2 for its in limits.values())):
+        raise WrongResult(made.limits, "a mapping of fields to least and greatest value", limits)
+    return limits

@@ -7,19 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, NotFinite
 from foosim.world.components.fitted import FittedSensor
-from foosim.world.components.view import ComponentError, SensingView
+from foosim.world.components.view import SensingView, called, component_error
+from foosim.world.forms.failures import WrongResult
 
 Numbers: TypeAlias = NDArray[np.float64]
 MODIFIED_TOGETHER_MIN: Final = 64
 """Numbers from which on modifiers are computed together. Amid a tick little of numpy is in a cache of the processor:
 arrays of fewer numbers cost more than one number after the other."""
+NAMED_MAX: Final = 4
+"""Sensors that a message about several names."""
 PLANS_MAX: Final = 64
 """Sets of sensors whose plan is kept: those of ticks, and of robots that are out of service."""
 
@@ -40,25 +43,26 @@ class Sensing:
         if plan is None:
             while len(self._plans) >= PLANS_MAX:
                 self._plans.pop(next(iter(self._plans)))
-            plan = self._plans[key] = Plan(fitted)
+            plan = self._plans[key] = Plan(fitted, view.tick)
         return plan.sample(view)
 
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Sensors or modifiers of one class that are computed together: the places of their sensors, what they became, and
-    their names, for messages."""
+    """Sensors or modifiers of one class that are computed together: the places of their sensors, what they became, how
+    many numbers each has, and their names, for messages."""
 
     places: list[int]
     made: Any
+    size: int
     what: str
 
 
 class Plan:
-    """What is done for one set of sensors, in which order."""
+    """What is done for one set of sensors, in which order. Raises ComponentError."""
 
-    def __init__(self, fitted: Sequence[FittedSensor]) -> None:
-        self._fitted = tuple(fitted)
+    def __init__(self, fitted: Sequence[FittedSensor], tick: int) -> None:
+        self._fitted, self._tick = tuple(fitted), tick
         everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
         self._together, self._alone = self._divided(everyone, "sensor", 0)
         depth = max((len(one.modifiers) for one in fitted), default=0)
@@ -90,11 +94,13 @@ class Plan:
             if len(its) == 1 or len(its) * size < least:
                 alone += [place for place, _ in its]
                 continue
-            names = ", ".join(f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its)
-            groups.append(
-                _Group([place for place, _ in its], kind.together([one for _, one in its]), f"{form} {names}")
-            )
+            names = [f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its]
+            what = f"{form} {', '.join(names[:NAMED_MAX])}{', ...' * (len(names) > NAMED_MAX)}"
+            groups.append(_Group([place for place, _ in its], self._put_together(kind, its, what), size, what))
         return groups, alone
+
+    def _put_together(self, kind: Any, members: Sequence[tuple[int, Any]], what: str) -> Any:
+        return called(what, "", self._tick, kind.together, [one for _, one in members])
 
     def sample(self, view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor, None of a reading that is dropped. Raises ComponentError."""
@@ -103,9 +109,9 @@ class Plan:
         for place in self._alone:
             one = fitted[place]
             reading = one.sample(view)
-            readings[place] = one.codec.numbers(reading) if one.modifiers else reading
+            readings[place] = _numbers(one, reading, view) if one.modifiers else reading
         for group in self._together:
-            rows = _computed(group, view, group.made.sample, view)
+            rows = _computed(group, len(group.places), view, group.made.sample, view)
             for place, row in zip(group.places, rows, strict=True):
                 readings[place] = row
         for depth, (groups, alone) in enumerate(self._steps):
@@ -127,16 +133,34 @@ def _apply_together(group: _Group, readings: list[Any], view: SensingView) -> No
     nothing = [0.0] * len(readings[there[0]]) if there else []
     if there:
         values = np.array([nothing if readings[place] is None else readings[place] for place in group.places])
-        for place, row in zip(group.places, _computed(group, view, group.made.apply, values, view), strict=True):
+        rows = _computed(group, len(values), view, group.made.apply, values, view)
+        for place, row in zip(group.places, rows, strict=True):
             if readings[place] is not None:
                 readings[place] = row
 
 
-def _computed(group: _Group, view: SensingView, compute: Callable[..., Numbers], *arguments: Any) -> Numbers:
+def _computed(
+    group: _Group, count: int, view: SensingView, compute: Callable[..., Numbers], *arguments: Any
+) -> Numbers:
+    shape = (count, group.size)
     try:
-        return compute(*arguments)
-    except Exception as error:
-        raise ComponentError(group.what, view.tick, error) from error
+        rows: Any = compute(*arguments)
+        if isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64:
+            return cast("Numbers", rows)
+        raise WrongResult(compute, f"an array of float64 of the shape {shape}", rows)
+    except BaseException as error:
+        raise component_error(group.what, "", view.tick, error) from error
+
+
+def _numbers(one: FittedSensor, reading: Any, view: SensingView) -> list[float]:
+    """Return the numbers of a reading, for modifiers. Raises ComponentError."""
+    try:
+        numbers = one.codec.numbers(reading)
+        if len(numbers) == one.size and all(isinstance(number, int | float) for number in numbers):
+            return numbers
+        raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
+    except BaseException as error:
+        raise one.failed(view.tick, error) from error
 
 
 def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None:
@@ -148,7 +172,14 @@ def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None
             return one.codec.encode_numbers(reading.tolist())
         if isinstance(reading, list):
             return one.codec.encode_numbers(reading)
-        return one.codec.encode(reading)
-    except BadValue:
+        payload = one.codec.encode_checked(reading)
+        if one.size and len(payload) != 8 * one.size:
+            raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
+        return payload
+    except NotFinite:
         view.not_finite.append(one)
         return None
+    except BadValue as error:
+        raise one.failed(view.tick, WrongResult(one.sensor.sample, error.problem, reading)) from error
+    except BaseException as error:
+        raise one.failed(view.tick, error) from error

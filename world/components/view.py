@@ -7,27 +7,51 @@ and the layout.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
 
 if TYPE_CHECKING:  # numpy is for those who compute a tick
     import numpy as np
     from numpy.typing import NDArray
 
+Result = TypeVar("Result")
+
 
 class ComponentError(Exception):
-    """A component has raised: whichever node computes its tick, it would raise again. `cause` has its traceback."""
+    """A form has raised, or returned what it must not: whichever node computes its tick, it would do so again.
 
-    def __init__(self, what: str, tick: int, cause: Exception) -> None:
-        super().__init__(f"{what} failed at tick {tick}: {failure_of(cause)}")
-        self.cause = cause
+    `component` is which one of `entity` it is, `cause` has its traceback.
+    """
+
+    def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
+        of = {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
+        super().__init__(f"{component}{of} failed at tick {tick}: {failure_of(cause)}")
+        self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
+
+
+def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
+    """Return what a call of a form has come to, whatever it raised: SystemExit, too.
+
+    An interrupt, and an error that names its form already, is raised as it is.
+    """
+    if isinstance(error, KeyboardInterrupt | ComponentError):
+        raise error
+    return ComponentError(component, entity, tick, error)
+
+
+def called(component: str, entity: str, tick: int, call: Callable[..., Result], *arguments: Any) -> Result:
+    """Return what a call of a form returns. Raises ComponentError."""
+    try:
+        return call(*arguments)
+    except BaseException as error:
+        raise component_error(component, entity, tick, error) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +95,12 @@ class View:
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """The numbers as an array."""
+        """The numbers as an array, which is not written to."""
         if self._values is None:
             import numpy as np
 
             self._values = np.array(self.numbers)
+            self._values.setflags(write=False)
         return self._values
 
     def read(self, slot: Slot) -> Sequence[float]:
@@ -109,6 +134,11 @@ class WritableView(View):
         self._values: NDArray[np.float64] | None = None
         self._written = numbers
         self._commands: dict[object, int] = {}
+
+    @property
+    def written_to(self) -> list[float]:
+        """The numbers that `write` changes."""
+        return self._written
 
     def count_command(self, actuator: object) -> None:
         """Say in `count` how many commands of the tick an actuator has had before this one."""

@@ -3,14 +3,40 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from inspect import unwrap
 from traceback import walk_tb
 from types import FrameType
-from typing import Final
+from typing import Any, Final
 
 OURS: Final = "foosim"
 TEXT_LENGTH_MAX: Final = 500
 """A longer text of an error is cut."""
+VALUE_LENGTH_MAX: Final = 80
+
+
+class Misdeed(Exception):
+    """What a method of a form has done is wrong. `method` is where that is to be changed."""
+
+    def __init__(self, method: Callable[..., Any], text: str) -> None:
+        super().__init__(text)
+        self.method = method
+
+
+class WrongResult(Misdeed):
+    """A method of a form has returned something else than it must."""
+
+    def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
+        name = getattr(method, "__name__", type(method).__name__)
+        super().__init__(method, f"{name} gives {_value(given)}, where {needed} is needed")
+
+
+def _value(given: object) -> str:
+    text = f"a {type(given).__name__}"
+    with suppress(Exception):  # the user's own code, too
+        text = repr(given)
+    return text if len(text) <= VALUE_LENGTH_MAX else f"{text[: VALUE_LENGTH_MAX - 3]}..."
 
 
 def failure_of(error: BaseException, module: str = "") -> str:
@@ -24,6 +50,8 @@ def failure_of(error: BaseException, module: str = "") -> str:
         said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
         text = " ".join(said.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
+    if isinstance(error, Misdeed):
+        return text + _place_of_method(error.method)
     return (f"{kind}: {text}" if text else kind) + _place_of(error, module)
 
 
@@ -41,6 +69,11 @@ def _place_of(error: BaseException, module: str) -> str:
     return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
 
 
+def _place_of_method(method: Callable[..., Any]) -> str:
+    code = getattr(unwrap(getattr(method, "__func__", method)), "__code__", None)
+    return "" if code is None else f" ({_shown(code.co_filename)}:{code.co_firstlineno})"
+
+
 def _package(frame: FrameType) -> str:
     return str(frame.f_globals.get("__name__", "")).partition(".")[0]
 
@@ -51,10 +84,10 @@ def _is_own(frame: FrameType, module: str) -> bool:
     if package == OURS:
         return False
     file = frame.f_code.co_filename
-    return package == module.partition(".")[0] or not (file.startswith("<") or _in_library(file))
+    return package == module.partition(".")[0] or not (file.startswith("<") or in_library(file))
 
 
-def _in_library(file: str) -> bool:
+def in_library(file: str) -> bool:
     """Whether a file is one of Python's own modules or of an installed package."""
     import sysconfig  # takes longer than all else here, and few processes ask
 

@@ -117,9 +117,9 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     """Return what a function of a form says of its slots. Raises BadValue where it fails, or what it says is wrong."""
     try:
         found = slots_of(*arguments)
-    except BadValue:
+    except (BadValue, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:  # SystemExit, too: a function may do anything
         raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", name) from error
     problem = slots_problem(found, is_sensor=is_sensor)
     if problem:
@@ -164,7 +164,8 @@ class Component(Form):
     that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
     `moves` says that an actuator commands the motors of its robot: one of a robot may.
-    `speaks` is a field of the robot: a sensor also measures at each tick at whose start its first number is not 0.
+    `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
+    tick at whose start its first number is not 0.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
     """

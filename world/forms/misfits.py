@@ -81,7 +81,7 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
     has = model.declared if having is None else having
     word = word_of(form.form)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and form.speaks and form.speaks not in needs:
+    if isinstance(form, Component) and _speaks_by_model(form) and form.speaks not in needs:
         needs = (*needs, form.speaks)
     missing = [] if has is None else [field for field in needs if field not in has]
     if missing:
@@ -95,6 +95,12 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
         yield f"{word} that writes {', '.join(written)}: {fields_of(model, written, has)}"
     if not model.is_solved:
         yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
+
+
+def _speaks_by_model(sensor: Component) -> bool:
+    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`layout.unheard`)."""
+    is_own = callable(sensor.slots) or sensor.speaks in sensor.slots
+    return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
 
 
 def rule_problems(rule: WorldRule) -> Iterator[str]:

@@ -18,7 +18,7 @@ from typing import Any, Final, TypeAlias
 import msgspec
 from msgspec import Struct, inspect
 
-from foosim.common.errors import BadValue, Malformed
+from foosim.common.errors import BadValue, Malformed, NotFinite
 
 FLOAT_MAX: Final = sys.float_info.max
 FLOAT: Final = frozenset((float,))
@@ -109,12 +109,27 @@ class PayloadCodec:
             self._check(field_at(self.fields, len(numbers), place).name, number)
         return struct.pack(f"<{len(numbers)}d", *numbers)
 
+    def encode_checked(self, value: Any) -> bytes:
+        """Return the payload of a value that may hold anything.
+
+        Raises NotFinite for a number that is not finite, BadValue for what is not of its field's type.
+        """
+        payload = self.encode(value)
+        if not self._is_packed:
+            try:
+                self._other.decode(payload)
+            except msgspec.DecodeError as error:
+                raise BadValue(f"{self.name}: {error}", value) from None
+            if not _is_finite(msgspec.to_builtins(value)):
+                raise NotFinite(f"{self.name} with numbers that are not finite")
+        return payload
+
     def encode_numbers(self, numbers: Sequence[float]) -> bytes:
-        """Return the payload of a value's numbers; raises BadValue for one that is not finite."""
+        """Return the payload of a value's numbers; raises NotFinite for one that is not finite."""
         is_whole = not self._many and len(numbers) == len(self.fields)
         payload = self._packed.pack(*numbers) if is_whole else struct.pack(f"<{len(numbers)}d", *numbers)
         if not all(map(isfinite, numbers)):
-            raise BadValue(f"{self.name} with numbers that are not finite", list(numbers))
+            raise NotFinite(f"{self.name} with numbers that are not finite", list(numbers))
         return payload
 
     def from_numbers(self, numbers: Sequence[float]) -> Any:
@@ -130,7 +145,7 @@ class PayloadCodec:
         if not isinstance(number, int | float):
             raise BadValue(f"{self.name}.{field} is not a number", number)
         if not -FLOAT_MAX <= number <= FLOAT_MAX:
-            raise BadValue(f"{self.name}.{field} is not finite", number)
+            raise NotFinite(f"{self.name}.{field} is not finite", number)
 
     def numbers(self, value: Any) -> list[Any]:
         """Return all numbers of a value, in the order of its fields; of what is not packed none. Raises BadValue."""
@@ -159,6 +174,15 @@ def field_at(fields: Sequence[Field], size: int, place: int) -> Field:
     many = many_of(fields)
     single = len(fields) - many
     return fields[place] if place < single else fields[single + (place - single) * many // (size - single)]
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether all numbers in a value of plain types are finite."""
+    if isinstance(value, float):
+        return isfinite(value)
+    if isinstance(value, dict):
+        return all(map(_is_finite, value.values()))
+    return not isinstance(value, list | tuple) or all(map(_is_finite, value))
 
 
 def as_mapping(value: Value) -> dict[str, Any]:

@@ -337,7 +337,9 @@ def _of_class(form: str, path: str) -> Form:
     for component in _known.values():
         if component.form == form and component.made is made:
             return component
-    raise Refused(f"not registered as {with_article(word_of(form))}")
+    there = [one.made.__qualname__ for one in _known.values() if one.module == module_name and one.form == form]
+    hint = f"; {module_name} registers {', '.join(sorted(there))}" if there else ""
+    raise Refused(f"not registered as {with_article(word_of(form))}{hint}")
 
 
 def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:
