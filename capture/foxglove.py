@@ -36,7 +36,7 @@ from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, moved, rotate
 from foosim.world.scene import Quaternion as Turn
 

@@ -12,7 +12,7 @@ from foosim.deployment.loader import apply_sets, check_open_meshes, check_state_
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
 from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
-from foosim.world.mesh import AssetError, digest_of
+from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.scenery import SceneryMesh
 
 

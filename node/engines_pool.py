@@ -19,7 +19,7 @@ from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout, build_layout
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 
 FINGERPRINT_TICKS: Final = 32
 ENGINES_KEPT: Final = 3

@@ -13,7 +13,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Fetch, Piece
-from foosim.world.mesh import digest_of
+from foosim.world.matter.mesh import digest_of
 
 
 class Fetching:

@@ -21,7 +21,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, Epoch, Fetch, FormVersion, Heartbeat, Hello, Piece, Ready, Recall, Refusal
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.layout import Layout, build_layout
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 
 AGAIN_NS: Final = 200_000_000
 

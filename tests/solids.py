@@ -11,7 +11,7 @@ from foosim.world.components.drives import NO_DRIVES, Drives
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS, NO_ENTITY, PARTNERS, PARTNERS_MAX, Model
 from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity
-from foosim.world.physics import Contact, Physics, Side
+from foosim.world.matter.physics import Contact, Physics, Side
 from foosim.world.scene import ORIGIN, UPRIGHT, Body, Box, Geometry, Link, Quaternion, Shape, Sphere, Vector
 
 TICK_S: Final = 0.01

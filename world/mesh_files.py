@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from foosim.common import limits
 from foosim.common.errors import describe
-from foosim.world.mesh import MESH_SUFFIXES, AssetError, Mesh
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh
 
 EXTENT_MIN_M: Final = 1e-4
 EXTENT_MAX_M: Final = 1e3

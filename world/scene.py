@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from math import cos, inf, sin, sqrt
 from typing import Final, Literal, TypeAlias
 
-from foosim.world.materials import UNKNOWN, RadioMaterial
-from foosim.world.mesh import Mesh
+from foosim.world.matter.materials import UNKNOWN, RadioMaterial
+from foosim.world.matter.mesh import Mesh
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -18,8 +18,8 @@ from foosim.common import limits, units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.materials import UNKNOWN, Radio
-from foosim.world.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of
+from foosim.world.matter.materials import UNKNOWN, Radio
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of
 from foosim.world.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, from_rpy
 
 PATH_LENGTH_MAX: Final = 200

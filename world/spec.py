@@ -12,8 +12,8 @@ from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
-from foosim.world.mesh import AssetError, Mesh, check_digest
-from foosim.world.physics import PhysicsSettings, SurfaceSettings
+from foosim.world.matter.mesh import AssetError, Mesh, check_digest
+from foosim.world.matter.physics import PhysicsSettings, SurfaceSettings
 from foosim.world.scene import Shape
 from foosim.world.scenery import (
     SCENERY_MAX,

@@ -15,7 +15,7 @@ from foosim.world.assembly.world import addition, mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.layout import Entity, Layout
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {

@@ -11,7 +11,7 @@ from typing import Final
 
 from foosim.deployment.network.impairments import Impairments, TableJitter, Trace
 from foosim.deployment.network.rules import Network
-from foosim.world.mesh import AssetError, check_digest
+from foosim.world.matter.mesh import AssetError, check_digest
 
 NUMBERS_MAX: Final = 1_000_000
 

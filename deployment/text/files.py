@@ -20,7 +20,7 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.deployment.text.includes import Source, Wanted, inlined
 from foosim.deployment.text.yaml import Place, Problem
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 from foosim.world.scenery import path_problem
 
 NO_FILES: Final[Mapping[str, bytes]] = MappingProxyType({})

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from foosim.node.physics.quiet import without_lines
-from foosim.world.mesh import Mesh
-from foosim.world.physics import Physics, Side
+from foosim.world.matter.mesh import Mesh
+from foosim.world.matter.physics import Physics, Side
 from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector
 
 with without_lines(b"pybullet build time:"):

@@ -37,8 +37,8 @@ from foosim.world.components.drives import Motor
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
-from foosim.world.mesh import Mesh
-from foosim.world.physics import Physics
+from foosim.world.matter.mesh import Mesh
+from foosim.world.matter.physics import Physics
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Hull, Link, Shape, Vector, in_pieces, swept_box
 
 BODIES: Final = 1

@@ -26,7 +26,7 @@ from foosim.protocol.codec import decode_any, encode
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.components.drives import NO_DRIVES
 from foosim.world.layout import Entity, build_layout
-from foosim.world.mesh import AssetError, Mesh
+from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import Body, Shape, Vector, place, shape_box
 from foosim.world.scenery import SceneryMesh
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import sin, sqrt
 from typing import Final
 
-from foosim.world.physics import Contact
+from foosim.world.matter.physics import Contact
 from foosim.world.scene import Body, Sphere, Vector, inertia_about_axis
 
 # Not Final: compiled by mypyc 2.4, a Final tuple of so many floats counts as not set.

@@ -11,7 +11,7 @@ from math import cos, sin, sqrt
 from typing import Final
 
 from foosim.node.physics.pure_bodies import FreeSphere, Shaft
-from foosim.world.physics import Contact
+from foosim.world.matter.physics import Contact
 from foosim.world.scene import UPRIGHT, Body, Box, Cylinder, Shape, Vector, rotate, shape_box
 
 CELL_M: Final = 0.05

@@ -17,7 +17,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_files
-from foosim.world.mesh import AssetError, digest_of
+from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.scene import Box
 from foosim.world.scenery import path_problem
 

@@ -9,7 +9,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.traces import file_settings, read_opportunities, read_table
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
-from foosim.world.mesh import AssetError, digest_of
+from foosim.world.matter.mesh import AssetError, digest_of
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RULES = (

@@ -373,7 +373,7 @@ def test_modifiers_of_a_sensor_that_speaks_have_room_for_a_value_at_each_tick(si
     [
         ("floor", ""),
         ("", ""),
-        ("flor", "scene own_form:shapes has scenery of an unknown surface (there are: figures, floor, goal, ramps, "
+        ("flor", "scene own_form:shapes has an unknown surface (there are: figures, floor, goal, ramps, "
          "rods, walls; and '' of what no rigid body feels), 'flor', nearest is 'floor'"),
     ],
 )  # fmt: skip

@@ -16,6 +16,7 @@ from foosim.client.player import Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.world.forms import registry
+from foosim.world.forms.payloads import PayloadCodec
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 Place = tuple[str | int, ...]
@@ -33,13 +34,13 @@ class Driver:
         assert kind.value is not None
         self._value: type[Struct] = kind.value
         self._robots = parameters["robots"]
-        (limits,) = {
-            tuple(sorted(one.limits.items()))
-            for robot in self._robots[:1]
-            for one in CommandEncoder(deployment).actuators(robot)
-        }
-        least = [min(-low, high) for _, (low, high) in limits]
-        self._bounds = [min(bound, most) for bound, most in zip(parameters["bounds"], least, strict=True)]
+        bounds = parameters["bounds"]
+        found = [one for one in CommandEncoder(deployment).actuators(self._robots[0]) if one.limits]
+        limits = sorted(found[0].limits.items()) if found else []
+        least = [max(abs(low), abs(high)) for _, (low, high) in limits] * len(bounds)
+        self._bounds = [min(bound, most) for bound, most in zip(bounds, least, strict=False)] if limits else bounds
+        self._is_several = PayloadCodec(kind.value, kind.name).fields[-1].is_several
+        self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
         """Return commands for all, whatever was heard."""
@@ -47,8 +48,10 @@ class Driver:
 
     def _command(self, robot: str, tick: int) -> Struct:
         words = draw_words(draw_key(3, "driver", robot), tick)
-        numbers = [bound * (word / 2.0**63 - 1.0) for bound, word in zip(self._bounds, words, strict=False)]
-        return self._value(*numbers)
+        words = [*words, *draw_words(draw_key(4, "driver", robot), tick)]
+        shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in words]
+        numbers = [bound * share for bound, share in zip(self._bounds, shares, strict=False)]
+        return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 
 
 def driver(robots: Sequence[str], kind: str, bounds: Sequence[float], rate: str) -> dict[str, Any]:
@@ -125,6 +128,60 @@ def _yard() -> dict[str, Any]:
     }
 
 
+@cache
+def _solids() -> dict[str, Any]:
+    """Rigid bodies of every shape that fall on a floor, and quadrotors among them."""
+    corners = [[x, y, z] for x in ("-10 cm", "10 cm") for y in ("-10 cm", "10 cm") for z in ("0 cm", "20 cm")]
+    shapes: dict[str, Any] = {
+        "box": {"model": "box", "size": ["30 cm", "20 cm", "10 cm"]},
+        "capsule": {"model": "capsule", "radius": "10 cm", "length": "20 cm"},
+        "cylinder": {"model": "cylinder", "radius": "10 cm", "length": "20 cm"},
+        "hull": {"model": "hull", "corners": corners},
+        "sphere": {"model": "sphere", "radius": "10 cm"},
+    }
+    objects = {
+        name: {**shape, "mass": "1 kg", "at": {"x": f"{number % 3 * 25} cm", "z": f"{20 + number * 25} cm"}}
+        for number, (name, shape) in enumerate(shapes.items())
+    }
+    flyers = ("quad-1", "quad-2")
+    robots = {
+        name: {"model": "quadrotor", "at": {"x": f"{number} m", "y": "60 cm", "z": "50 cm"}, "sensors": {}}
+        for number, name in enumerate(flyers)
+    }
+    return {
+        "format": 2,
+        "world": "solids",
+        "seed": 1,
+        "tick": "10 ms",
+        "substeps": 2,
+        "engine": "bullet",
+        "pace": "fast",
+        "scene": {"kind": "empty"},
+        "objects": objects,
+        "robots": robots,
+        "players": driver(flyers, "rotor_speeds", (900.0,) * 4, "50 Hz"),
+        "nodes": {"n": {"robots": ["*"]}},
+        "network": {"links": [LINK]},
+    }
+
+
+def _pushed() -> World:
+    """The same, with forces on the quadrotors."""
+    data = json.loads(json.dumps(_solids()))
+    for robot in data["robots"].values():
+        robot["actuators"] = {"push": {"kind": "force", "force": "20 N", "torque": "0.1 N m"}}
+    flyers = list(data["robots"])
+    return World(data | {"players": driver(flyers, "force", (20.0, 20.0, 20.0, 0.1, 0.1, 0.1), "50 Hz")})
+
+
+def _jointed(kind: str, bounds: Sequence[float]) -> World:
+    """The table with general actuators of joints on its rods."""
+    data = json.loads(json.dumps(_table()))
+    for rod in RODS:
+        data["robots"][rod]["actuators"] = {"joints": {"kind": kind}}
+    return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")})
+
+
 class World(NamedTuple):
     """The plain data of a deployment, and the place of the form's settings in it; no place: it has none."""
 
@@ -152,6 +209,7 @@ TABLE: Final = World(_table())
 HALL: Final = World(_hall())
 EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude": "13.4 deg"}})
 YARD: Final = World(_yard())
+SOLIDS: Final = World(_solids())
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -208,7 +266,17 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
     ("sensor", "range"): sensor(HALL, ROVERS, "range", range="3 m", cone="30 deg", at={"z": "20 cm"}),
     ("sensor", "velocity"): sensor(YARD, ["one", "base", "craft"], "velocity", at={"x": "20 cm"}),
+    ("actuator", "force"): _pushed(),
+    ("actuator", "joint_position"): _jointed("joint_position", (0.1, 2.0)),
+    ("actuator", "joint_velocity"): _jointed("joint_velocity", (0.5, 20.0)),
     ("actuator", "rod_position"): TABLE,
+    ("actuator", "rotor_speeds"): SOLIDS,
+    ("model", "box"): SOLIDS,
+    ("model", "capsule"): SOLIDS,
+    ("model", "cylinder"): SOLIDS,
+    ("model", "hull"): SOLIDS,
+    ("model", "quadrotor"): SOLIDS,
+    ("model", "sphere"): SOLIDS,
     ("actuator", "v_w"): YARD,
     ("actuator", "waypoint"): YARD,
     ("actuator", "x_y_w"): YARD,

@@ -31,7 +31,7 @@ from foosim.rehearsal.system import Settings
 from foosim.runtime.journal import Journal, read_records
 from foosim.runtime.run_folder import RunFolder, RunInfo
 from foosim.vhub.state.records import fold
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 from foosim.world.mesh_files import read_mesh
 from foosim.world.robot_packets import Delivered
 

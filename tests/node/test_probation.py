@@ -12,7 +12,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics import mesh_trial
 from foosim.node.physics.mesh_trial import check_models
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"

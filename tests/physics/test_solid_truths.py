@@ -12,8 +12,8 @@ import pytest
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.kinematics import forward_kinematics, twist
-from foosim.world.mesh import Mesh
-from foosim.world.physics import Side
+from foosim.world.matter.mesh import Mesh
+from foosim.world.matter.physics import Side
 from foosim.world.scene import ORIGIN, Body, Box, Capsule, Cylinder, Hull, Link, Sphere, Vector, rotate, turn
 from tests.solids import GRAVITY, TICK_S, Solids, ball, box, physics, shape
 

@@ -15,7 +15,7 @@ from foosim.common import limits
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify, verify_capture
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

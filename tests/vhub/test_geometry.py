@@ -18,8 +18,8 @@ from foosim.vhub.line_of_sight.occlusion import Crossing, Geometry, LineOfSight,
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
 from foosim.world.layout import Declared, Layout, build_layout
-from foosim.world.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
-from foosim.world.mesh import Mesh
+from foosim.world.matter.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
+from foosim.world.matter.mesh import Mesh
 from foosim.world.mesh_files import read_mesh
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import (

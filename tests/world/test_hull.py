@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue
 from foosim.world.bodies.hull import CORNERS_MAX, convex_hull
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.mesh_files import is_closed
 
 Points = NDArray[np.float64]

@@ -12,7 +12,7 @@ import pytest
 
 from foosim.common import limits
 from foosim.common.errors import Refused
-from foosim.world.mesh import AssetError, Mesh
+from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.mesh_files import pieces, read_mesh
 
 Point = tuple[float, float, float]

@@ -14,7 +14,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import build_layout
-from foosim.world.materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
+from foosim.world.matter.materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
 from foosim.world.mesh_files import is_closed, read_mesh
 from foosim.world.scene import Cylinder
 

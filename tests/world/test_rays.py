@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Declared, Layout
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.mesh_files import read_mesh
 from foosim.world.rays.caster import Caster, Placement
 from foosim.world.rays.kernels import box_spans, capsule_spans, cylinder_spans, sphere_spans

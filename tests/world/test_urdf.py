@@ -19,7 +19,7 @@ from foosim.world.forms.forms import BODY, Model
 from foosim.world.forms.settings import RobotSettings
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 from foosim.world.scene import (
     MOVING,
     ORIGIN,

@@ -22,7 +22,7 @@ from foosim.world.forms import misfits, registry
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.mesh import AssetError, digest_of
+from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.models.urdf import arms_of
 from foosim.world.scene import from_rpy
 

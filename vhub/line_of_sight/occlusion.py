@@ -19,7 +19,7 @@ from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Declared, Layout
-from foosim.world.materials import RadioMaterial
+from foosim.world.matter.materials import RadioMaterial
 from foosim.world.rays.boxes import MARGIN_M, boxes_around, boxes_met_by
 from foosim.world.rays.solids import Line, Meshes, Piece, Solid, chord_of, joined, ray_of, solid_of
 from foosim.world.scene import (

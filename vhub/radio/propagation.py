@@ -26,7 +26,7 @@ from foosim.vhub.radio.path_loss import (
     vehicle_blockage_db,
 )
 from foosim.vhub.radio.shadowing import Shadowing
-from foosim.world.materials import RadioMaterial
+from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scene import Vector
 
 OLDER_MAX: Final = 1024

@@ -11,13 +11,13 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.world.components.drives import Motor
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
 
-Gain = Annotated[float, Quantity(units.FREQUENCY, "1 mHz", "100 kHz")]
+Gain = Annotated[float, Quantity(units.FREQUENCY, "0.001 Hz", "100 kHz")]
 
 
 class JointPositionSettings(JointSettings):
@@ -72,9 +72,9 @@ class JointPositionActuator:
         """Move each joint by a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
-    def command(self, view: View) -> tuple[Motor, ...]:
+    def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor."""
         group, gain = self._group, self._gain
         wanted = view.read(group.set_point)
         drives = zip(wanted, group.positions(view), group.speeds, group.forces, strict=True)
-        return tuple([Motor(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])
+        return tuple([(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.world.components.drives import Motor
+from foosim.world.components.misfit import Misfit
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
@@ -30,8 +31,10 @@ class JointTorqueActuator:
 
     @staticmethod
     def check(settings: JointTorqueSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise Misfit for a joint that the robot does not have, and a robot whose motors have speeds alone."""
         JointGroup(settings, at)
+        if not at.robot.kind.couples:
+            raise Misfit(("kind",), f"the motors of a {at.robot.model} have speeds alone", settings.kind)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return no bounds that are common to all joints: each has its own."""

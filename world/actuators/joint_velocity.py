@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from foosim.world.components.drives import Motor
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
@@ -50,7 +50,7 @@ class JointVelocityActuator:
         """Turn each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
 
-    def command(self, view: View) -> tuple[Motor, ...]:
+    def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor."""
         wanted = view.read(self._group.set_point)
-        return tuple([Motor(speed, force) for speed, force in zip(wanted, self._group.forces, strict=True)])
+        return tuple(zip(wanted, self._group.forces, strict=True))

@@ -10,7 +10,7 @@ from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.world.fixed_scenery import kits_of
 from foosim.world.forms import registry
-from foosim.world.physics import Physics, physics_from
+from foosim.world.matter.physics import Physics, physics_from
 from foosim.world.spec import WorldSpec
 
 STANDARD_GRAVITY: Final = 9.80665
@@ -53,17 +53,22 @@ def _has_rigid(spec: WorldSpec) -> bool:
 
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield the surfaces of scenery that the kit with what rigid bodies feel does not have."""
+    """Yield the surfaces of scenery and bodies of which nobody says what rigid bodies feel of them."""
     made: list[tuple[Location, str, list[str]]] = []
     for name, kit in kits_of(spec):
         made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()]))  # type: ignore[attr-defined]
     if spec.scene is not None:
         surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces))
-    known = physics_of(spec).surfaces
+    for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
+        for name, one in entities.items():
+            if hasattr(one, "surface"):
+                made.append(((section, name, "surface"), f"{one.model} {name}", [one.surface]))
+    felt = physics_of(spec)
+    known = felt.surfaces or felt.sides
     for location, what, surfaces in made:
         for surface in dict.fromkeys(surfaces):
             if surface != FELT_BY_NOBODY and surface not in known:
                 valid = f"there are: {', '.join(sorted(known))}; and '' of what no rigid body feels"
                 nearest = quoted(nearest_name(surface, known))
-                yield Finding(location, f"{what} has scenery of an unknown surface ({valid})", surface, nearest)
+                yield Finding(location, f"{what} has an unknown surface ({valid})", surface, nearest)

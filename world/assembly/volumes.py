@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
-from foosim.world.physics import Physics
+from foosim.world.matter.physics import Physics
 from foosim.world.scene import UPRIGHT, Body, Vector, conjugate, moved, rotate, swept_box
 from foosim.world.spec import WorldSpec
 

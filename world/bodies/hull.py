@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 
 CORNERS_MAX: Final = 255
 STEPS: Final = 1 << 20

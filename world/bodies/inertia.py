@@ -13,7 +13,7 @@ from math import sqrt
 from typing import Final, NamedTuple
 
 from foosim.common.errors import BadValue
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,

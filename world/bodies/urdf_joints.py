@@ -22,7 +22,7 @@ from foosim.world.bodies.urdf_values import (
     vector_of,
 )
 from foosim.world.bodies.xml_tree import Element
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 from foosim.world.scene import MOVING, ORIGIN, JointKind, Vector
 
 X_AXIS: Final[Vector] = (1.0, 0.0, 0.0)

@@ -30,7 +30,7 @@ from foosim.world.bodies.urdf_values import (
     vector_of,
 )
 from foosim.world.bodies.xml_tree import Element
-from foosim.world.mesh import MESH_SUFFIXES, AssetError
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,

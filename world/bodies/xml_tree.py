@@ -13,7 +13,7 @@ from typing import Final
 from xml.parsers import expat
 
 from foosim.common.errors import ABSENT, describe
-from foosim.world.mesh import AssetError
+from foosim.world.matter.mesh import AssetError
 
 BYTES_MAX: Final = 1024 * 1024
 ELEMENTS_MAX: Final = 20_000

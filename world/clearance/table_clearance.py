@@ -14,7 +14,7 @@ from math import hypot, sqrt
 from typing import Final
 
 from foosim.common.finding import Finding
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.models.rod import ALONG_Y, RodRobot, figure_ys, line_x_m
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Box, Cylinder, Quaternion, Shape, Vector, rotate, shape_box

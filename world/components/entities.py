@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 from foosim.common.keyed_random import draw_key
 from foosim.world.components.view import Mounting, Slot, SolvingView, WritableView
 from foosim.world.layout import WORLD, Entity, Layout
-from foosim.world.physics import Physics
+from foosim.world.matter.physics import Physics
 from foosim.world.scene import Body, Shape
 from foosim.world.spec import WorldSpec
 

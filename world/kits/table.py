@@ -10,9 +10,9 @@ from foosim.common.finding import Finding
 from foosim.common.plain_data import PlainData
 from foosim.world.clearance.table_clearance import clearance_findings
 from foosim.world.forms.registry import kit
+from foosim.world.matter.physics import Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
 from foosim.world.parameters.table_checks import table_findings
-from foosim.world.physics import Contact, Physics, Side
 from foosim.world.scene import Shape
 from foosim.world.scenes.football_table import table_scenery
 from foosim.world.spec import WorldSpec

@@ -10,7 +10,7 @@ from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import PLASTIC
+from foosim.world.matter.materials import PLASTIC
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import ORIGIN, Body, Colour, Link, Shape, Sphere, Vector
 

@@ -20,7 +20,6 @@ class BoxObject(ObjectSettings):
 
 @model("box", BoxObject, slots=RIGID, is_robot=False, is_rigid=True, tags=("object",))
 def box(settings: BoxObject, at: Mounting) -> RigidObject:
-    """A box of uniform density: I = m (b^2 + c^2) / 12."""
+    """A box of uniform density."""
     a, b, c = settings.size
-    inertia = (b * b + c * c) / 12.0, (a * a + c * c) / 12.0, (a * a + b * b) / 12.0
-    return RigidObject(settings, at, Box((a / 2, b / 2, c / 2)), inertia)
+    return RigidObject(settings, at, Box((a / 2, b / 2, c / 2)))

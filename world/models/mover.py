@@ -17,7 +17,7 @@ from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import UNKNOWN, Radio
+from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.moving.path import Path, Point, path_at_speed, path_of
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.vehicles import HULL, Height, Radius, Speed, is_in_reach

@@ -7,7 +7,7 @@ from typing import Final
 
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
-from foosim.world.materials import PLASTIC
+from foosim.world.matter.materials import PLASTIC
 from foosim.world.parameters.primitives import RIGID, ROUNDING, SPIN_MAX
 from foosim.world.parameters.rotors import QuadrotorRobot
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape

@@ -10,7 +10,7 @@ from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import CONTACTS, JOINTS
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import METAL, PLASTIC
+from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.parameters.table import Line, LineName, Table, Team, table_of
 from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Shape, Vector
 from foosim.world.spec import WorldSpec

@@ -12,7 +12,7 @@ from foosim.common.units import Quantity
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import METAL, PLASTIC
+from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.moving.upright import Upright
 from foosim.world.moving.wheels import Wheels, slips_of
 from foosim.world.parameters.hall import Place, hall_of

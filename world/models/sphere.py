@@ -16,6 +16,5 @@ class SphereObject(ObjectSettings):
 
 @model("sphere", SphereObject, slots=RIGID, is_robot=False, is_rigid=True, tags=("object",))
 def sphere(settings: SphereObject, at: Mounting) -> RigidObject:
-    """A sphere of uniform density: I = 2/5 m r^2."""
-    moment = 0.4 * settings.radius * settings.radius
-    return RigidObject(settings, at, Sphere(settings.radius), (moment, moment, moment))
+    """A sphere of uniform density."""
+    return RigidObject(settings, at, Sphere(settings.radius))

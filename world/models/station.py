@@ -8,7 +8,7 @@ from typing import Final
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import METAL
+from foosim.world.matter.materials import METAL
 from foosim.world.parameters.hall import Place, hall_of
 from foosim.world.parameters.hall_bodies import mast, standing
 from foosim.world.scene import Body, Colour, Cylinder, Shape

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from foosim.world.materials import PLASTIC
+from foosim.world.matter.materials import PLASTIC
 from foosim.world.scene import ORIGIN, Body, Colour, Cylinder, Link, Shape, Vector
 
 DARK: Final[Colour] = (0.15, 0.15, 0.18, 1.0)

@@ -10,13 +10,14 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
+from foosim.world.bodies.inertia import principal_of, solid
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS, PARTNERS, RESTING
 from foosim.world.forms.settings import EntitySettings
-from foosim.world.materials import UNKNOWN, Radio
-from foosim.world.physics import DEFAULT
+from foosim.world.matter.materials import UNKNOWN, Radio
+from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At
-from foosim.world.scene import ORIGIN, Body, Geometry, Link, Shape, Vector
+from foosim.world.scene import ORIGIN, Body, Geometry, Link, Shape, moved, multiply, rotate
 from foosim.world.scenery import Material
 
 ObjectMass = Annotated[float, Quantity(units.MASS, "1 mg", "1000000 kg")]
@@ -49,9 +50,10 @@ class ObjectSettings(EntitySettings):
 class RigidObject:
     """An entity of one shape and a uniform density, in the frames of one layout."""
 
-    def __init__(self, settings: ObjectSettings, at: Mounting, geometry: Geometry, inertia: Vector) -> None:
-        """`inertia` is the diagonal about the middle of the shape, for a mass of 1 kg (m2)."""
-        self._settings, self._at, self._geometry, self._inertia = settings, at, geometry, inertia
+    def __init__(self, settings: ObjectSettings, at: Mounting, geometry: Geometry) -> None:
+        self._settings, self._at, self._geometry = settings, at, geometry
+        whole = solid(geometry, settings.mass)
+        self._centre, (self._moments, self._axes) = whole.centre, principal_of(whole.tensor)
         self._position, self._velocity = at.slot("position").at, at.slot("linear_velocity").at
         self._spin = at.slot("angular_velocity").at
         self._speed_max = settings.speed_limit
@@ -62,16 +64,16 @@ class RigidObject:
         settings, name = self._settings, self._at.robot.name
         radio = UNKNOWN if settings.radio is None else settings.radio
         shape = Shape(self._geometry, settings.surface, settings.material.colour, radio=radio)
-        x, y, z = self._inertia
-        mass = settings.mass
-        link = Link(name, "free", (shape,), mass, (mass * x, mass * y, mass * z))
+        link = Link(
+            name, "free", (shape,), settings.mass, self._moments, centre_of_mass=self._centre, principal=self._axes
+        )
         return Body(name, settings.model, ORIGIN, (link,), speed_limit=settings.speed_limit)
 
     def place(self, view: WritableView) -> None:
         """Set it to its start, at rest."""
-        at = self._at
-        view.write(at.slot("position"), *self._settings.at.position)
-        view.write(at.slot("orientation"), *self._settings.at.orientation)
+        at, pose = self._at, self._settings.at
+        view.write(at.slot("position"), *moved(pose.position, rotate(pose.orientation, self._centre), 1.0))
+        view.write(at.slot("orientation"), *multiply(pose.orientation, self._axes))
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def stir(self, view: WritableView) -> None:

@@ -11,7 +11,7 @@ from foosim.common import units
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.physics import DEFAULT
+from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At
 
 RotorSpeed = Annotated[float, Quantity(units.SPIN, "1 rad/s", "20000 rad/s")]

@@ -13,7 +13,8 @@ from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.settings import RobotSettings
-from foosim.world.materials import METAL, PLASTIC
+from foosim.world.matter.materials import METAL, PLASTIC
+from foosim.world.matter.physics import DEFAULT
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.hall_bodies import DARK, mast
 from foosim.world.placing import ORIGIN_OF_WORLD, At
@@ -29,7 +30,7 @@ Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
-HULL: Final = ""
+HULL: Final = DEFAULT
 """The surface of robots without rigid-body dynamics."""
 
 

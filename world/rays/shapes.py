@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.rays.boxes import MARGIN_M, Floats
 from foosim.world.rays.solids import CAPSULE, CYLINDER, SPHERE, Meshes, form_of
 from foosim.world.rays.sorted_boxes import SortedBoxes

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from math import sqrt
 from typing import Final
 
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.rays.spans import Span, box_span, capsule_span, cylinder_span, sphere_span
 from foosim.world.rays.triangles import Triangles
 from foosim.world.scene import (

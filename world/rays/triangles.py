@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.mesh import Mesh
+from foosim.world.matter.mesh import Mesh
 from foosim.world.mesh_files import is_closed
 from foosim.world.rays.boxes import STEP_MIN, Floats, as_columns, between_sides, boxes_around
 from foosim.world.scene import Vector

@@ -10,7 +10,7 @@ from foosim.common import units
 from foosim.common.spec_base import Name, SpecBase
 from foosim.common.units import Quantity
 from foosim.world.forms.registry import scene
-from foosim.world.materials import UNKNOWN, Radio
+from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.placing import ORIGIN_OF_WORLD, At
 from foosim.world.scene import Box, Shape, rotate
 from foosim.world.scenery import Material
@@ -32,7 +32,7 @@ class SceneBox(SpecBase):
     length: Side
     width: Side
     height: Side
-    surface: str = ""
+    surface: str = "walls"
     material: Material = Field(default_factory=Material)
     radio: Radio | None = None
 

@@ -9,7 +9,7 @@ from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
-from foosim.world.materials import CONCRETE
+from foosim.world.matter.materials import CONCRETE
 from foosim.world.scene import Box, Colour, Shape
 
 GREY: Final[Colour] = (0.62, 0.62, 0.60, 1.0)
@@ -26,7 +26,7 @@ class EmptySettings(SceneSettings):
 
     length: Side = default("100 m")
     width: Side = default("100 m")
-    surface: str = ""
+    surface: str = "floor"
 
 
 @scene("empty", EmptySettings)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
-from foosim.world import materials
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
+from foosim.world.matter import materials
 from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Table, Walls
 from foosim.world.scene import Box, Colour, Shape, Vector
 

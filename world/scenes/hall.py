@@ -6,7 +6,7 @@ from typing import Final
 
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
-from foosim.world.materials import CONCRETE
+from foosim.world.matter.materials import CONCRETE
 from foosim.world.parameters.hall import Hall, HallWalls, Side
 from foosim.world.scene import Box, Colour, Shape, Vector
 

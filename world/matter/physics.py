@@ -82,7 +82,7 @@ class PhysicsSettings(SpecBase):
 
 
 DEFAULT: Final = "default"
-BASIC: Final = (DEFAULT, "floor", "walls")
+BASIC: Final = ("default", "floor", "walls")
 """Surfaces that each world has; those of these names in a deployment replace them."""
 
 
