@@ -105,11 +105,12 @@ class FittedSensor:
         """Return what is measured. Raises ComponentError."""
         try:
             reading = self.sensor.sample(view)
-            if isinstance(reading, self.codec.kind):
-                return reading
-            raise WrongResult(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
+        if not isinstance(reading, self.codec.kind):
+            wrong = WrongResult(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
+            raise self.failed(view.tick, wrong) from wrong
+        return reading
 
     def failed(self, tick: int, error: BaseException) -> ComponentError:
         """Return the error of a sensor that has raised, or whose reading is none."""

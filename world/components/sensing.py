@@ -172,10 +172,12 @@ def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None
             return one.codec.encode_numbers(reading.tolist())
         if isinstance(reading, list):
             return one.codec.encode_numbers(reading)
-        payload = one.codec.encode_checked(reading)
-        if one.size and len(payload) != 8 * one.size:
-            raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
-        return payload
+        if not one.size:
+            return one.codec.encode_checked(reading)
+        payload = one.codec.encode(reading)
+        if len(payload) == 8 * one.size:
+            return payload
+        raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
     except NotFinite:
         view.not_finite.append(one)
         return None
