@@ -103,7 +103,8 @@ class CommandEncoder:
         payload = one.codec.encode(command)
         for name, (least, most) in one.limits.items():
             value = getattr(command, name)
-            if not least <= value <= most:
-                (unit,) = [field.unit for field in one.codec.fields if field.name == name]
-                raise BadValue(f"{name} of {robot} is not within {least} to {most} {unit}", value)
+            for number in value if isinstance(value, tuple | list) else (value,):
+                if not least <= number <= most:
+                    (unit,) = [field.unit for field in one.codec.fields if field.name == name]
+                    raise BadValue(f"{name} of {robot} is not within {least} to {most} {unit}", number)
         return payload

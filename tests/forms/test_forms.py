@@ -74,7 +74,7 @@ def test_it_obeys_the_laws(key: Key) -> None:
 def test_its_world_moves(key: Key) -> None:
     """A world in which nothing happens would prove nothing: robots go where they are told, sensors measure."""
     moved = changed(WORLDS[key].text())
-    assert any(slot.endswith(("joint_positions", "wheel_travel")) for slot in moved)
+    assert any(slot.endswith(("joint_positions", "wheel_travel", "angular_velocity")) for slot in moved)
     if key[0] == "sensor" or key[0] == "modifier":
         assert any(slot.endswith("own.samples") for slot in moved)
 

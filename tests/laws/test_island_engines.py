@@ -21,7 +21,7 @@ from foosim.node.physics.bullet_islands import CompositionEngine
 from foosim.world.assembly.volumes import overlapping
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.layout import Entity
-from foosim.world.scene import Body, Capsule, Link, Vector
+from foosim.world.scene import Body, Box, Capsule, Cylinder, Link, Vector
 from tests.solids import TICK_S, Solids, box, shape
 
 SEED: Final = 20
@@ -210,6 +210,24 @@ class WithoutParking(CompositionEngine):
         pass
 
 
+class OnlyParked(CompositionEngine):
+    """Leaves pairs to Bullet, which ends few of them at a time."""
+
+    def _wipe(self) -> None:
+        for made in self._made:
+            self._park(made)
+        p.performCollisionDetection(physicsClientId=self._client)
+
+
+class Untied(CompositionEngine):
+    def _tie(self) -> None:
+        pass
+
+
+def make_of(kind: type[CompositionEngine], made: Solids, bodies: Sequence[Body]) -> CompositionEngine:
+    return kind(made.feel, made.tick_s / made.substeps, made.substeps, made.scenery, bodies, ())
+
+
 def of_engine(kind: type[CompositionEngine]) -> type[Comparison]:
     """Comparisons whose engines are of a kind."""
 
@@ -218,8 +236,7 @@ def of_engine(kind: type[CompositionEngine]) -> type[Comparison]:
             super().__init__(self._made)
 
         def _made(self, bodies: Sequence[Body]) -> CompositionEngine:
-            feel, step_s = self.world.feel, self.world.tick_s / self.world.substeps
-            return kind(feel, step_s, self.world.substeps, self.world.scenery, bodies, ())
+            return make_of(kind, self.world, bodies)
 
     return Mutant
 
@@ -247,6 +264,105 @@ class InAnotherOrder(Comparison):
 def test_a_rule_that_is_broken_is_seen(kind: type[Comparison]) -> None:
     outcome = compared(600, kind, until_it_differs=True)
     assert outcome.differing, outcome
+
+
+def crowd() -> Solids:
+    """Two arms out of each other's reach, and boxes around each."""
+    boxes = [box(f"box{number}", (0.08, 0.08, 0.08), 0.3) for number in range(6)]
+    return Solids([arm("arm0", 0.0), arm("arm1", 1.6), *boxes])
+
+
+def crowded(kind: type[CompositionEngine], loads: int) -> Outcome:
+    """Solve a crowd, drawn anew at each load, by one engine that is kept and by a new one at each load.
+
+    Three boxes overlap with each arm: which of them Bullet names the arm's island after depends on the order in which
+    the overlaps are found. One load of a past is enough to change it.
+    """
+    made, outcome = crowd(), Outcome()
+    kept = make_of(kind, made, made.bodies)
+    for load in range(loads):
+        for number in range(6):
+            x, y = draw(10 + number, load, -0.25, 0.25), draw(20 + number, load, -0.25, 0.25)
+            made.put(f"box{number}", (1.6 * (number % 2) + x, y, draw(30 + number, load, 0.1, 1.2)))
+        for number in range(2):
+            name, of = f"arm{number}", [100 * number + joint for joint in range(JOINTS)]
+            made.set(name, "joint_positions", *[draw(1000 + at, load, -0.3, 0.3) for at in of])
+            made.set(name, "joint_velocities", *[draw(2000 + at, load, -1.0, 1.0) for at in of])
+            made.drives[name] = Drives(tuple(Motor(draw(3000 + at, load, -1.0, 1.0), 60.0) for at in of))
+        by_kept, by_new, new = made.numbers.copy(), made.numbers.copy(), make_of(kind, made, made.bodies)
+        made.solve(kept, made.entities, by_kept)
+        made.solve(new, made.entities, by_new)
+        new.close()
+        outcome.ticks, outcome.rebuilt = outcome.ticks + 1, outcome.rebuilt + 1
+        if by_kept != by_new:
+            outcome.differing.append(load)
+            break
+    kept.close()
+    made.close()
+    return outcome
+
+
+def test_the_order_in_which_overlaps_are_found_is_not_remembered() -> None:
+    assert crowded(CompositionEngine, 100).differing == []
+
+
+def test_without_ties_it_is_remembered() -> None:
+    assert crowded(Untied, 200).differing != []
+
+
+def table(name: str) -> Body:
+    """A plate on four discs: a link of five shapes."""
+    discs = [shape(Cylinder(0.08, 0.02), position=(x, y, 0.04)) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]
+    plate = shape(Box((0.06, 0.06, 0.05)))
+    link = Link(name, "free", (plate, *discs), 1.5, (0.02, 0.02, 0.03))
+    return Body(name, "table", (0.0, 0.0, 0.0), (link,), speed_limit=10.0)
+
+
+def heaped(kind: type[CompositionEngine], ticks: int) -> list[int]:
+    """Return at which ticks a heap differs between an engine that is kept and a new one at each tick."""
+    bodies = [box(f"box{number}", (0.15, 0.1, 0.05), 0.5) for number in range(5)]
+    made = Solids([*bodies, *[table(f"table{number}") for number in range(5)]], substeps=2)
+    kept, differing = make_of(kind, made, made.bodies), []
+    for tick in range(ticks):
+        if tick % 60 == 0:
+            for number, body in enumerate(made.bodies):
+                x, y = draw(10 + number, tick, -0.3, 0.3), draw(30 + number, tick, -0.3, 0.3)
+                spin = draw(50 + number, tick, -9.0, 9.0), draw(70 + number, tick, -9.0, 9.0), 1.0
+                made.put(body.name, (x, y, 0.2 + 0.15 * number), spin=spin)
+        by_kept, by_new, new = made.numbers.copy(), made.numbers.copy(), make_of(kind, made, made.bodies)
+        made.solve(kept, made.entities, by_kept)
+        made.solve(new, made.entities, by_new)
+        new.close()
+        if by_kept != by_new:
+            differing.append(tick)
+        made.numbers = by_kept
+    kept.close()
+    made.close()
+    return differing
+
+
+def test_a_heap_has_the_same_bits_whatever_was_solved_before() -> None:
+    assert heaped(CompositionEngine, 240) == []
+
+
+def test_pairs_that_bullet_ends_by_itself_are_remembered() -> None:
+    assert heaped(OnlyParked, 240) != []
+
+
+@pytest.mark.parametrize(("kind", "count"), [(CompositionEngine, 1), (Untied, 8)], ids=["tied", "untied"])
+def test_an_island_is_one_of_bullets_islands(kind: type[CompositionEngine], count: int) -> None:
+    """Bullet reports each island that it solves: with ties one, without them one of each arm and box."""
+    made = crowd()
+    for number in range(6):
+        made.put(f"box{number}", (0.5 * number - 1.0, 1.0, 0.0799))
+    for number in range(2):
+        made.drives[f"arm{number}"] = Drives((Motor(0.0, 60.0),) * JOINTS)
+    engine = make_of(kind, made, made.bodies)
+    made.solve(engine, made.entities, made.numbers)
+    p.setPhysicsEngineParameter(reportSolverAnalytics=1, physicsClientId=engine._client)
+    assert len(p.stepSimulation(engine._client)) == count
+    engine.close()
+    made.close()
 
 
 def test_at_a_load_nothing_is_near_anything() -> None:

@@ -38,6 +38,8 @@ def _forms_of(spec: WorldSpec) -> Iterator[Form]:
         yield registry.find("rule", rule.kind)
     if spec.scene is not None:
         yield registry.find("scene", spec.scene.kind)
+    for thing in spec.objects.values():
+        yield from _with_motion(registry.find_model(thing.model))
     for robot in spec.robots.values():
         yield from _with_motion(registry.find_model(robot.model))
         for sensor in robot.sensors.values():
