@@ -342,7 +342,7 @@ class CompositionEngine:
         """Forget all pairs and contacts: parked, no body is near another or the scenery, and each is known anew.
 
         Bullet ends few pairs at a time of those whose boxes are apart: the others would keep their places in the list
-        of contacts, which is solved in its order. To set a filter makes another box for a link in the broad phase, which
+        of contacts, which is solved in its order. To set a filter makes another box for a link in the broad phase, and
         ends its pairs at once.
         """
         client = self._client
