@@ -223,8 +223,8 @@ def check_state_fields(text: Text, name: str, deployment: Deployment) -> None:
     `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
     """
     findings = list(islice(field_findings(deployment), PROBLEMS_MAX + 1))
-    if not findings and deployment.robot_files(deployment.asset_files):
-        findings = list(_trial_findings(deployment))
+    for part in _state_findings(deployment) if deployment.robot_files(deployment.asset_files) else ():
+        findings = findings or list(islice(part, PROBLEMS_MAX + 1))
     refuse_findings(text, name, findings)
 
 
@@ -294,18 +294,24 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
     if deployment is not None and not between and not within:
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-        between = first(doubled_slots(deployment)) or first(unheard(deployment)) or first(_trial_findings(deployment))
-        placed = place_findings(deployment)
-        between = between or first(
-            findings_of(deployment), _start_findings(deployment), rules, placed, unfit_components(deployment)
-        )
+        for part in () if deployment.lacks_files else _state_findings(deployment):
+            between = between or first(part)
+        between = between or first(findings_of(deployment), rules, place_findings(deployment))
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
 
 
+def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:
+    """What is wrong with the state of a world, whose robots' files must be there; each part rests on those before."""
+    yield doubled_slots(deployment)
+    yield unheard(deployment)
+    yield _trial_findings(deployment)
+    yield chain(_start_findings(deployment), unfit_components(deployment))
+
+
 def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
-    """What a trial of forms of other packages finds; foosim's own are not tried. Robots' files must be there."""
-    if deployment.lacks_files or not foreign_versions(deployment):
+    """What a trial of forms of other packages finds; foosim's own are not tried."""
+    if not foreign_versions(deployment):
         return ()
     from foosim.world.assembly.trial import trial_findings  # brings numpy
 

@@ -363,6 +363,10 @@ class CompositionEngine:
             zip(island.bodies, self._made, bodies[: self._count], strict=False)
         ):
             offsets = entity.offsets
+            if made.joints:  # before the base: a link's box in the broad phase is that of the last long way
+                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
+                for number, joint in enumerate(made.joints):
+                    reset(made.id, joint, numbers[at + number], numbers[speed + number], client)
             if made.is_free:
                 at, turned = offsets["position"], offsets["orientation"]
                 speed, spin = offsets["linear_velocity"], offsets["angular_velocity"]
@@ -370,10 +374,6 @@ class CompositionEngine:
                 p.resetBaseVelocity(made.id, numbers[speed : speed + 3], numbers[spin : spin + 3], client)
             else:
                 p.resetBasePositionAndOrientation(made.id, body.position, body.orientation, client)
-            if made.joints:
-                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
-                for number, joint in enumerate(made.joints):
-                    reset(made.id, joint, numbers[at + number], numbers[speed + number], client)
             if numbers[offsets["contacts"] + 2] == last:
                 self._touching.add(place)
         for entity, made, body in zip(island.movers, self._made[self._count :], bodies[self._count :], strict=True):

@@ -48,8 +48,8 @@ class Driver:
 
     def _command(self, robot: str, tick: int) -> Struct:
         words = draw_words(draw_key(3, "driver", robot), tick)
-        words = [*words, *draw_words(draw_key(4, "driver", robot), tick)]
-        shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in words]
+        more = draw_words(draw_key(4, "driver", robot), tick)
+        shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
         numbers = [bound * share for bound, share in zip(self._bounds, shares, strict=False)]
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 

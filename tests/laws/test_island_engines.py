@@ -219,7 +219,9 @@ class OnlyParked(CompositionEngine):
         p.performCollisionDetection(physicsClientId=self._client)
 
 
-class Untied(CompositionEngine):
+class Untied(OnlyParked):
+    """Nor are bodies tied into one island."""
+
     def _tie(self) -> None:
         pass
 
