@@ -41,7 +41,22 @@ from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics
-from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Hull, Link, Shape, Vector, in_pieces, swept_box
+from foosim.world.scene import (
+    MOVING,
+    ORIGIN,
+    UPRIGHT,
+    Body,
+    Hull,
+    Link,
+    Shape,
+    Vector,
+    conjugate,
+    cross,
+    in_pieces,
+    moved,
+    rotate,
+    swept_box,
+)
 
 BODIES: Final = 1
 SCENERY: Final = 2
@@ -206,6 +221,31 @@ def _reach(body: Body) -> float:
     return sqrt(sum(side * side for side in sides))
 
 
+def stable_damping(link: Link, parent: Link | None, substep_s: float) -> float:
+    """Return what Bullet is to damp a joint with, so that it takes d / (1 + d h / I) of its speed in a substep h.
+
+    That is what the implicit rule of Euler takes of a speed that is damped by d. Bullet takes d h / I, more than
+    the whole speed where d is large. I is that of both links about the joint, one against the other.
+    """
+    inertia = _inertia_about(link, link.axis, link.centre_of_mass, link.joint)
+    if parent is not None and parent.mass > 0.0:
+        axis = rotate(link.orientation, link.axis)
+        other = _inertia_about(parent, axis, moved(parent.centre_of_mass, link.position, -1.0), link.joint)
+        inertia = inertia * other / (inertia + other)
+    return link.damping / (1.0 + link.damping * substep_s / inertia) if inertia > 0.0 else 0.0
+
+
+def _inertia_about(link: Link, axis: Vector, centre: Vector, joint: str) -> float:
+    """Return the inertia (kg m2) of a link about an axis from which its centre of mass is so far away; of a joint that
+    slides its mass (kg). The parallel axis theorem."""
+    if joint == "prismatic":
+        return link.mass
+    x, y, z = rotate(conjugate(link.principal), axis)
+    arm = cross(axis, centre)
+    about_centre = link.inertia[0] * x * x + link.inertia[1] * y * y + link.inertia[2] * z * z
+    return about_centre + link.mass * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
+
+
 class CompositionEngine:
     """A physics client with scenery and the bodies of one composition, all of them parked between two loads."""
 
@@ -284,9 +324,9 @@ class CompositionEngine:
             physicsClientId=client,
         )
         if base is not None:
-            self._finish(made, -1, base)
+            self._finish(made, -1, base, None)
         for index, link in enumerate(links):
-            self._finish(made, index, link)
+            self._finish(made, index, link, links[link.parent] if link.parent >= 0 else base)
         p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
         joints = tuple([index for index, link in enumerate(links) if link.joint in MOVING])
         zeros = (0.0,) * len(joints)
@@ -318,7 +358,7 @@ class CompositionEngine:
             # Bullet leaves a gear out of the solve if its force is exactly 0; it is 500 N by default.
             p.changeConstraint(tie, maxForce=0.0, physicsClientId=client)
 
-    def _finish(self, made: int, index: int, link: Link) -> None:
+    def _finish(self, made: int, index: int, link: Link, parent: Link | None) -> None:
         """Set what a link that was made weighs, and what others feel of it."""
         client = self._client
         p.setCollisionFilterGroupMask(made, index, BODIES, BODIES | SCENERY, physicsClientId=client)
@@ -327,7 +367,8 @@ class CompositionEngine:
         if link.shapes:
             make_surface(client, made, index, self._physics.sides[link.shapes[0].surface])
         if link.damping > 0.0:
-            p.changeDynamics(made, index, jointDamping=link.damping, physicsClientId=client)
+            damping = stable_damping(link, parent, self._dt)
+            p.changeDynamics(made, index, jointDamping=damping, physicsClientId=client)
         if link.joint in ("prismatic", "revolute"):
             low, high = link.limits
             p.changeDynamics(made, index, jointLowerLimit=low, jointUpperLimit=high, physicsClientId=client)
@@ -403,13 +444,8 @@ class CompositionEngine:
                 )
 
     def _push(self, island: Island) -> None:
-        """Apply the efforts of joints and the forces on bases, which Bullet forgets after each substep."""
+        """Apply the forces on bases, which Bullet forgets after each substep."""
         for made, drives in zip(self._made, island.drives, strict=False):
-            efforts = [motor.effort for motor in drives.motors]
-            if any(efforts):
-                p.setJointMotorControlArray(
-                    made.id, made.joints, p.TORQUE_CONTROL, forces=efforts, physicsClientId=self._client
-                )
             if drives.wrench is not None:
                 force, torque = drives.wrench
                 p.applyExternalForce(made.id, -1, force, ORIGIN, p.LINK_FRAME, physicsClientId=self._client)
@@ -418,7 +454,7 @@ class CompositionEngine:
     def step(self, island: Island) -> None:
         """Advance by the substeps of a tick and log the contacts."""
         self._impulses, self._logs = {}, {}
-        pushed = [made for made, drives in zip(self._made, island.drives, strict=False) if drives.is_pushed]
+        pushed = any(drives.wrench is not None for drives in island.drives)
         for substep in range(self._substeps):
             if pushed:
                 self._push(island)
@@ -470,8 +506,7 @@ class CompositionEngine:
         for number, (position, velocity, _, applied) in enumerate(states):
             numbers[at + number], numbers[speed + number] = position, velocity
             # Without a force Bullet keeps what a motor applied last.
-            of_motor = applied if motors and motors[number].force > 0.0 else 0.0
-            numbers[effort + number] = of_motor + (motors[number].effort if motors else 0.0)
+            numbers[effort + number] = applied if motors and motors[number].force > 0.0 else 0.0
 
     def _read_log(self, place: int, entity: Entity, everybody: Sequence[Entity], numbers: list[float]) -> None:
         at = entity.offsets["contacts"]

@@ -100,11 +100,11 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
          "5:13: templates.rover.sensors.pose: missing key, 'rate'"),
         (("    model: rover", "    model: rovr"),
          "3:12: templates.rover.model: unknown model (there are: camera, "
-         "differential_drive, holonomic, mover, rod, rotorcraft, rover, station, "
+         "differential_drive, holonomic, mover, quadrotor, rod, rotorcraft, rover, station, urdf, "
           "or any module:Class), 'rovr', "
           "nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
-         "4:5: templates.rover: unknown key (there are: model, sensors, actuators, rules, tags, x, y, heading, charge)"
+         "4:5: templates.rover: unknown key (there are: model, tags, sensors, actuators, rules, x, y, heading, charge)"
          ", 'colour'"),
         (("      pose:", "      echo:"),
          "5:7: robots.r0.sensors: a reserved name, 'echo'"),
@@ -179,7 +179,7 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
           "nearest is '50 Hz'"]),
         ("  other: {model: rower}\n",
          ["7:18: templates.other.model: unknown model (there are: camera, "
-         "differential_drive, holonomic, mover, rod, rotorcraft, rover, station, "
+         "differential_drive, holonomic, mover, quadrotor, rod, rotorcraft, rover, station, urdf, "
            "or any module:Class), 'rower', "
            "nearest is 'rover'"]),
         ("  other: {class: 'a.b:C', rate: 1 Hx}\n",

@@ -145,7 +145,8 @@ def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
     hall = load_deployment((TABLE.parent / "warehouse.yaml").read_text(), "warehouse.yaml")
     rover = next(name for name, robot in hall.robots.items() if robot.model == "rover")
     half = 0.5**0.5
-    moving = velocity(hall, rover, orientation=(0.0, 0.0, half, half), wheel_speeds=(0.2, 0.4))
+    turned = {"orientation": (0.0, 0.0, half, half), "angular_velocity": (0.0, 0.0, 1.0)}
+    moving = velocity(hall, rover, linear_velocity=(0.0, 0.3, 0.0), **turned)
     assert moving == pytest.approx((0.0, 0.3, 0.0))
 
 

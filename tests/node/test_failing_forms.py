@@ -33,7 +33,7 @@ FORMS: Final = """
 import sys
 import numpy as np
 from msgspec import Struct
-from foosim.world.actuators.joint_position import Command, JointPositionSettings, PositionActuator
+from foosim.world.actuators.rod_position import Command, RodPositionSettings, PositionActuator
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import actuator, entity_rule, modifier, rule, sensor
 from foosim.world.forms.settings import EntityRuleSettings, ModifierSettings, RuleSettings, SensorSettings
@@ -104,7 +104,7 @@ class Bends:
         return act("modifier", view, values)
 
 
-@actuator("misdeed_drive", JointPositionSettings, Command, slots={"set_point": 2}, kit="table")
+@actuator("misdeed_drive", RodPositionSettings, Command, slots={"set_point": 2}, kit="table")
 class Drive(PositionActuator):
     def accept(self, command, view):
         return act("accept", view, True)

@@ -196,7 +196,7 @@ def test_a_form_is_named_as_deployments_do() -> None:
 
 WRONG: Final = {
     "encodr": "table.yaml uses no form called this (there are: ball, camera, encoder, football, gaussian_noise, "
-    "rod_position, pure, rod, table), 'encodr', nearest is 'encoder'",
+    "pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
     "foosim.world.models.rod:Rot": "uses no form called this (there are: actuator rod_position, ",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from foosim.world.components.drives import Motor
-from foosim.world.components.misfit import Misfit
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
@@ -23,7 +22,7 @@ class JointEfforts(Struct, frozen=True):
 
 @actuator("joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",))
 class JointTorqueActuator:
-    """Motors that apply the last efforts that they were told, throughout each tick."""
+    """Motors that apply the last efforts that they were told, up to the greatest speeds of their joints."""
 
     def __init__(self, settings: JointTorqueSettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
@@ -31,10 +30,8 @@ class JointTorqueActuator:
 
     @staticmethod
     def check(settings: JointTorqueSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have, and a robot whose motors have speeds alone."""
+        """Raise Misfit for a joint that the robot does not have."""
         JointGroup(settings, at)
-        if not at.robot.kind.couples:
-            raise Misfit(("kind",), f"the motors of a {at.robot.model} have speeds alone", settings.kind)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return no bounds that are common to all joints: each has its own."""
@@ -53,6 +50,15 @@ class JointTorqueActuator:
         """Push each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[min(0.01, force) for force in self._group.forces])
 
-    def command(self, view: View) -> tuple[Motor, ...]:
-        """Return the effort of each motor, which keeps no speed."""
-        return tuple([Motor(0.0, 0.0, effort) for effort in view.read(self._group.set_point)])
+    def command(self, view: View) -> Motors:
+        """Return of each motor its greatest speed in the direction of the effort, and the effort.
+
+        So a joint is driven with the effort until it is as fast as its motor can be.
+        """
+        efforts = view.read(self._group.set_point)
+        return tuple(
+            [
+                (speed if effort > 0.0 else -speed, abs(effort))
+                for effort, speed in zip(efforts, self._group.speeds, strict=True)
+            ]
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Final
 
 from foosim.common.finding import Finding, Location
@@ -54,19 +54,19 @@ def _has_rigid(spec: WorldSpec) -> bool:
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the surfaces of scenery and bodies of which nobody says what rigid bodies feel of them."""
-    made: list[tuple[Location, str, list[str]]] = []
+    felt = physics_of(spec)
+    made: list[tuple[Location, str, list[str], Collection[str]]] = []
+    scenery = felt.surfaces or felt.sides
     for name, kit in kits_of(spec):
-        made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()]))  # type: ignore[attr-defined]
+        made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()], scenery))  # type: ignore[attr-defined]
     if spec.scene is not None:
         surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
-        made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces))
+        made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
         for name, one in entities.items():
             if hasattr(one, "surface"):
-                made.append(((section, name, "surface"), f"{one.model} {name}", [one.surface]))
-    felt = physics_of(spec)
-    known = felt.surfaces or felt.sides
-    for location, what, surfaces in made:
+                made.append(((section, name, "surface"), f"{one.model} {name}", [one.surface], felt.sides))
+    for location, what, surfaces, known in made:
         for surface in dict.fromkeys(surfaces):
             if surface != FELT_BY_NOBODY and surface not in known:
                 valid = f"there are: {', '.join(sorted(known))}; and '' of what no rigid body feels"

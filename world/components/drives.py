@@ -9,14 +9,11 @@ from foosim.world.scene import Vector, moved
 
 
 class Motor(NamedTuple):
-    """What is asked of the motor of a joint: a speed, the greatest force with which it is reached, an effort beside it.
-
-    SI units: m/s or rad/s, N or N m. The effort acts throughout the tick.
-    """
+    """What is asked of the motor of a joint: a speed (m/s or rad/s), the greatest force with which it is reached (N or
+    N m)."""
 
     speed: float
     force: float
-    effort: float = 0.0
 
 
 Wrench: TypeAlias = tuple[Vector, Vector]
@@ -32,14 +29,9 @@ class Drives:
     wrench: Wrench | None = None
 
     @property
-    def is_pushed(self) -> bool:
-        """Whether something has to be applied again in each substep."""
-        return self.wrench is not None or any(motor.effort != 0.0 for motor in self.motors)
-
-    @property
     def is_moving(self) -> bool:
         """Whether something is asked that moves a body: what holds its joints in place does not."""
-        return self.is_pushed or any(motor.speed != 0.0 and motor.force != 0.0 for motor in self.motors)
+        return self.wrench is not None or any(motor.speed != 0.0 and motor.force != 0.0 for motor in self.motors)
 
 
 FREE: Final = Motor(0.0, 0.0)

@@ -10,7 +10,7 @@ from foosim.common.finding import Finding
 from foosim.common.plain_data import PlainData
 from foosim.world.clearance.table_clearance import clearance_findings
 from foosim.world.forms.registry import kit
-from foosim.world.matter.physics import Contact, Physics, Side
+from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
 from foosim.world.parameters.table_checks import table_findings
 from foosim.world.scene import Shape
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 BALL = "ball"
 """Name of the ball that every table has; further ones have other names and can be removed again."""
+WALLS = "walls"
 SILENT = frozenset({"floor", "ramps"})
 """What a ball rolls on: its contacts are not logged."""
 
@@ -54,6 +55,7 @@ class TableKit:
             for name, pair in surfaces.items()
         }
         sides[BALL] = Side(bounce, grip)
+        sides[DEFAULT] = sides[WALLS]  # of bodies that are no part of a table
         return Physics(table.gravity, surfaces, between, table.solver_iterations, table.contact_erp, sides)
 
     def findings(self) -> Iterator[Finding]:
