@@ -246,6 +246,18 @@ class NodeCore:
             stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout, is_watched=self.is_watched)
         return stepper
 
+    def present(self) -> tuple[int, Stepper | None]:
+        """Return the tick that is computed and its stepper; -1 and None without one. Any thread may call this."""
+        frame, term = self.frame, self._term
+        return (-1, None) if frame is None or term is None else (frame.tick, term.stepper)
+
+    def slow_form(self, text: str) -> Publish:
+        """Return what tells the supervisor of a form that takes long. Any thread may call this."""
+        tick = max(0, self.present()[0])
+        text = _sendable(text)[: limits.TEXT_LENGTH_MAX]
+        beat = Heartbeat(self.name, tick, self.epoch, "", "", self.busy, b"", slow=text)
+        return Publish(channels.HEARTBEAT, self.name, encode(beat))
+
     def make_anew(self) -> None:
         """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
         self._steppers.clear()

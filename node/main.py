@@ -6,6 +6,7 @@ One address is all that it needs: deployment and models come with the handshake.
 from __future__ import annotations
 
 import time
+from collections import deque
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -15,6 +16,7 @@ from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
+from foosim.node.slow_forms import SlowForm, SlowWatch
 from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
@@ -46,6 +48,9 @@ class NodeShell:
         self._wire = self._shell.connect(session, Plane.SIMULATION)
         self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._shell.watch_router(self._wire, SUPERVISOR)
+        self._slow: deque[str] = deque()
+        """Of slow forms, what the supervisor is to be told at the next turn."""
+        self._watch = SlowWatch(self.core.present, self._name_slow)
 
     def is_over(self) -> bool:
         """Whether the run has ended, or this node leaves it."""
@@ -53,6 +58,7 @@ class NodeShell:
 
     def finish(self) -> int:
         """Perform the last actions; return the exit code."""
+        self._watch.stop()
         self.role.perform()
         self._solver.close()
         if self.core.member.refusal:
@@ -61,6 +67,7 @@ class NodeShell:
 
     def leave(self) -> None:
         """Close the engines."""
+        self._watch.stop()
         self._solver.close()
 
     def stop(self) -> None:
@@ -78,8 +85,23 @@ class NodeShell:
         if self._orphan.is_over(core.deployment, now_ns) and not self.is_over():
             core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
+        while self._slow:
+            core.actions.append(core.slow_form(self._slow.popleft()))
         core.advance(now_ns)
         self._build()
+
+    def _name_slow(self, form: SlowForm) -> None:
+        """Log a slow form and tell the supervisor, from the thread that watches.
+
+        That is at once, as it may never end, but in a process of several roles, whose bus has one thread.
+        """
+        text = str(form)
+        self._shell.log.warning(text)
+        if self._wire.is_alone:
+            told = self.core.slow_form(text)
+            self._wire.put(told.channel, told.name, told.payload)
+        else:
+            self._slow.append(text)
 
     def _work(self, now_ns: int) -> bool:
         """Solve the current tick, if there is one to be solved."""

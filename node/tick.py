@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import cast
@@ -19,9 +19,9 @@ from foosim.node.edited_frame import edit, moved_reference
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
 from foosim.world.assembly.rest import Rest, wake_edited
 from foosim.world.assembly.world import World
-from foosim.world.components.fitted import sensors_of
+from foosim.world.components.fitted import named_modifiers, sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.view import SensingView, View, WritableView
+from foosim.world.components.view import SensingView, View, WritableView, called_of
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
@@ -80,6 +80,18 @@ class Stepper:
         """Readings with a number that is not finite, which are not sent, by robot and channel."""
         self.quarantined: list[str] = []
         """Who came into quarantine, and why, in words; whoever reads it empties it."""
+
+    def forms(self) -> Iterator[tuple[object, str]]:
+        """Yield the objects that compute ticks beside the engine, and what each is called."""
+        for fitted in self._sensors.values():
+            for one in fitted:
+                yield one.sensor, called_of(f"sensor {one.channel}", one.robot)
+                yield from named_modifiers(one.modifiers)
+        yield from self.world.forms()
+
+    def forms_together(self) -> list[tuple[object, str]]:
+        """Return what computes several sensors or modifiers together, and their names."""
+        return self._sensing.groups()
 
     def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         """Return what these robots send at the frame's tick, and what their sensors remember.

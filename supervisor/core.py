@@ -469,6 +469,9 @@ class SupervisorCore:
         is_hub = process.name == channels.VHUB
         if process.lost and not is_hub:
             self.node_loss.on_heartbeat(process, now_ns)
+        if heartbeat.slow:
+            process.slow = heartbeat
+            state.log("warning", f"{process.name}: {heartbeat.slow}")
         if not heartbeat.report:
             self.progress.on_heartbeat(heartbeat)
             return

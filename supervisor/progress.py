@@ -178,7 +178,7 @@ class ProgressMonitor:
         heartbeat_ns = state.wait_ns(deadlines.heartbeat_ns)
         silent = state.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
+            return {name: f"no heartbeat for {heartbeat_ns / 1e9:g} s{self._slow_form(name)}" for name in silent}
         if state.is_resuming:
             return {}  # no process is waited for yet
         if state.is_vhub_away:
@@ -196,11 +196,18 @@ class ProgressMonitor:
         if self._waits_for_capture(names):
             lost_ns = max(lost_ns, deadlines.close_ns)
         if overdue_ns > lost_ns:
-            return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
+            why = f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s"
+            return {name: why + self._slow_form(name) for name in names}
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             state.log("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
+
+    def _slow_form(self, name: str) -> str:
+        """Return what a node has said of a slow form at the present tick or later, as a part of a reason."""
+        process = self._state.roster.by_name.get(name)
+        slow = None if process is None else process.slow
+        return f": {slow.slow}" if slow is not None and slow.tick >= self._state.frame.tick else ""
 
     def _waits_for_capture(self, names: list[str]) -> bool:
         """Whether only the vHub is waited for, and reports to wait for its disk."""

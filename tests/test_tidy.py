@@ -72,6 +72,7 @@ SHELLS = {
     "console/server/serving.py",
     "node/physics/mesh_trial.py",
     "node/main.py",
+    "node/slow_forms.py",
     "deployment/assets.py",
     "deployment/text/files.py",
     "runtime/transport/certificate_files.py",

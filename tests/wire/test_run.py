@@ -457,6 +457,26 @@ def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, mo
     assert code == 0, (out, err)
     logs = "".join(path.read_text() for path in (house.folder / "state" / "foosim" / "runs").glob("*/logs/*"))
     assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
+    slow = re.escape("sensor dozes of red.goal has taken ") + r"\d\.\d s at tick 10 so far: dozes\.py:\d+ in sample\n"
+    assert re.search(rf" red: {slow}", logs), logs
+    assert re.search(rf" supervisor: red: {slow}", logs), logs
+
+
+def test_a_component_that_hangs_is_in_the_reason_of_its_node_s_loss(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.0)", "sleep(1000.0)"))
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
+    up = house.up(
+        *("--json", "--set", own, "--set", "engine=pure", "--set", "on_node_loss=stop"),
+        *("--set", "deadlines.tick_named=1 s", "--set", "deadlines.tick_lost=3 s", "--for", "60 ms", "--no-capture"),
+        each=True,
+    )
+    code, out, err = house.end(up)
+    assert code == 1, (out, err)
+    named = r": sensor dozes of red\.goal has taken \d\.\d s at tick 10 so far: dozes\.py:\d+ in sample"
+    assert re.search(f"^lost red: tick 10 is overdue by .* s{named}", last_json(out)["reason"]), (out, err)
 
 
 FACTOR: Final = "FACTOR = {}\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from foosim.common.errors import Refused
@@ -20,8 +20,8 @@ from foosim.world.components.entities import (
     RuleMounting,
     mounting_of,
 )
-from foosim.world.components.fitted import FittedActuator, actuators_of
-from foosim.world.components.view import Mounting, SolvingView, View, WritableView, called, component_error
+from foosim.world.components.fitted import FittedActuator, actuators_of, named_modifiers
+from foosim.world.components.view import Mounting, SolvingView, View, WritableView, called, called_of, component_error
 from foosim.world.components.watching import Watched, places_of, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
@@ -235,6 +235,23 @@ class World:
                 )
                 for label, rule in its
             )
+
+    def forms(self) -> Iterator[tuple[object, str]]:
+        """Yield the objects that compute, and what each is called."""
+        entities = self._layout.entities
+        for index, model in self.models.items():
+            yield model, called_of(f"model {entities[index].model}", entities[index].name)
+        for label, rule in self._rules.items():
+            yield rule, called_of(f"rule {label}", WORLD)
+        for fitted in self.actuators.values():
+            for one in fitted:
+                yield one.actuator, called_of(f"actuator {one.channel}", one.robot)
+                yield from named_modifiers(one.modifiers)
+        for name, motion in self._motions.items():
+            yield motion, f"motion {name}"
+        for index, rules in self._entity_rules.items():
+            for label, its in rules:
+                yield its, called_of(f"rule {label}", entities[index].name)
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final, NamedTuple
@@ -18,6 +18,7 @@ from foosim.world.components.view import (
     Sensor,
     WritableView,
     called,
+    called_of,
     component_error,
 )
 from foosim.world.forms import registry
@@ -177,6 +178,12 @@ class FittedActuator:
     def failed(self, tick: int, error: BaseException) -> ComponentError:
         """Return the error of an actuator that has raised."""
         return component_error(f"actuator {self.channel}", self.robot, tick, error)
+
+
+def named_modifiers(modifiers: Iterable[FittedModifier]) -> Iterator[tuple[object, str]]:
+    """Yield the objects of modifiers, and what each is called."""
+    for one in modifiers:
+        yield one.modifier, called_of(one.what, one.robot)
 
 
 # --- making ----------------------------------------------------------------------------------------------------------

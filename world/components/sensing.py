@@ -33,6 +33,10 @@ class Sensing:
     def __init__(self) -> None:
         self._plans: dict[tuple[int, ...], Plan] = {}
 
+    def groups(self) -> list[tuple[object, str]]:
+        """Return what computes several sensors or modifiers together, and their names."""
+        return [(group.made, group.what) for plan in list(self._plans.values()) for group in plan.groups]
+
     def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
 
@@ -67,6 +71,11 @@ class Plan:
         self._together, self._alone = self._divided(everyone, "sensor", 0)
         depth = max((len(one.modifiers) for one in fitted), default=0)
         self._steps = [self._step(place) for place in range(depth)]
+
+    @property
+    def groups(self) -> list[_Group]:
+        """Those that are computed together."""
+        return [*self._together, *(group for groups, _ in self._steps for group in groups)]
 
     def _step(self, depth: int) -> tuple[list[_Group], list[int]]:
         """Return the modifiers at a depth: groups, and the places of the sensors whose modifier works alone."""

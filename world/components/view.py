@@ -31,9 +31,13 @@ class ComponentError(Exception):
     """
 
     def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
-        of = {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
-        super().__init__(f"{component}{of} failed at tick {tick}: {failure_of(cause)}")
+        super().__init__(f"{called_of(component, entity)} failed at tick {tick}: {failure_of(cause)}")
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
+
+
+def called_of(component: str, entity: str) -> str:
+    """Return in words which component of which entity it is; `entity` is empty, or that of the world, of others."""
+    return component + {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
 
 
 def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
