@@ -62,7 +62,7 @@ def as_json(component: Form) -> dict[str, Any]:
         "summary": component.summary,
         "class": f"{component.module}:{component.made.__qualname__}",
         "settings": [{"key": key, "value": value, "default": default} for key, value, default in _settings(component)],
-        "slots": None if callable(slots) else dict(slots),
+        "slots": None if callable(slots) else {field: int(size) for field, size in slots.items()},
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
         "meshes": getattr(component, "meshes", False),

@@ -234,10 +234,11 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     if of_world:
         models[WORLD] = WORLD
     models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
+    fields = _fields(spec, models)
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
-    declared = Declared(frozenset(models), carried, memory, tuple(addable), _fields(spec, models))
+    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields)
     for name, model in added:
         if not addable:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")

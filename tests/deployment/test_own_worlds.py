@@ -118,11 +118,10 @@ def test_a_model_has_what_its_motion_needs(site: Path, motion: str) -> None:
     assert problems(DRONE, "players={}") == ([] if told is None else [f"robots.camera.model: {told}, 'own_form:Own'"])
 
 
-def test_a_rigid_model_that_the_islands_do_not_know_is_refused(site: Path) -> None:
-    written(site, "model('crate', RobotSettings, is_rigid=True)(Own)")
+def test_a_rigid_model_that_may_not_share_a_solve_is_refused(site: Path) -> None:
+    written(site, "model('crate', RobotSettings, is_rigid=True, couples=False)(Own)")
     assert problems(DRONE) == [
-        "robots.camera.model: a rigid model whose reach the islands do not know; valid are rod, ball, and models with "
-        "a motion, 'own_form:Own'"
+        "robots.camera.model: a rigid model with couples=False, which is valid of rod, ball alone, 'own_form:Own'"
     ]
 
 
@@ -217,8 +216,8 @@ KITS: Final = {
                                 "are in robots:"],
     "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: "
                                   f"{installed('model')}, or any module:Class), 'beest'"],
-    "entities={'leo': 'crate'}": ["its entity leo is a rigid model whose reach the islands do not know; valid are "
-                                  "rod, ball, and models with a motion"],
+    "entities={'leo': 'crate'}": ["its entity leo is a rigid model with couples=False, which is valid of rod, ball "
+                                  "alone"],
     "entities={'world': 'beast'}": ["its entity world has a reserved name"],
     "entities={'ball': 'beast'}": ["its entity ball has a name that is also one of the kit table's"],
     "rules={'football': {'kind': 'feed'}}": ["its rule football has a name that is also one of the kit table's"],

@@ -49,6 +49,8 @@ UNUSED: Final = {
     ("scene", "football_table"),
     ("scene", "boxes"),
     ("scene", "empty"),
+    *(("model", name) for name in ("box", "capsule", "cylinder", "hull", "quadrotor", "sphere", "urdf")),
+    *(("actuator", name) for name in ("force", "joint_position", "joint_torque", "joint_velocity", "rotor_speeds")),
 }
 """Scenes are those of the kits; one engine computes."""
 WALK: Final = [{"x": "-5 m", "y": "-2 m"}, {"x": "-5 m", "y": "2 m", "yaw": "180 deg"}]
