@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
 from foosim.capture.foxglove import VIEW_TYPES
 from foosim.capture.mcap.checks import CaptureError
@@ -37,6 +39,7 @@ CHUNK_BYTES: Final = 4 * 1024 * 1024
 _LIBRARIES: Final = (
     *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
 )
+NO_READINGS: Final[Mapping[str, Any]] = MappingProxyType({})
 CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
 """Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
 metadata `foosim`."""
@@ -59,9 +62,20 @@ def ending_metadata(end: End) -> dict[str, str]:
     return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
 
 
-def declare_topics(mcap: McapWriter) -> dict[str, int]:
-    """Declare all topics, also those that stay empty; return their channels."""
-    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in _topics()}
+def declare_topics(mcap: McapWriter, readings: Mapping[str, Any] = NO_READINGS) -> dict[str, int]:
+    """Declare all topics, also those that stay empty; return their channels.
+
+    `readings` are the topics of readings that are shown (`shown_readings.shown_topics`), each with its message.
+    """
+    shown = [(topic, "protobuf", _view_schema(message)) for topic, message in readings.items()]
+    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in (*_topics(), *shown)}
+
+
+@cache
+def _view_schema(message: Any) -> tuple[str, str, bytes]:
+    """Return name, encoding and content of the schema of a Foxglove message."""
+    schema = message.get_schema()
+    return schema.name, schema.encoding, schema.data
 
 
 @cache
@@ -72,8 +86,7 @@ def _topics() -> tuple[tuple[str, str, tuple[str, str, bytes]], ...]:
         schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
         topics.append((topic, "json", schema))
     for topic, message in VIEW_TYPES.items():
-        view = message.get_schema()
-        topics.append((topic, "protobuf", (view.name, view.encoding, view.data)))
+        topics.append((topic, "protobuf", _view_schema(message)))
     return tuple(topics)
 
 

@@ -30,6 +30,7 @@ from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, Joined
 from foosim.capture.reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK
+from foosim.capture.shown_readings import shown_topics
 from foosim.capture.state_at import ActiveState
 from foosim.common.errors import BadValue, Failed
 from foosim.common.units import format_ns
@@ -131,7 +132,7 @@ class _Copy:
         self._start = start
         self._tick_ns = tick_ns
         self._stop_tick = stop_tick
-        self._channels = declare_topics(mcap)
+        self._channels = declare_topics(mcap, shown_topics(deployment_of(read_about(path))))
         self._tick = -1
         self._begun = False
         self._head: list[Message] = []

@@ -33,6 +33,10 @@ class Number(Struct, frozen=True):
     value: Metres
 
 
+class Scan(Struct, frozen=True):
+    distances: tuple[float, ...]
+
+
 class Nothing(Struct, frozen=True):
     pass
 

@@ -329,6 +329,7 @@ class HubCore:
         for joining in joins:
             state.join(joining, tick)
         closing = closing_of(frame, commit, self.commits.chain_at(tick), state, joins, leaves, now_ns)
+        closing.sensed = packets
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         if self.watching.readings:
             self.watching.sensed(tick, packets)

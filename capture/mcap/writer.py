@@ -86,14 +86,21 @@ class McapWriter:
         return sum(self._book.counts.values())
 
     def add_channel(self, topic: str, message_encoding: str, schema: tuple[str, str, bytes]) -> int:
-        """Declare a topic with its schema (name, encoding, data) and return the channel's number."""
+        """Declare a topic with its schema (name, encoding, data) and return the channel's number.
+
+        Topics of one schema share it.
+        """
         number = len(self._book.channels) + 1
-        name, encoding, data = schema
-        self._book.schemas.append(records.Schema(id=number, name=name, encoding=encoding, data=data))
+        schemas = self._book.schemas
+        known = next((one.id for one in schemas if (one.name, one.encoding, one.data) == schema), None)
+        if known is None:
+            name, encoding, data = schema
+            schemas.append(records.Schema(id=number, name=name, encoding=encoding, data=data))
+            self._put_record(schemas[-1])
+        schema_id = number if known is None else known
         self._book.channels.append(
-            records.Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=number, metadata={})
+            records.Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata={})
         )
-        self._put_record(self._book.schemas[-1])
         self._put_record(self._book.channels[-1])
         self._index[number] = []
         self._book.counts[number] = 0

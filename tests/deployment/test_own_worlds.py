@@ -208,7 +208,7 @@ KIT: Final = (
     "class Stone(Own): pass",
     "model('stone', RobotSettings, is_robot=False)(Stone)",
     "class Crate(Own): pass",
-    "model('crate', RobotSettings, is_robot=False, is_rigid=True)(Crate)",
+    "model('crate', RobotSettings, is_robot=False, is_rigid=True, couples=False)(Crate)",
 )
 KITS: Final = {
     "entities={'leo': 'beast'}, addable=('beast',), rules={'feed': {'kind': 'feed', 'count': 2}}": [],

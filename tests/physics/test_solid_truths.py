@@ -238,8 +238,8 @@ def test_forces_and_torques_on_a_base_act_in_its_own_axes() -> None:
         assert one.get("a", "angular_velocity") == pytest.approx([0.0, 0.01 / inertia * 0.5, 0.0], abs=1e-6)
 
 
-def test_motors_reach_speeds_with_their_forces_and_efforts_act_throughout() -> None:
-    """Without gravity: torque over inertia, held at the speed; an effort likewise, without a bound."""
+def test_motors_reach_speeds_with_their_forces() -> None:
+    """Without gravity: torque over inertia, held at the speed."""
     inertia = 2.0 * 0.5 * 0.5 + 1e-6
     with solids(pendulum(0.5, 2.0), feel=physics(0.0)) as one:
         one.drives["arm"] = Drives((Motor(1.0, 2.0),))
@@ -248,11 +248,6 @@ def test_motors_reach_speeds_with_their_forces_and_efforts_act_throughout() -> N
         assert one.get("arm", "joint_efforts")[0] == pytest.approx(2.0, rel=1e-3)
         one.run(40)
         assert one.get("arm", "joint_velocities")[0] == pytest.approx(1.0, abs=1e-6)
-        one.set("arm", "joint_velocities", 0.0)
-        one.drives["arm"] = Drives((Motor(0.0, 0.0, 3.0),))
-        one.run(50)
-        assert one.get("arm", "joint_velocities")[0] == pytest.approx(3.0 / inertia * 0.5, rel=1e-3)
-        assert one.get("arm", "joint_efforts") == [3.0]
 
 
 def test_a_revolute_joint_stops_at_its_limits() -> None:

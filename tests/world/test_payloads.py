@@ -16,7 +16,12 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import load_deployment
+from foosim.world.actuators.force import Push
+from foosim.world.actuators.joint_position import JointPositions
+from foosim.world.actuators.joint_torque import JointEfforts
+from foosim.world.actuators.joint_velocity import JointVelocities
 from foosim.world.actuators.rod_position import Command
+from foosim.world.actuators.rotor_speeds import RotorSpeeds
 from foosim.world.actuators.v_w import Motion
 from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.actuators.wheel_speeds import Drive
@@ -68,13 +73,26 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "joint_state": (JointState((0.1, 1.5), (-0.5, 2.0), (40.0, 1 / 3)), [0.1, 1.5, -0.5, 2.0, 40.0, 1 / 3], [""] * 3),
     "pose_3d": (Pose3d(1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8), [1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8],
                 ["m"] * 3 + [""] * 4),
+    "force": (Push(1.0, 2.0, 3.0, 0.1, 0.2, 1 / 3), [1.0, 2.0, 3.0, 0.1, 0.2, 1 / 3], ["N"] * 3 + ["N m"] * 3),
+    "joint_position": (JointPositions((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
+    "joint_torque": (JointEfforts((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
+    "joint_velocity": (JointVelocities((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
+    "rotor_speeds": (RotorSpeeds((1.0, 2.0, 3.0, 1 / 3)), [1.0, 2.0, 3.0, 1 / 3], [""]),
 }  # fmt: skip
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
-SIZES |= {"v_w": 16, "x_y_w": 24, "waypoint": 32, "velocity": 48}
+SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "velocity": 48}
 """In bytes, of the kinds that have as many numbers always."""
-SEVERAL = {"joint_state", "laser_scanner", "proximity"}
+SEVERAL = {
+    "joint_position",
+    "joint_state",
+    "joint_torque",
+    "joint_velocity",
+    "laser_scanner",
+    "proximity",
+    "rotor_speeds",
+}
 
 
 def codec(kind: str) -> PayloadCodec:

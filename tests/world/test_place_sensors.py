@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.earth import SEMI_MAJOR_M, EarthOrigin, Geodesy, to_ecef, to_geodetic
 from foosim.world.scene import Vector, multiply, rotate
@@ -187,12 +186,10 @@ def test_what_robot_or_world_does_not_have_is_refused_at_its_place(sensor: str, 
     assert problems(OWN + sensor) == [f"robots.red.goal.sensors.own.{problem}"]
 
 
-def test_a_robot_that_does_not_say_how_it_moves_has_no_inertial_unit() -> None:
+def test_a_rover_carries_an_inertial_unit_since_its_state_has_velocities() -> None:
     hall = (TABLE.parent / "warehouse.yaml").read_text()
-    with pytest.raises(
-        DeploymentError, match=r"rover01 moves freely, and its state has no linear_velocity, angular_ve"
-    ):
-        load_deployment(apply_sets(hall, "hall.yaml", ["robots.rover01.sensors.own={kind: imu, rate: 10 Hz}"]), "f")
+    text = apply_sets(hall, "hall.yaml", ["robots.rover01.sensors.own={kind: imu, rate: 10 Hz}"])
+    assert "own" in load_deployment(text, "hall.yaml").robots["rover01"].sensors
 
 
 def test_a_place_is_rotated_as_its_quaternion_says() -> None:

@@ -37,7 +37,7 @@ REFUSED: Final = {
     'rule("own", EntityRuleSettings)': "its settings are a class derived from RuleSettings, not EntityRuleSettings",
     'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
     'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
-    'model("own", SpecBase)': "its settings are a class derived from RobotSettings, not SpecBase",
+    'model("own", SpecBase)': "its settings are a class derived from EntitySettings, not SpecBase",
     'kit("own", Own)': "its settings are a class derived from SpecBase, not Own",
     'sensor("own", Settings, dict)': "its reading is a class derived from msgspec.Struct, not dict",
     'actuator("own", ActuatorSettings, 3)': "its command is a class derived from msgspec.Struct, not 3",
@@ -48,6 +48,16 @@ REFUSED: Final = {
     'sensor("own", Settings, Number, kit=3)': "kit is the name of a kit, not 3",
     'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
     'sensor("own", Settings, Number, speaks=("contacts",))': "speaks is a name, not a list of 1",
+    'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, "
+    "foxglove.LocationFix, foxglove.PoseInFrame, not 'foxglove.Pose'",
+    'sensor("own", Settings, Number, shown_as=["x"])': "shown_as is one of foxglove.LaserScan, foxglove.LocationFix, "
+    "foxglove.PoseInFrame, not a list of 1",
+    'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that "
+    "foxglove.PoseInFrame shows: x, y, heading or x, y, z, qx, qy, qz, qw",
+    'sensor("own", Settings, Number, shown_as="foxglove.LaserScan")': "its reading Number lacks the tuples of numbers "
+    "that foxglove.LaserScan shows: distances",
+    'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which "
+    "foxglove.LaserScan shows",
     'sensor("own", Settings, Number, slots=("kept",))': "slots: they are a mapping of names to counts of numbers, not "
     "a list of 1",
     'sensor("own", Settings, Number, slots={"a.b": 1})': f"slots: 'a.b': {NAME}",

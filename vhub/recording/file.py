@@ -34,6 +34,7 @@ from foosim.capture.mcap.scan import Scanned, read_messages
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, part_path, parts_at
 from foosim.capture.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE
+from foosim.capture.shown_readings import ShownReadings
 from foosim.capture.state_at import HOLDING
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
@@ -91,6 +92,7 @@ class CaptureFile:
         self._described = described
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
+        self._shown = ShownReadings(described.deployment)
         self._encode = msgspec.json.Encoder().encode
         self._reserve = capture.reserve_bytes
         self._bytes_max = capture.bytes_max
@@ -154,6 +156,9 @@ class CaptureFile:
                 done.frame = tick
         add_packets(self.mcap, self._channels[PACKETS], closing.fates, encode)
         self._write_views(closing.frame)
+        if self._shown.topics:
+            for topic, data in self._shown.messages(tick, closing.sensed):
+                self._write_view(topic, tick, data)
         self._known = closing.frame
         done.tick = tick
         if self._split is not None:
@@ -276,7 +281,7 @@ class CaptureFile:
         Return the channels of its topics.
         """
         described, deployment = self._described, self._described.deployment
-        channels = declare_topics(mcap)
+        channels = declare_topics(mcap, self._shown.topics)
         content = {
             MODEL_HASH: model_hash(deployment),
             "format": str(FORMAT),

@@ -118,6 +118,8 @@ class Closing:
     """Over the frames up to this one, without the one that the run began with."""
     owing: list[str] = field(default_factory=list)
     """Clients that left while the tick waited for their Dones."""
+    sensed: Sequence[RobotPacket] = ()
+    """What the robots sent at this frame, in (robot, index) order."""
     ages: Sequence[Age] = ()
     """Ages at use since the last rows of them, where this closing has rows."""
 
@@ -237,6 +239,7 @@ class Fold:
         if self.commit:  # the frame that a run begins with is not in its chain, or is already
             self.chain = chain_next(self.chain, commit.digest)
         closing = closing_of(frame, commit, self.chain, state, record.joins, record.leaves)
+        closing.sensed = packets
         for name in record.leaves:
             state.leave(name)
         for joining in record.joins:

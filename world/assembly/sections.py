@@ -42,7 +42,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
         for key in ("physics", "surfaces"):
             if getattr(spec, key):
                 yield Finding((key,), f"what rigid bodies feel, which {felt[0]} says already", key, at="key")
-    if len(felt) == 1 or _has_rigid(spec):
+    if len(felt) == 1 or (not felt and _has_rigid(spec)):
         yield from _unfelt(spec)
     for _, kit in kits_of(spec):
         yield from kit.findings()  # type: ignore[attr-defined]

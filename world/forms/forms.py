@@ -166,6 +166,7 @@ class Component(Form):
     `moves` says that an actuator commands the motors of its robot: one of a robot may.
     `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0.
+    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
     """
@@ -175,6 +176,7 @@ class Component(Form):
     needs: tuple[str, ...] = ()
     several: str | SeveralOf = ""
     speaks: str = ""
+    shown_as: str = ""
     moves: bool = False
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 

@@ -28,6 +28,7 @@ from foosim.world.forms.forms import (
     word_of,
 )
 from foosim.world.forms.settings import BASES
+from foosim.world.forms.shown import shown_problems
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """What the values of a form are called."""
@@ -88,6 +89,7 @@ def _component(found: Any) -> Iterator[str]:
     for key in ("several", "speaks"):
         if not isinstance(getattr(found, key), str) and not (key == "several" and callable(found.several)):
             yield f"{key} is a name, not {show(getattr(found, key))}"
+    yield from shown_problems(found)
     if isinstance(found.several, str) and found.several and found.several not in found.settings.model_fields:
         yield f"several names no setting, {show(found.several)}"
     if not isinstance(found.per_field, Mapping):

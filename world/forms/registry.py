@@ -74,7 +74,7 @@ _loaded: Final[dict[str, str]] = {}
 """Of each entry point that was loaded: why that failed, empty if it did not."""
 
 
-def sensor(
+def sensor(  # noqa: PLR0913  # what a sensor is, by keyword
     name: str,
     settings: type[ComponentSettings],
     reading: type[Struct],
@@ -84,8 +84,12 @@ def sensor(
     kit: str = "",
     several: str | SeveralOf = "",
     speaks: str = "",
+    shown_as: str = "",
 ) -> Callable[[Made], Made]:
-    """Register a sensor: a class with the methods of `components.view.Sensor`."""
+    """Register a sensor: a class with the methods of `components.view.Sensor`.
+
+    `shown_as` names the message by which captures show its readings to viewers: one of `forms.shown.MESSAGES`.
+    """
 
     def describe(made: Callable[..., Any]) -> Component:
         return Component(
@@ -99,6 +103,7 @@ def sensor(
             kit=kit,
             several=several,
             speaks=speaks,
+            shown_as=shown_as,
         )
 
     return _registering(describe)

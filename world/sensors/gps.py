@@ -38,7 +38,7 @@ class GlobalPosition(Struct, frozen=True):
     groups: ClassVar = {"horizontal": ("latitude", "longitude")}
 
 
-@sensor("gps", GpsSettings, GlobalPosition)
+@sensor("gps", GpsSettings, GlobalPosition, shown_as="foxglove.LocationFix")
 class Gps:
     """Latitude, longitude and altitude of the mount."""
 

@@ -44,6 +44,14 @@ class LaserScannerSettings(SensorSettings):
     least: Least = default("0 m")
     at: MountedAt = FIRST_LINK
 
+    @property
+    def bearings(self) -> tuple[float, float]:
+        """Those of the first and the last beam (rad), from x towards y of the mount."""
+        if self.rays == 1:
+            return 0.0, 0.0
+        first = -self.angle / 2.0
+        return first, first + (self.rays - 1) * step_of(self.rays, self.angle)
+
 
 class Scan(Struct, frozen=True):
     """A distance for each beam, from right to left; the sensor's range where nothing is met."""
@@ -51,7 +59,7 @@ class Scan(Struct, frozen=True):
     distances: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
 
 
-@sensor("laser_scanner", LaserScannerSettings, Scan, several="rays")
+@sensor("laser_scanner", LaserScannerSettings, Scan, several="rays", shown_as="foxglove.LaserScan")
 class LaserScanner:
     """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
 
@@ -92,9 +100,14 @@ class LaserScanners:
         return found
 
 
+def step_of(rays: int, angle: float) -> float:
+    """Return the angle (rad) between two neighbours of `rays` beams over an angle (rad)."""
+    return angle / rays if angle >= FULL_TURN else angle / max(rays - 1, 1)
+
+
 def directions(rays: int, angle: float) -> Iterator[Vector]:
     """Yield unit vectors in the plane of x and y, over an angle (rad) about x, from right to left."""
-    step = angle / rays if angle >= FULL_TURN else angle / max(rays - 1, 1)
+    step = step_of(rays, angle)
     for ray in range(rays):
         turned = ray * step - angle / 2.0 if rays > 1 else 0.0
         yield cos(turned), sin(turned), 0.0

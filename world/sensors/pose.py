@@ -26,7 +26,7 @@ class Pose(Struct, frozen=True):
     groups: ClassVar = {"position": ("x", "y")}
 
 
-@sensor("pose", PoseSettings, Pose, needs=("position", "heading"))
+@sensor("pose", PoseSettings, Pose, needs=("position", "heading"), shown_as="foxglove.PoseInFrame")
 class PoseTracker:
     """Place and heading in the world frame."""
 

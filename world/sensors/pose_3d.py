@@ -34,7 +34,7 @@ class Pose3d(Struct, frozen=True):
     groups: ClassVar = {"position": ("x", "y", "z"), "orientation": ("qx", "qy", "qz", "qw")}
 
 
-@sensor("pose_3d", Pose3dSettings, Pose3d)
+@sensor("pose_3d", Pose3dSettings, Pose3d, shown_as="foxglove.PoseInFrame")
 class PoseTracker3d:
     """Position and orientation of the mount in the world frame."""
 
