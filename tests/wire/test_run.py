@@ -111,7 +111,7 @@ def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None
     assert code == 3 and "world chess, this is table" in err
     version_2 = "from foosim.common import limits; limits.PROTOCOL_VERSION = 1"
     code, err = altered_node(house, version_2, "red", address)
-    assert code == 3 and "protocol version 1, this is 2" in err
+    assert code == 3 and "protocol version 1, this is 3" in err
 
 
 def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
