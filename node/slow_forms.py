@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -70,20 +70,26 @@ class SlowForms:
         return SlowForm(what, place, tick, seen_ns)
 
 
-def form_in(frame: FrameType | None, name_of: Callable[[object], str]) -> tuple[str, str]:
+def form_in(frame: FrameType | None, name_of: Callable[[object], str], files: Container[str]) -> tuple[str, str]:
     """Return the name of the innermost form whose method is on a stack, and where it is; two empty strings without.
 
     `frame` is the innermost of the stack, `name_of` returns the name of a form by its object, empty for other objects.
+    `files` are those of the forms' modules: the variables of other frames, which run meanwhile, are not touched.
     Compiled modules have no frames, so a form of theirs is not found.
     """
     while frame is not None:
         code = frame.f_code
-        if code.co_argcount:
+        if code.co_argcount and code.co_filename in files:
             what = name_of(frame.f_locals.get(code.co_varnames[0]))
             if what:
                 return what, f"{Path(code.co_filename).name}:{frame.f_lineno} in {code.co_name}"
         frame = frame.f_back
     return "", ""
+
+
+def modules_of(kind: type) -> set[str]:
+    """Return the modules of a class and of those that it derives from."""
+    return {base.__module__ for base in kind.__mro__}
 
 
 class Names:
@@ -94,6 +100,8 @@ class Names:
         self._by_id: dict[int, tuple[object, str]] = {}
         for made, what in stepper.forms():
             self._by_id.setdefault(id(made), (made, what))
+        modules = {module for made, _ in self._by_id.values() for module in modules_of(type(made))}
+        self.files: Final = frozenset(getattr(sys.modules.get(module), "__file__", None) or "" for module in modules)
 
     def name_of(self, made: object) -> str:
         """Return the name of a form, empty for another object; sensors computed together have one for several."""
@@ -133,4 +141,4 @@ class SlowWatch:
             return "", ""
         if self._names is None or self._names.stepper is not stepper:
             self._names = Names(stepper)
-        return form_in(sys._current_frames().get(self._watched), self._names.name_of)
+        return form_in(sys._current_frames().get(self._watched), self._names.name_of, self._names.files)
