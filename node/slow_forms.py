@@ -100,8 +100,13 @@ class Names:
         self._by_id: dict[int, tuple[object, str]] = {}
         for made, what in stepper.forms():
             self._by_id.setdefault(id(made), (made, what))
-        modules = {module for made, _ in self._by_id.values() for module in modules_of(type(made))}
-        self.files: Final = frozenset(getattr(sys.modules.get(module), "__file__", None) or "" for module in modules)
+
+    @property
+    def files(self) -> frozenset[str]:
+        """The files of the modules of all forms, and of what computes several of them together."""
+        made = [*(one for one, _ in self._by_id.values()), *(group for group, _ in self.stepper.forms_together())]
+        modules = {module for one in made for module in modules_of(type(one))}
+        return frozenset(getattr(sys.modules.get(module), "__file__", None) or "" for module in modules)
 
     def name_of(self, made: object) -> str:
         """Return the name of a form, empty for another object; sensors computed together have one for several."""

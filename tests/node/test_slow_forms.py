@@ -55,7 +55,7 @@ def test_each_form_of_a_world_has_a_name_and_each_sensor_is_found_on_the_stack(
     fitted = [one for sensors in stepper._sensors.values() for one in sensors if one.is_due(0, frame.numbers)]
     kept = {kind: caught(monkeypatch, kind, "sample") for kind in dict.fromkeys(type(one.sensor) for one in fitted)}
     stepper.sense(frame, stepper.layout.robots)
-    places = [form_in(stack, names.name_of, names.files) for frames in kept.values() for stack in frames]
+    places = [form_in(stack, names.name_of, names.files | {__file__}) for frames in kept.values() for stack in frames]
     alone = {what for what, _ in places}
     assert alone and alone <= {f"sensor {one.channel} of {one.robot}" for one in fitted}
     assert {where.partition(":")[0] for _, where in places} == {"test_slow_forms.py"}
