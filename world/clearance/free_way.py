@@ -111,6 +111,8 @@ class FreeWay:
         own = rows[who]
         is_other = own != other
         who, own, other = who[is_other], own[is_other], other[is_other]
+        if not len(who):
+            return _NO_PLANES
         here, there = everybody[own], everybody[other]
         dx, dy = there[:, 0] - here[:, 0], there[:, 1] - here[:, 1]
         way = np.sqrt(dx * dx + dy * dy)
@@ -180,6 +182,9 @@ class _Planes(NamedTuple):
         here = places[self.who]
         found: Floats = here[:, 0] * self.x + here[:, 1] * self.y + here[:, 2] * self.z
         return found
+
+
+_NO_PLANES: Final = _Planes(np.zeros(0, np.int64), *(np.zeros(0) for _ in range(4)))
 
 
 class _Met(NamedTuple):

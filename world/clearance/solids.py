@@ -26,6 +26,8 @@ CELLS_OF_ONE_MAX: Final = 4096
 CELLS_MAX: Final = 2**20
 """Cells lie this far from the origin at most, in either direction; what is farther out is in the last one."""
 STRIDE: Final = 2**22
+PAIRS_FEW: Final = 4096
+"""So many pairs at most are compared one and all: it costs less than sorting."""
 
 
 class Solids(NamedTuple):
@@ -150,8 +152,11 @@ class Standing:
 def pairs_near(own: Floats, others: Floats, reach_m: float) -> tuple[Places, Places]:
     """Return pairs of places of two kinds, shape (n, 2 or more), that are no farther apart in x and y than the reach.
 
-    Some that are farther apart are among them: all in neighbouring cells of a grid are.
+    Some that are farther apart are among them: of many, all in neighbouring cells of a grid are.
     """
+    if len(own) * len(others) <= PAIRS_FEW:
+        apart = np.abs(own[:, None, :2] - others[None, :, :2]) <= reach_m
+        return (apart[:, :, 0] & apart[:, :, 1]).nonzero()
     cells = cells_of(others[:, 0], others[:, 1], reach_m)
     order = np.argsort(cells, kind="stable")
     ordered, mine = cells[order], cells_of(own[:, 0], own[:, 1], reach_m)
