@@ -156,7 +156,8 @@ def pairs_near(own: Floats, others: Floats, reach_m: float) -> tuple[Places, Pla
     """
     if len(own) * len(others) <= PAIRS_FEW:
         apart = np.abs(own[:, None, :2] - others[None, :, :2]) <= reach_m
-        return (apart[:, :, 0] & apart[:, :, 1]).nonzero()
+        who, other = (apart[:, :, 0] & apart[:, :, 1]).nonzero()
+        return who, other
     cells = cells_of(others[:, 0], others[:, 1], reach_m)
     order = np.argsort(cells, kind="stable")
     ordered, mine = cells[order], cells_of(own[:, 0], own[:, 1], reach_m)
