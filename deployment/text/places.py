@@ -51,8 +51,8 @@ class Places:
                 finding, (place, is_key, depth) = finding.other, there
         written = (self._keys if is_key else self._values).get(place, ())
         if is_key and written[2:-1] == (SPACING,):
-            axes = ", ".join(axis for axis in AXES if axis in finding.valid)
-            finding = replace(finding, location=written, what=f"unknown key (there are: {axes or 'none'})", nearest=None)
+            axes = ", ".join(axis for axis in AXES if axis in finding.valid) or "none"
+            finding = replace(finding, location=written, what=f"unknown key (there are: {axes})", nearest=None)
         location = finding.location
         if written[:1] and written[0] in _AS_WRITTEN and not (is_made and written[0] == TEMPLATES):
             location = (*written, *location[depth:])

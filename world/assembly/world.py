@@ -21,7 +21,16 @@ from foosim.world.components.entities import (
     mounting_of,
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of, named_modifiers
-from foosim.world.components.view import Mounting, SolvingView, View, WritableView, called, called_of, component_error
+from foosim.world.components.view import (
+    ComponentError,
+    Mounting,
+    SolvingView,
+    View,
+    WritableView,
+    called,
+    called_of,
+    component_error,
+)
 from foosim.world.components.watching import Watched, places_of, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
@@ -34,6 +43,9 @@ from foosim.world.spec import WorldSpec
 
 NO_MOTORS: Final[Motors] = ()
 NO_TEXT: Final = "no text of"
+FAILED: Final = "failed"
+"""The kind of the mark of a rule whose marks cannot be told."""
+FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
 
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
@@ -65,6 +77,20 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     return rules
 
 
+def _watched_rules(spec: WorldSpec, layout: Layout, rules: Mapping[str, Rule]) -> dict[str, Any]:
+    """Return the rules of a world, each with what compares frames around it."""
+    watched: dict[str, Any] = {}
+    for label, settings in world_rules(spec).items():
+        writes = find_rule(settings).writes
+        places = [
+            place
+            for entity in layout.entities
+            for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
+        ]
+        watched[label] = Watched(rules[label], layout, places)
+    return watched
+
+
 def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies in the deployment's world. Raises ComponentError."""
     bodies: dict[str, Body] = {}
@@ -76,8 +102,11 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
 
 
-def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
-    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set."""
+def initial_numbers(spec: WorldSpec, layout: Layout, *, is_watched: bool = False) -> list[float]:
+    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set.
+
+    `is_watched`: rules that write to them otherwise than by their views are errors (`watching`).
+    """
     numbers = [0.0] * layout.size
     for place in layout.references:
         numbers[place] = NO_ENTITY
@@ -85,7 +114,8 @@ def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
     for index, model in models_of(spec, layout).items():
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
-    for label, rule in rules_of(spec, layout).items():
+    rules = rules_of(spec, layout)
+    for label, rule in (_watched_rules(spec, layout, rules) if is_watched else rules).items():
         if hasattr(rule, "place"):
             called(f"rule {label}", WORLD, 0, rule.place, view)
     return numbers
@@ -153,7 +183,8 @@ def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     """Return the kinds of what rules mark, by name."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
-    return {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+    own = {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+    return {FAILED: FAILED_LOOK, **own}
 
 
 class WorldMarks:
@@ -161,22 +192,41 @@ class WorldMarks:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.layout = layout
-        self._rules: list[Any] = [rule for rule in rules_of(spec, layout).values() if hasattr(rule, "marks")]
-        self._entity_rules: list[tuple[str, Any]] = [
-            (robot.name, rule)
+        self._rules: dict[tuple[str, str], Any] = {
+            (WORLD, label): rule for label, rule in rules_of(spec, layout).items() if hasattr(rule, "marks")
+        }
+        self._rules |= {
+            (robot.name, label): rule
             for robot in layout.robots
             if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
-            for _, rule in _entity_rules_of(spec, layout, robot)
+            for label, rule in _entity_rules_of(spec, layout, robot)
             if hasattr(rule, "marks")
-        ]
+        }
+        """By entity and name: those of the world first."""
 
     def between(self, before: Frame, after: Frame) -> list[Marked]:
-        """Return what happened after one frame, up to a later one."""
-        found = [mark for rule in self._rules for mark in rule.marks(before, after)]
-        for robot, rule in self._entity_rules:
-            if robot in before.layout:
-                found += rule.marks(before, after)
+        """Return what happened after one frame, up to a later one.
+
+        A rule that raises, or gives something else than marks, is left out from then on, and a mark says so.
+        """
+        found: list[Marked] = []
+        for (entity, label), rule in [*self._rules.items()]:
+            if entity != WORLD and entity not in before.layout:
+                continue
+            try:
+                found += called(f"marks of rule {label}", entity, after.tick, _marks_of, rule, before, after)
+            except ComponentError as error:
+                del self._rules[entity, label]
+                found.append((after.tick, FAILED, str(error)))
         return found
+
+
+def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
+    found = [*rule.marks(before, after)]
+    for mark in found:
+        if not (isinstance(mark, tuple) and [*map(type, mark)] == [int, str, str]):
+            raise WrongResult(rule.marks, "a mark (tick, kind, text)", mark)
+    return found
 
 
 class World:
@@ -209,14 +259,7 @@ class World:
             index: Watched(model, layout, places_of(entities[index], *entities[index].offsets))
             for index, model in self.models.items()
         }
-        for label, settings in world_rules(spec).items():
-            writes = find_rule(settings).writes
-            places = [
-                place
-                for entity in entities
-                for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
-            ]
-            self._rules[label] = Watched(self._rules[label], layout, places)
+        self._rules = _watched_rules(spec, layout, self._rules)
         self.actuators = {
             index: tuple(watched_actuator(one, layout) for one in its) for index, its in self.actuators.items()
         }

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from foosim.common.errors import Failed
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
@@ -24,7 +25,7 @@ if TYPE_CHECKING:  # numpy is for those who compute a tick
 Result = TypeVar("Result")
 
 
-class ComponentError(Exception):
+class ComponentError(Failed):
     """A form has raised, or returned what it must not: whichever node computes its tick, it would do so again.
 
     `component` is which one of `entity` it is, `cause` has its traceback.
