@@ -103,7 +103,8 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
 
 
 def initial_numbers(spec: WorldSpec, layout: Layout, *, is_watched: bool = False) -> list[float]:
-    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set.
+    """Return the numbers of a world at tick 0: each entity as its model places it, then what its rules set, then
+    those of the world.
 
     `is_watched`: rules that write to them otherwise than by their views are errors (`watching`).
     """
@@ -114,6 +115,12 @@ def initial_numbers(spec: WorldSpec, layout: Layout, *, is_watched: bool = False
     for index, model in models_of(spec, layout).items():
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
+    for robot in layout.robots:
+        if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
+            for label, own in _entity_rules_of(spec, layout, robot):
+                if hasattr(own, "place"):
+                    watched = _watched_entity_rule(spec, layout, robot, label, own) if is_watched else own
+                    called(f"rule {label}", robot.name, 0, watched.place, view)
     rules = rules_of(spec, layout)
     for label, rule in (_watched_rules(spec, layout, rules) if is_watched else rules).items():
         if hasattr(rule, "place"):
@@ -248,6 +255,12 @@ class World:
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
+        self._powers: dict[int, list[tuple[str, Any]]] = {}
+        """The rules that say whether an entity's drives have power, by its index."""
+        for index, its in self._entity_rules.items():
+            for label, rule in its:
+                if hasattr(rule, "has_power"):
+                    self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
 
@@ -270,13 +283,8 @@ class World:
             places = [place for entity in moved for place in places_of(entity, *writes, component="motion")]
             self._motions[name] = Watched(motion, layout, places)
         for index, its in self._entity_rules.items():
-            robot, rules = entities[index], spec.robots[entities[index].name].rules
             self._entity_rules[index] = tuple(
-                (
-                    label,
-                    Watched(rule, layout, places_of(robot, *find_entity_rule(rules[label]).writes, component=label)),
-                )
-                for label, rule in its
+                (label, _watched_entity_rule(spec, layout, entities[index], label, rule)) for label, rule in its
             )
 
     def forms(self) -> Iterator[tuple[object, str]]:
@@ -329,6 +337,9 @@ class World:
         found: list[Motors] = []
         for entity in entities:
             one = self._only.get(entity.index)
+            if entity.index in self._powers and not self._has_power(entity, view):
+                found.append(self._motors_without_power(entity, view))
+                continue
             if one is None:
                 found.append(self._motors_of_several(entity, view))
                 continue
@@ -348,17 +359,40 @@ class World:
             return NO_DRIVES
         motors = [FREE] * entity.counts.get("joint_positions", 0)
         wrench: Wrench | None = None
+        has_power = entity.index not in self._powers or self._has_power(entity, view)
         for one in fitted:
             try:
-                asked = one.actuator.command(view)
+                asked = one.actuator.command(view) if has_power else _without_power(one, view)
                 joints = getattr(one.actuator, "joints", None) or range(len(asked))
                 for joint, motor in zip(joints, asked, strict=True):
                     motors[joint] = Motor(*motor)
-                if hasattr(one.actuator, "wrench"):
+                if has_power and hasattr(one.actuator, "wrench"):
                     wrench = added(wrench, one.actuator.wrench(view))
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return Drives(tuple(motors), wrench)
+
+    def _has_power(self, entity: Entity, view: View) -> bool:
+        """Whether all rules of an entity that say so say that its drives have power."""
+        for label, rule in self._powers[entity.index]:
+            try:
+                answer = rule.has_power(view)
+                if answer is not True and answer is not False:
+                    raise WrongResult(rule.has_power, "True or False", answer)
+            except BaseException as error:
+                raise component_error(f"rule {label}", entity.name, view.tick, error) from error
+            if not answer:
+                return False
+        return True
+
+    def _motors_without_power(self, entity: Entity, view: View) -> Motors:
+        asked = NO_MOTORS
+        for one in self.actuators.get(entity.index, ()):
+            try:
+                asked += _without_power(one, view)
+            except BaseException as error:
+                raise one.failed(view.tick, error) from error
+        return asked
 
     def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
         """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""
@@ -436,6 +470,19 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
     return motions
 
 
+def _without_power(one: FittedActuator, view: View) -> Motors:
+    """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
+    unpowered = getattr(one.actuator, "unpowered", None)
+    asked: Motors = tuple((0.0, most) for _, most in one.actuator.command(view)) if unpowered is None else unpowered()
+    return asked
+
+
+def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: str, rule: EntityRule) -> Any:
+    """Return a rule of a robot with what compares frames around it."""
+    written = find_entity_rule(spec.robots[robot.name].rules[label]).written
+    return Watched(rule, layout, places_of(robot, *written, component=label))
+
+
 def _are_motors(asked: object, count: int | None) -> bool:
     """Whether that is what an actuator can ask of so many motors, or of any number."""
     return (
@@ -451,6 +498,6 @@ def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tu
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found = find_entity_rule(settings)
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
-        at = Mounting(spec, layout, robot, label, key, frozenset(found.writes))
+        at = Mounting(spec, layout, robot, label, key, frozenset(found.written))
         rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))
     return tuple(rules)

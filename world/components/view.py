@@ -288,7 +288,11 @@ class Modifier(Protocol):
 
 
 class Actuator(Protocol):
-    """What the tick of a node asks of an actuator. It is made from its settings and its mounting."""
+    """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
+
+    A class may have the method `unpowered()`, which returns what is asked of the motors of a robot without power. Where
+    there is none, that is a speed of 0 with the force or acceleration of `command`.
+    """
 
     def accept(self, command: Any, view: WritableView) -> bool:
         """Take a command, a value of the registered type, into the slots; False when it is refused."""
