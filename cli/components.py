@@ -18,7 +18,7 @@ OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
     "motion": ("writes",),
     "rule": ("each", "writes"),
-    "entity_rule": ("writes",),
+    "entity_rule": ("writes", "shared"),
     "kit": ("entities", "addable", "rules"),
 }
 """What is told of a form beside what all have: its fields."""
@@ -114,6 +114,8 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  slots of each {'robot' if whose == ROBOTS else whose}: {_counted(slots)}"
     if about.get("writes"):
         yield f"  writes: {', '.join(about['writes'])}"
+    if about.get("shared"):
+        yield f"  slots that are the model's where it has them: {', '.join(about['shared'])}"
     if about["form"] == "model":
         yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
         yield f"  moved by: {'an engine' if about['is_rigid'] else about['motion'] or 'nothing'}"

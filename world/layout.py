@@ -349,7 +349,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
+        slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots_on(fields).items()}
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
         component = registry.find_component("sensor", sensor.kind)

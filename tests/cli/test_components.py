@@ -102,7 +102,7 @@ TOLD: Final = {
     ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
     ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)", "can be added: ball"],
-    ("entity_rule", "battery"): ["needs a model with: charge, wheel_speeds, position", "writes: charge"],
+    ("entity_rule", "battery"): ["slots: charge", "slots that are the model's where it has them: charge"],
     ("sensor", "pose"): ["modifiers: a list: of modifiers, see components modifier (default [])"],
 }
 

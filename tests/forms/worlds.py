@@ -23,6 +23,7 @@ Place = tuple[str | int, ...]
 RODS: Final = ("red.goal", "red.attack", "blue.goal", "blue.attack")
 ROVERS: Final = ("rover-1", "rover-2", "rover-3")
 SCENE: Final = ("field", "floor", "walls", "goal", "ramps")
+CHARGER: Final = {"tag": "vehicle", "radius": "1 m", "power": "2 W"}
 LINK: Final = {"id": "all", "from": "*", "to": "*", "delay": "2 ms", "loss": "10 %", "order": "fifo"}
 
 
@@ -290,7 +291,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
     ("rule", "football"): TABLE,
     ("rule", "zone"): World(YARD.data, ("rules", "corner")),
-    ("entity_rule", "battery"): HALL,
+    ("entity_rule", "battery"): YARD.with_(
+        ("robots", "base", "rules"),
+        {"own": {"kind": "battery", "capacity": "5 J", "idle": "1 W", "drag": "5 N", "chargers": [CHARGER]}},
+        ("robots", "base", "rules", "own"),
+    ),
     ("scene", "boxes"): World(YARD.data, ("scene",)),
     ("scene", "empty"): World(
         YARD.with_(("scene",), {"kind": "empty", "length": "9 m", "width": "9 m"}).data, ("scene",)

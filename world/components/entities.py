@@ -86,7 +86,9 @@ class EntityRule(Protocol):
     """A rule of one entity. It is made from its settings and its mounting.
 
     A class may have `marks(before, after)` and `mark_kinds`, as a rule of the world may. It is asked about frames that
-    both have the entity.
+    both have the entity. It may have further methods: the static `check(settings, at)`, which raises Misfit where the
+    settings do not fit robot or world; `place(view)`, which writes what it has at tick 0; and `has_power(view)`: where
+    one of a robot's rules says False at a tick, its drives get none.
     """
 
     def apply(self, view: WritableView) -> None:

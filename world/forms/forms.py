@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -276,12 +276,22 @@ class EntityRule(Form):
     """What an entity does by itself, after it was solved, computed by the node that solves it.
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
-    that it changes.
+    that it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
+
+    def slots_on(self, fields: Collection[str]) -> dict[str, int]:
+        """Return its slots on an entity whose model has these fields."""
+        return {slot: size for slot, size in self.slots.items() if not (slot in self.shared and slot in fields)}
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The fields of an entity that it may change, where they are there."""
+        return (*self.writes, *self.shared)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -58,6 +58,8 @@ def _problems(found: Form) -> Iterator[str]:
             yield from _slots(found.slots)
             yield from _names("needs", found.needs)
             yield from _names("writes", found.writes)
+            if isinstance(found, EntityRule):
+                yield from _names("shared", found.shared)
         case WorldRule():
             yield from _world_rule(found)
         case Kit():

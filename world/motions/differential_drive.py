@@ -3,7 +3,7 @@
 A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
 From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an arc
 (`moving.arcs`), as far as nothing is in the way (`clearance.free_way`). It turns on the spot where all is blocked, with
-its wheels slipping. Of a robot with a `charge` the wheels stop where that is 0.
+its wheels slipping.
 """
 
 from __future__ import annotations
@@ -47,8 +47,6 @@ class _Batch:
         wheels = [wheels_of(at.spec, at.layout, entity) for entity in entities]
         self.track = np.array([its.track for its in wheels])
         self.rolls = np.array([[1.0 - its.slips[0], 1.0 - its.slips[1]] for its in wheels])
-        self.charges = [(row, its.offsets["charge"]) for row, its in enumerate(entities) if "charge" in its.offsets]
-        """Rows of those that have a charge, and its places."""
 
 
 @motion("differential_drive", needs=STATE, writes=STATE)
@@ -73,9 +71,6 @@ class DifferentialDrive:
         asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
         asked = asked.reshape(count, 2, 2)
         targets, rates = asked[:, :, 0], asked[:, :, 1]
-        for row, charge in batch.charges:
-            if not view.numbers[charge] > 0.0:
-                targets[row] = 0.0
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
