@@ -66,14 +66,14 @@ class Battery:
 
     def apply(self, view: WritableView) -> None:
         """Take what a tick costs, and give what chargers give."""
-        dt = self._dt
-        charge = view.numbers[self._charge.at] - self._idle * dt - self._drag * self._way(view)
-        if self._standing or self._tagged:
+        charge = view.numbers[self._charge.at] - self._idle * self._dt - self._drag * self._way(view)
+        chargers = [*self._standing, *self._places(view)] if self._tagged else self._standing
+        if chargers:
             x, y = self._place(view)
-            for there_x, there_y, reach, power in [*self._standing, *self._places(view)]:
+            for there_x, there_y, reach, power in chargers:
                 dx, dy = x - there_x, y - there_y
                 if dx * dx + dy * dy <= reach * reach:
-                    charge += power * dt
+                    charge += power * self._dt
         view.write(self._charge, min(max(charge, 0.0), self._capacity))
 
     def _way(self, view: WritableView) -> float:
