@@ -108,10 +108,9 @@ def _parts(shape: Shape, body: _Swept) -> Iterator[tuple[Nearest, Reach]]:
         size = geometry.radius, geometry.length / 2
         yield _in_cylinder(place, orientation, *size), _reach_of_cylinder(place, orientation, *size)
     elif isinstance(geometry, Mesh):
-        import numpy as np  # which no other table needs
+        from foosim.world.clearance.convex import placed_points  # brings numpy, which no other table needs
 
-        turned = np.array([rotate(orientation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))])
-        corners = (geometry.vertices @ turned + place)[geometry.triangles]
+        corners = placed_points(geometry, place, orientation)[geometry.triangles]
         is_near = (corners.min(axis=1) < body.high) & (body.low < corners.max(axis=1))
         for triangle in corners[is_near.all(axis=1)].tolist():
             yield _in_triangle(*triangle), _reach_of_triangle(*triangle)
