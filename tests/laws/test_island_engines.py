@@ -260,8 +260,22 @@ class InAnotherOrder(Comparison):
             self._solve(self.engine(self.whole, back), back, numbers)
 
 
+class HoldsAnothers(Comparison):
+    """Each engine of one side has a body of another island besides, where that is: solved, and not read."""
+
+    def solve_whole(self, islands: Sequence[tuple[int, ...]], numbers: list[float]) -> None:
+        before = numbers.copy()
+        for rows, others in zip(islands, [*islands[1:], islands[0]], strict=True):
+            held, solved = tuple(sorted({*rows, others[0]})), before.copy()
+            self._solve(self.engine(self.whole, held), held, solved)
+            for entity in (self.world.entities[row] for row in rows):
+                numbers[entity.start : entity.stop] = solved[entity.start : entity.stop]
+
+
 @pytest.mark.parametrize(
-    "kind", [of_engine(WithoutParking), InOneSolve, InAnotherOrder], ids=["no parking", "one solve", "order"]
+    "kind",
+    [of_engine(WithoutParking), InOneSolve, InAnotherOrder, HoldsAnothers],
+    ids=["no parking", "one solve", "order", "another's body"],
 )
 def test_a_rule_that_is_broken_is_seen(kind: type[Comparison]) -> None:
     outcome = compared(600, kind, until_it_differs=True)
