@@ -5,7 +5,6 @@ from __future__ import annotations
 from hashlib import blake2b
 from itertools import permutations
 from math import pi
-from pathlib import Path
 from struct import pack
 from typing import Final
 
@@ -189,10 +188,9 @@ def by_lapack(tensor: Tensor) -> Principal:
     ours = principal_of(tensor)
     values, vectors = np.linalg.eigh(matrix(tensor))
     order = min(permutations(range(3)), key=lambda order: abs(values[list(order)] - ours.moments).sum())
+    axes = [rotate(ours.axes, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     columns = [vectors[:, number] for number in order]
-    for column, axis in zip(columns, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True):
-        if float(column @ np.array(rotate(ours.axes, axis))) < 0.0:
-            column *= -1.0
+    columns = [np.copysign(1.0, (one * axis).sum()) * one for one, axis in zip(columns, axes, strict=True)]
     x, y, z = (tuple(column.tolist()) for column in columns)
     return Principal(tuple(values[list(order)].tolist()), quaternion_of((x, y, z)))
 
