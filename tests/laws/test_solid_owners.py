@@ -21,7 +21,8 @@ from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.components.drives import Drives
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
-from tests.solid_yards import ARMS, DEPLOY, NAME, PUSHED, SIDE_M, STACK, Push, run, stack, three_arms
+from tests.forms.worlds import DEPLOY
+from tests.solid_yards import ARMS, NAME, PUSHED, SIDE_M, STACK, Push, run, stack, three_arms
 
 TICKS = 200
 

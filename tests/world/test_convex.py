@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from foosim.world.bodies.hull import convex_hull
-from foosim.world.clearance.convex import Corners, convex_of, overlap_of
+from foosim.world.clearance.convex import Convex, Corners, convex_parts, overlap_of
 from foosim.world.scene import (
     UPRIGHT,
     Box,
@@ -35,6 +35,11 @@ Geometry = Box | Sphere | Cylinder | Capsule | Hull
 
 def shape(geometry: Geometry) -> Shape:
     return Shape(geometry, "", (0.0, 0.0, 0.0, 1.0))
+
+
+def convex_of(one: Shape, position: Vector, orientation: Quaternion) -> Convex:
+    (found,) = convex_parts(one, position, orientation, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    return found
 
 
 def between(

@@ -109,16 +109,22 @@ class Corners:
 Convex: TypeAlias = Solid | Corners
 
 
-def convex_of(shape: Shape, position: Vector, orientation: Quaternion) -> Convex:
-    """Return a shape, but a mesh, at a pose in the world."""
+def convex_parts(
+    shape: Shape, position: Vector, orientation: Quaternion, low: Vector, high: Vector
+) -> Iterator[Convex]:
+    """Yield a shape at a pose in the world as convex bodies: of a mesh the triangles whose boxes meet a box."""
     its = shape.geometry
-    if isinstance(its, Hull):
-        return Corners(placed_points(its.mesh, position, orientation))
-    assert not isinstance(its, Mesh), "a mesh need not be convex"
-    return Solid(its, position, orientation)
+    if isinstance(its, Mesh):
+        corners = _placed(its, position, orientation)[its.triangles]
+        is_met = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
+        yield from map(Corners, corners[is_met])
+    elif isinstance(its, Hull):
+        yield Corners(_placed(its.mesh, position, orientation))
+    else:
+        yield Solid(its, position, orientation)
 
 
-def placed_points(mesh: Mesh, position: Vector, orientation: Quaternion) -> NDArray[np.float64]:
+def _placed(mesh: Mesh, position: Vector, orientation: Quaternion) -> NDArray[np.float64]:
     """Return the corners of a mesh at a pose in the world, shape (n, 3)."""
     x, y, z = mesh.vertices.T
     ex, ey, ez = (rotate(orientation, axis) for axis in AXES)

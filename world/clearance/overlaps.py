@@ -20,7 +20,7 @@ from foosim.common.finding import Finding
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import is_felt
 from foosim.world.assembly.world import initial_numbers, models_of
-from foosim.world.clearance.convex import Convex, Corners, convex_of, overlap_of, placed_points
+from foosim.world.clearance.convex import Convex, convex_parts, overlap_of
 from foosim.world.clearance.solids import scenery_of
 from foosim.world.clearance.start import PLACED_BY
 from foosim.world.kinematics import forward_kinematics
@@ -64,6 +64,10 @@ class _Piece:
             return inf
         low, high = shape_box(Shape(self.shape.geometry, "", self.shape.colour))
         return min(high[axis] - low[axis] for axis in range(3))
+
+    def convex(self, near: _Piece) -> Iterator[Convex]:
+        """Yield it as convex bodies, of a mesh the triangles near another piece."""
+        return convex_parts(self.shape, self.position, self.orientation, near.low, near.high)
 
 
 class _Overlap(NamedTuple):
@@ -147,30 +151,15 @@ def _deepest(pairs: Iterable[tuple[_Piece, _Piece]]) -> _Overlap | None:
     """Return the greatest overlap of pairs, if there is any."""
     found: _Overlap | None = None
     for one, other in pairs:
+        if isinstance(one.shape.geometry, Mesh) and isinstance(other.shape.geometry, Mesh):
+            continue  # triangles have no inside
         touching = min(TOUCHING_M, TOUCHING_SHARE * min(one.thinnest, other.thinnest))
-        for mine in _convex(one, other):
-            for its in _convex(other, one):
+        for mine in one.convex(other):
+            for its in other.convex(one):
                 depth = overlap_of(mine, its, touching if found is None else max(touching, found.depth))
                 if depth > 0.0:
                     found = _Overlap(depth, other.what, touching)
     return found
-
-
-def _convex(piece: _Piece, near: _Piece) -> Iterator[Convex]:
-    """Yield a piece as convex bodies: of a mesh the triangles whose boxes meet that of another piece.
-
-    Of two meshes none: triangles have no inside.
-    """
-    its = piece.shape.geometry
-    if isinstance(its, Mesh) and isinstance(near.shape.geometry, Mesh):
-        return
-    if not isinstance(its, Mesh):
-        yield convex_of(piece.shape, piece.position, piece.orientation)
-        return
-    corners = placed_points(its, piece.position, piece.orientation)[its.triangles]
-    is_met = (corners.min(axis=1) <= near.high).all(axis=1) & (corners.max(axis=1) >= near.low).all(axis=1)
-    for triangle in corners[is_met]:
-        yield Corners(triangle)
 
 
 def _scenery(spec: WorldSpec) -> Iterator[_Piece]:
