@@ -76,13 +76,16 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
 
 
-def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
-    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set."""
+def initial_numbers(spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None) -> list[float]:
+    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set.
+
+    `models` are those of the layout where they are made already. Raises ComponentError.
+    """
     numbers = [0.0] * layout.size
     for place in layout.references:
         numbers[place] = NO_ENTITY
     view = WritableView(0, numbers)
-    for index, model in models_of(spec, layout).items():
+    for index, model in (models_of(spec, layout) if models is None else models).items():
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for label, rule in rules_of(spec, layout).items():

@@ -174,7 +174,8 @@ def _scenery(spec: WorldSpec) -> Iterator[_Piece]:
 
 def _bodies(spec: WorldSpec, layout: Layout, entities: Sequence[Entity]) -> Iterator[_Piece]:
     """Yield the shapes of all bodies that rigid bodies feel, at tick 0. Owners are places in the list."""
-    physics, numbers, models = physics_of(spec), initial_numbers(spec, layout), models_of(spec, layout)
+    physics, models = physics_of(spec), models_of(spec, layout)
+    numbers = initial_numbers(spec, layout, models)
     for owner, entity in enumerate(entities):
         body: Body | None = models[entity.index].body() if entity.index in models else None
         if body is None or not entity.is_solved or not is_felt(body, physics):
