@@ -65,7 +65,9 @@ def test_files(case: str, tmp_path: Path) -> None:
 def test_a_mesh_that_is_missing(tmp_path: Path) -> None:
     text = ARM.replace('<link name="grip"/>', MESH)
     assert text != ARM
-    assert "gripper.stl" in said(text, folder=tmp_path) and said(folder=tmp_path) == ""
+    line, what = line_of('<link name="grip"/>'), "a mesh that cannot be read: gripper.stl: No such file or directory"
+    assert said(text, folder=tmp_path) == f"arm.urdf:{line}: {what}"
+    assert said(folder=tmp_path) == "", "the arm itself is good"
 
 
 @pytest.mark.parametrize(
