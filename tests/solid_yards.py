@@ -54,7 +54,7 @@ def _text(**sections: Any) -> str:
 
 
 def three_arms() -> str:
-    """Three arms that wave, a box in front of the first, a crate beside each, and a base that drives between two."""
+    """Three arms that wave, a box and a ram behind it, a crate beside each arm, and a base that drives between two."""
     arm = {"model": "urdf", "file": "arm.urdf", "fixed": True, "actuators": {"joints": {"kind": "joint_position"}}}
     robots: dict[str, Any] = {name: {**arm, "at": {"x": f"{x} m"}} for name, x in zip(ARMS, ARMS_X_M, strict=True)}
     robots["base"] = {"model": "holonomic", "at": {"x": "3.9 m", "y": "-50 cm"}}
@@ -64,6 +64,7 @@ def three_arms() -> str:
         surfaces={"floor": {"friction": 0.05, "restitution": 0.1}},
         objects={
             "box": {**BOX, "at": {"x": "-1.6 m", "y": "60 cm", "z": "10 cm"}},
+            "ram": {**BOX, "mass": "5 kg", "at": {"x": "-1.85 m", "y": "60 cm", "z": "10 cm"}},
             "crate": {**BOX, **crates},
             "fallen": {**BOX, **fallen},
         },
@@ -75,7 +76,12 @@ def three_arms() -> str:
     )
 
 
-PUSHED: Final[tuple[Push, ...]] = tuple((tick, "box", (4.0 if tick == 5 else 0.8, 0.0, 0.0)) for tick in (5, 60, 120))
+PUSHED: Final[tuple[Push, ...]] = (
+    (5, "ram", (20.0, 0.0, 0.0)),
+    (60, "ram", (5.0, 0.0, 0.0)),
+    (110, "ram", (5.0, 0.0, 0.0)),
+)
+"""The ram is thrown at the box, and pushes it on."""
 
 
 def stack() -> str:

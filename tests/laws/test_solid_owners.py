@@ -22,7 +22,7 @@ from foosim.world.components.drives import Drives
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 from tests.forms.worlds import DEPLOY
-from tests.solid_yards import ARMS, NAME, PUSHED, SIDE_M, STACK, Push, run, stack, three_arms
+from tests.solid_yards import ARMS, ARMS_X_M, NAME, PUSHED, SIDE_M, STACK, Push, run, stack, three_arms
 
 TICKS = 200
 
@@ -49,7 +49,9 @@ def test_a_box_that_is_pushed_past_three_owners_goes_the_same_way_on_any_number_
     owners = [island.nearest for each in islands() for island in each if box in island.entities]
     assert [owner for owner in dict.fromkeys(owners) if owner] == list(ARMS)
     assert "" in owners, "between two arms it belongs to a node that follows from its name"
-    assert frames[-1].vector("box", "position", 3)[0] > 6.5
+    ram = frames[0].layout["ram"].index
+    touched = [frame for frame in frames if ram in [int(one) for one in frame.vector("box", "partners", 4)]]
+    assert len(touched) >= 8 and frames[-1].vector("box", "position", 3)[0] > ARMS_X_M[-1] + 0.5
 
 
 def test_a_base_of_one_node_drives_between_islands_of_two_others() -> None:
@@ -57,7 +59,7 @@ def test_a_base_of_one_node_drives_between_islands_of_two_others() -> None:
     digests, frames = pushed(1)
     layout, dealt = frames[0].layout, deal_robots(load_deployment(three_arms(), NAME), 3)
     owner = {robot: node for node, robots in dealt.items() for robot in robots}
-    base, fallen = layout["base"].index, layout["fallen"].index
+    base = layout["base"].index
     between = 0
     for each in islands():
         others = {owner[island.nearest] for island in each if base in island.movers and island.nearest}
@@ -65,7 +67,7 @@ def test_a_base_of_one_node_drives_between_islands_of_two_others() -> None:
     assert between >= 50, between
     partners = {int(one) for frame in frames for one in frame.vector("fallen", "partners", 4)}
     assert base in partners and frames[-1].vector("fallen", "position", 3)[2] == pytest.approx(SIDE_M / 2, abs=0.02)
-    assert digests == pushed(3)[0] and fallen != base
+    assert digests == pushed(3)[0]
 
 
 def stands_and_falls(stands: int, falls: int) -> None:
