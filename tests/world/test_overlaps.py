@@ -10,6 +10,7 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
+from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.world.clearance.overlaps import FOUND_MAX
 from tests.kinematic_yard import yard_text
 from tests.world.test_mesh import CUBE
@@ -86,8 +87,11 @@ def test_objects(case: str) -> None:
 
 
 def test_so_many_are_named_at_most() -> None:
-    found = problems(text_of({"a": crate(count=200, spacing={"x": "10 cm"})}))
-    assert len(found) == FOUND_MAX and found[0].startswith("objects.a-10.at: a-10 starts 100 mm deep in a-9")
+    with pytest.raises(DeploymentError) as refused:
+        load_deployment(text_of({"a": crate(count=300, spacing={"x": "10 cm"})}), "yard.yaml")
+    *found, more = refused.value.problems
+    assert FOUND_MAX > len(found) == PROBLEMS_MAX and more.startswith("and more: ")
+    assert "objects.a-10.at: a-10 starts 100 mm deep in a-9" in found[0]
 
 
 def test_the_place_is_that_of_the_value_in_the_file() -> None:

@@ -37,8 +37,8 @@ GROWTH_MAX: Final = 200
 EXACT_M: Final = 1e-6
 EXACT_SHARE: Final = 0.005
 """Growing ends where the depth is known to this, or to this share of itself."""
-FLAT: Final = 1e-12
-"""Of twice the area of a face, as a share of the square of the size: below it the face has no direction."""
+FLAT: Final = 1e-9
+"""The sine of the angle between two edges of a face, below which it has no direction."""
 AXES: Final[tuple[Vector, ...]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 Geometry: TypeAlias = Box | Sphere | Cylinder | Capsule
 
@@ -158,12 +158,13 @@ class _Face:
 
     __slots__ = ("corners", "far", "normal")
 
-    def __init__(self, points: Sequence[Vector], corners: tuple[int, int, int], flat: float) -> None:
+    def __init__(self, points: Sequence[Vector], corners: tuple[int, int, int]) -> None:
         a, b, c = (points[corner] for corner in corners)
-        across = cross(moved(b, a, -1.0), moved(c, a, -1.0))
+        one, other = moved(b, a, -1.0), moved(c, a, -1.0)
+        across = cross(one, other)
         length = sqrt(dot(across, across))
         self.corners = corners
-        if length > flat:
+        if length > FLAT * sqrt(dot(one, one) * dot(other, other)):
             self.normal: Vector = (across[0] / length, across[1] / length, across[2] / length)
             self.far = dot(self.normal, a)
         else:  # it keeps the surface closed, and is never the nearest one
@@ -184,7 +185,6 @@ class _Growing:
         self._faces: dict[int, _Face] = {}
         self._edges: dict[tuple[int, int], int] = {}
         self._next = 0
-        self._flat = 0.0
 
     def reach(self, way: Vector) -> float:
         """Return how far the difference reaches from the origin along a direction: at most so deep is the origin."""
@@ -199,7 +199,6 @@ class _Growing:
         """Begin with a tetrahedron: the ends along x, then what is farthest across them, and across all three."""
         a, b = self._farthest(AXES[0]), self._farthest(_back(AXES[0]))
         along = moved(a, b, -1.0)
-        self._flat = FLAT * dot(along, along)
         least = min(range(3), key=lambda axis: abs(along[axis]))
         c = self._away(a, cross(along, AXES[least]))
         d = self._away(a, cross(along, moved(c, a, -1.0)))
@@ -253,7 +252,7 @@ class _Growing:
         return [edge for edge, behind in around if behind not in seen]
 
     def _add(self, corners: tuple[int, int, int]) -> None:
-        self._faces[self._next] = _Face(self._points, corners, self._flat)
+        self._faces[self._next] = _Face(self._points, corners)
         a, b, c = corners
         for edge in ((a, b), (b, c), (c, a)):
             self._edges[edge] = self._next

@@ -34,8 +34,8 @@ TOUCHING_M: Final = 0.001
 """Bodies that overlap by no more only touch: so far Bullet itself takes them for touching."""
 TOUCHING_SHARE: Final = 0.05
 """Small bodies touch as long as they overlap by no more than this share of the thinner one."""
-FOUND_MAX: Final = 64
-"""So many that start in something are named: what is wrong with all of a fleet takes no long look."""
+FOUND_MAX: Final = 128
+"""So many that start in something are looked for, more than a report shows: a fleet in a heap takes no long look."""
 
 
 @dataclass(frozen=True, slots=True)
