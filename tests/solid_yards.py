@@ -3,14 +3,13 @@ drives between them, and a stack that stands and is then pushed over."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
 import yaml
 
 from foosim.rehearsal.check.component_check import _shuffle as shuffle
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.frame import Frame
@@ -103,9 +102,10 @@ def run(
     nodes: int,
     pushes: Sequence[Push] = (),
     *,
+    on_commit: Callable[[Frame], None] | None = None,
     is_shuffled: bool = False,
-) -> tuple[Rehearsed, list[Frame]]:
-    """Rehearse a world on some nodes, with pushes at their ticks; return its result and its frames.
+) -> Rehearsed:
+    """Rehearse a world on some nodes, with pushes at their ticks.
 
     `is_shuffled`: robots are moved between nodes, and all objects of nodes are made anew, at drawn ticks.
     """
@@ -116,6 +116,7 @@ def run(
         if is_shuffled:
             shuffle(system, seed=1, ticks=ticks)
 
-    frames = Frames()
-    found = rehearse(text, NAME, ticks, nodes, settings=Settings(on_commit=frames), prepare=prepare, folder=DEPLOY)
-    return found, frames.frames
+    settings = Settings(on_commit=on_commit)
+    found = rehearse(text, NAME, ticks, nodes, settings=settings, prepare=prepare, folder=DEPLOY)
+    assert not found.json["failed"] and found.json["ticks"] == ticks, found.json["reason"]
+    return found
