@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,7 +10,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.world.clearance.overlaps import FOUND_MAX
 from tests.kinematic_yard import yard_text
@@ -152,3 +153,20 @@ def test_meshes_when_their_files_are_there(tmp_path: Path) -> None:
         ]
     text = yard_text({"one": {"model": "differential_drive", "at": {"x": "0.9 m"}}}, scenery=rock)
     assert problems(text, tmp_path) == ["robots.one.at: the robot starts in the rock, '0.9 m, 0 m, 0 m'"]
+
+
+def test_what_a_kit_brings_is_compared_with_what_it_does_not() -> None:
+    """Rods pass through the walls of their table, as the kit means it; a crate on it is beside all of that, or not."""
+
+    def on_the_table(**place: str) -> list[str]:
+        box = {"model": "box", "size": ["4 cm"] * 3, "mass": "100 g", "speed_limit": "5 m/s", "at": place}
+        try:
+            apply_sets((DEPLOY / "table.yaml").read_text(), "table.yaml", [f"objects.a={json.dumps(box)}"])
+        except DeploymentError as error:
+            return [problem.split(": ", 1)[1].split(" (")[0] for problem in error.problems]
+        return []
+
+    assert on_the_table(x="15 cm", z="2 cm") == []
+    assert on_the_table(x="15 cm", y="34 cm", z="2 cm") == ["objects.a.at: a starts 20 mm deep in the table"]
+    assert on_the_table(z="2 cm") == ["objects.a.at: a starts 35 mm deep in ball"]
+    assert on_the_table(x="522 mm", z="8 cm") == ["objects.a.at: a starts 30 mm deep in blue.goal"]
