@@ -102,17 +102,20 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
 
 
-def initial_numbers(spec: WorldSpec, layout: Layout, *, is_watched: bool = False) -> list[float]:
+def initial_numbers(
+    spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None, *, is_watched: bool = False
+) -> list[float]:
     """Return the numbers of a world at tick 0: each entity as its model places it, then what its rules set, then
     those of the world.
 
-    `is_watched`: rules that write to them otherwise than by their views are errors (`watching`).
+    `models` are those of the layout where they are made already. `is_watched`: rules that write to them otherwise than
+    by their views are errors (`watching`). Raises ComponentError.
     """
     numbers = [0.0] * layout.size
     for place in layout.references:
         numbers[place] = NO_ENTITY
     view = WritableView(0, numbers)
-    for index, model in models_of(spec, layout).items():
+    for index, model in (models_of(spec, layout) if models is None else models).items():
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
