@@ -320,7 +320,7 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
 
 def _start_findings(deployment: Deployment) -> Iterable[Finding]:
     """The robots that start in something: those that move by kinematics and are no kit's."""
-    if not any(stands_upright(model) for model in {robot.model for robot in deployment.robots.values()}):
+    if not any(map(stands_upright, deployment.robots.values())):
         return ()
     from foosim.world.clearance.start import start_findings  # brings numpy
 

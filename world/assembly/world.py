@@ -200,6 +200,11 @@ class World:
         self._entity_rules = {index: its for index, its in rules.items() if its}
         if is_watched:
             self._watch()
+        self._derive: Mapping[int, Callable[[WritableView], None]] = {
+            entity.index: self.models[entity.index].derive  # type: ignore[attr-defined]
+            for entity in layout.entities
+            if entity.is_rigid and hasattr(self.models[entity.index], "derive")
+        }
 
     def _watch(self) -> None:
         """Put what compares frames around all forms."""
@@ -316,6 +321,20 @@ class World:
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return Drives(tuple(motors), wrench)
+
+    def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
+        """Let the models of these rigid bodies write what follows from their new state."""
+        if not self._derive:
+            return
+        view = WritableView(tick, numbers)
+        for entity in entities:
+            derive = self._derive.get(entity.index)
+            if derive is None:
+                continue
+            try:
+                derive(view)
+            except BaseException as error:
+                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
 
     def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
         """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""

@@ -114,6 +114,10 @@ def _model(found: Any) -> Iterator[str]:
     yield from _kinds("actuators", found.actuators)
     yield from _kinds("rules", found.rules)
     yield from _names("tags", found.tags)
+    for value, variant in found.variants.items():
+        if variant.module != found.module:
+            yield f"its variant {show(value)} is of another module, {variant.module}"
+        yield from _model(variant)
 
 
 def _world_rule(found: Any) -> Iterator[str]:
