@@ -28,9 +28,7 @@ class Pushing(Yard):
         for _ in range(ticks):
             everybody = self.layout.entities
             solved = tuple(entity.index for entity in everybody)
-            self.stepper.solve(
-                self.engine, Work(self.tick, self.layout, (tuple(everybody),), solved, self.numbers, {})
-            )
+            self.stepper.solve(self.engine, Work(self.tick, self.layout, (tuple(everybody),), solved, self.numbers, {}))
             self.tick += 1
         assert self.stepper.quarantined == []
 
@@ -96,7 +94,9 @@ BLOCK_M: Final = 0.06
 def block(mass: float) -> dict[str, Any]:
     """A low box ahead, which slides and does not tip."""
     size = ["40 cm", "60 cm", f"{BLOCK_M} m"]
-    return {"objects": {"block": {"model": "box", "size": size, "mass": f"{mass} kg", "at": {"x": "60 cm", "z": "3 cm"}}}}
+    return {
+        "objects": {"block": {"model": "box", "size": size, "mass": f"{mass} kg", "at": {"x": "60 cm", "z": "3 cm"}}}
+    }
 
 
 def traction(height: float) -> float:
@@ -171,7 +171,7 @@ def test_it_rests_without_drift(is_driven: bool) -> None:
 
 def one_ahead(one: Pushing) -> float:
     """The share of its way ahead that goes along x of the world."""
-    x, y, z, w = one.vector("bot", "orientation")
+    _, y, z, _ = one.vector("bot", "orientation")
     return 1.0 - 2.0 * (y * y + z * z)
 
 

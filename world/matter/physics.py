@@ -93,9 +93,6 @@ def physics_from(settings: PhysicsSettings | None, surfaces: Mapping[str, Surfac
     felt = PhysicsSettings.model_validate({}) if settings is None else settings
     plain, smooth = SurfaceSettings.model_validate({}), SurfaceSettings.model_validate({"friction": 0})
     known = {name: smooth if name == FRICTIONLESS else plain for name in BASIC} | dict(surfaces)
-    sides = {
-        name: Side(one.restitution, one.friction, one.rolling_friction)
-        for name, one in known.items()
-    }
+    sides = {name: Side(one.restitution, one.friction, one.rolling_friction) for name, one in known.items()}
     nothing = Contact(0.0, 0.0)
     return Physics(felt.gravity, {}, nothing, felt.solver_iterations, felt.contact_erp, sides)
