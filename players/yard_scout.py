@@ -99,8 +99,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
             is_right, what = isinstance(value, int | float) and not isinstance(value, bool), "a number"
         if not is_right:
             raise BadValue(f"parameter {name} is not {what}", value)
-    given: dict[str, Any] = {"scout": "", "partner": "", "goals": (), **parameters}
-    settings = Settings(**{name: tuple(its) if isinstance(its, list) else its for name, its in given.items()})
+    given: dict[str, Any] = {"scout": "", "partner": "", "goals": (), "crates": (), **parameters}
+    lists: dict[str, Any] = {name: tuple(given.pop(name)) for name in ("goals", "crates")}
+    settings = Settings(**given, **lists)
     scouts = sorted(name for name, its in deployment.robots.items() if isinstance(its, DifferentialDriveRobot))
     for name in (settings.scout, settings.partner):
         if name not in scouts:
