@@ -165,6 +165,33 @@ def _solids() -> dict[str, Any]:
     }
 
 
+@cache
+def _drives() -> dict[str, Any]:
+    """Rigid robots on two wheels that push boxes, and one another."""
+    data: dict[str, Any] = json.loads(json.dumps(_solids()))
+    box = {"model": "box", "size": ["30 cm", "30 cm", "20 cm"], "mass": "3 kg", "surface": "frictionless"}
+    scan = {"kind": "laser_scanner", "rate": "10 Hz", "rays": 31, "range": "5 m", "at": {"x": "20 cm", "z": "15 cm"}}
+    rigid = {"model": "differential_drive", "dynamics": "rigid"}
+    robots: dict[str, Any] = {
+        "one": {**rigid, "at": {"x": "-50 cm"}, "bumper": "40 cm", "sensors": {"scan": scan}},
+        "three": {**rigid, "at": {"x": "50 cm", "y": "60 cm", "yaw": "-90 deg"}},
+        "two": {**rigid, "at": {"x": "50 cm", "yaw": "180 deg"}, "mass": "10 kg", "torque": "2 N m"},
+    }
+    robots["two"]["sensors"] = {
+        name: {"kind": name, "rate": "50 Hz"}
+        for name in ("contact", "imu", "joint_state", "odometry", "pose", "velocity")
+    }
+    return data | {
+        "surfaces": {"floor": {"friction": 0.7}},
+        "objects": {
+            "box": {**box, "at": {"y": "5 cm", "z": "10 cm"}},
+            "stack": {**box, "at": {"y": "5 cm", "z": "30 cm"}},
+        },
+        "robots": {name: {"sensors": {}, **robot} for name, robot in robots.items()},
+        "players": driver(tuple(robots), "v_w", (1.0, 2.0), "5 Hz"),
+    }
+
+
 def _pushed() -> World:
     """The same, with forces on the quadrotors."""
     data = json.loads(json.dumps(_solids()))
@@ -210,6 +237,7 @@ HALL: Final = World(_hall())
 EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude": "13.4 deg"}})
 YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
+DRIVES: Final = World(_drives())
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -302,3 +330,8 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("engine", "bullet"): TABLE.with_(("engine",), "bullet", ()),
     ("engine", "pure"): TABLE,
 }
+
+VARIANTS: Final[Mapping[tuple[str, str, str], World]] = {
+    ("model", "differential_drive", "rigid"): World(DRIVES.data, ("robots", "one")),
+}
+"""Worlds of forms with their setting `dynamics`."""
