@@ -159,11 +159,13 @@ def model(name: str, settings: type[EntitySettings], **about: Any) -> Callable[[
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
     `{"rigid": {"made": Rigid, "is_rigid": True, ...}}`.
     """
-    others: Mapping[str, Mapping[str, Any]] = about.pop("variants", {})
+    others: Any = about.pop("variants", {})
 
     def describe(made: Callable[..., Any]) -> Model:
         found = Model(form="model", name=name, made=made, settings=settings, **about)
-        variants = {value: _with_needed(replace(found, **its)) for value, its in others.items()}
+        variants = others
+        if isinstance(others, Mapping) and all(isinstance(its, Mapping) for its in others.values()):
+            variants = {value: _with_needed(replace(found, **its)) for value, its in others.items()}
         return replace(_with_needed(found), variants=variants)
 
     return _registering(describe)
