@@ -175,6 +175,21 @@ def one_ahead(one: Pushing) -> float:
     return 1.0 - 2.0 * (y * y + z * z)
 
 
+def test_a_state_that_is_not_finite_comes_into_quarantine() -> None:
+    """What follows from it is not derived: the tick goes on to the check of all states."""
+    one = yard()
+    one.step()
+    solve = one.engine.solve  # type: ignore[union-attr]
+
+    def failing(*arguments: Any) -> None:
+        solve(*arguments)
+        one.put("bot", "orientation", float("nan"))
+
+    one.engine.solve = failing  # type: ignore[method-assign, union-attr]
+    with pytest.raises(AssertionError, match="bot stands in quarantine from here on: its new orientation is nan"):
+        one.step()
+
+
 def test_it_starts_on_its_wheels() -> None:
     """Within the gap of its casters nothing moves when it is set down."""
     one = yard(at={"z": "0 m", "yaw": "30 deg"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final
 
 from foosim.common.errors import Refused
@@ -323,13 +324,13 @@ class World:
         return Drives(tuple(motors), wrench)
 
     def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
-        """Let the models of these rigid bodies write what follows from their new state."""
+        """Let the models of these rigid bodies write what follows from their new state, where that is finite."""
         if not self._derive:
             return
         view = WritableView(tick, numbers)
         for entity in entities:
             derive = self._derive.get(entity.index)
-            if derive is None:
+            if derive is None or not isfinite(sum(numbers[entity.start : entity.split])):
                 continue
             try:
                 derive(view)

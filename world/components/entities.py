@@ -46,7 +46,7 @@ class Model(Protocol):
     `place_at(view, position, velocity)` sets it there (m, m/s, world frame), for models that can be added;
     `out_of_bounds(numbers)` says what is wrong with a state that no run should come to, empty if nothing is;
     `stir(view)` sets it in motion, for the fixed small run that tells engines apart;
-    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed in a tick.
+    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed, which is finite.
     """
 
     def body(self) -> Body | None:

@@ -7,7 +7,7 @@ from math import sqrt
 from typing import Final
 
 from foosim.common.exact_math import atan2
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import Mounting, Slot, WritableView
 from foosim.world.forms.forms import BODY, JOINTS
 from foosim.world.forms.registry import model
 from foosim.world.moving.upright import Upright
@@ -34,8 +34,9 @@ class RigidDifferentialDrive:
         self._position, self._orientation = at.slot("position").at, at.slot("orientation").at
         self._velocity, self._spin = at.slot("linear_velocity").at, at.slot("angular_velocity").at
         self._joints, self._rates = at.slot("joint_positions").at, at.slot("joint_velocities").at
-        self._heading = at.slot("heading")
-        self._rims, self._travel = at.slot("wheel_speeds"), at.slot("wheel_travel")
+        first = at.slot("heading")
+        self._derived = Slot(first.at, sum(WHEELS.values()), f"{at.robot.name} {', '.join(WHEELS)}", first.is_own)
+        """The fields of `WHEELS`, which follow one another."""
         self._tick_s = at.spec.tick_ns / 1e9
         self._radius, self._speed_max = settings.wheel_radius, settings.speed_limit
         self._way_max, self._reach = settings.speed_limit * self._tick_s * ROUNDING, settings.reach
@@ -62,11 +63,10 @@ class RigidDifferentialDrive:
         """Write the heading, which is where x of the hull is seen from above, and what the wheels do at their rims."""
         numbers, at, radius = view.numbers, self._orientation, self._radius
         x, y, z, w = numbers[at : at + 4]
-        view.write(self._heading, atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        heading = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         left, right = numbers[self._rates : self._rates + 2]
-        view.write(self._rims, left * radius, right * radius)
-        left, right = numbers[self._joints : self._joints + 2]
-        view.write(self._travel, left * radius, right * radius)
+        one, other = numbers[self._joints : self._joints + 2]
+        view.write(self._derived, heading, left * radius, right * radius, one * radius, other * radius)
 
     def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether it is within its reach, and no part of it faster than its speed limit."""
