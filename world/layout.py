@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from typing import Final
+from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Finding, Location
@@ -142,14 +142,15 @@ class Layout:
             start = position
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
-            counts = {**fields, **declared.remembered(kind), **its.solver}
+            counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
             for slot, count in counts.items():
                 offsets[slot] = position
                 position += count
             split = position
             for slot, count in its.owner.items():
-                offsets[slot], counts[slot] = position, count
+                offsets[slot] = position
                 position += count
+            counts.update(its.owner)
             entities.append(Entity(index, name, kind, start, split, position, offsets, counts, fields))
         self.entities: tuple[Entity, ...] = tuple(entities)
         self.size = position
@@ -162,7 +163,7 @@ class Layout:
             [
                 entity.offsets[slot] + place
                 for entity in entities
-                for slot, count in entity.counts.items()
+                for slot, count in _kept(entity.counts).items()
                 if isinstance(count, References)
                 for place in range(count)
             ]
@@ -321,9 +322,9 @@ def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]
     of_world: dict[str, int] = {}
     for label, settings in world_rules(spec).items():
         rule = find_rule(settings)
-        of_world |= {f"{label}.{slot}": count for slot, count in rule.slots.items()}
+        of_world |= _behind(label, rule.slots)
         for model, slots in rule.each.items():
-            each.setdefault(model, {}).update({f"{label}.{slot}": count for slot, count in slots.items()})
+            each.setdefault(model, {}).update(_behind(label, slots))
     return each, of_world
 
 
@@ -331,7 +332,7 @@ def of_motion(model: Model) -> dict[str, int]:
     """Return the slots in which the motion of a model remembers."""
     if not model.motion:
         return {}
-    return {f"{MOTION}.{slot}": count for slot, count in find_motion(model).slots.items()}
+    return _behind(MOTION, find_motion(model).slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -360,7 +361,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
+        slots = _behind(label, find_entity_rule(rule).slots)
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
         component = registry.find_component("sensor", sensor.kind)
@@ -412,7 +413,7 @@ def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
     for label, settings in world_rules(spec).items():
         place: Location = ("rules", label) if label in spec.rules else tuple(_kit_with(spec, label))
         for model, slots in find_rule(settings).each.items():
-            named = {f"{label}.{slot}": count for slot, count in slots.items()}
+            named = _behind(label, slots)
             of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
     seen: set[tuple[int, tuple[tuple[str, int], ...]]] = set()
     for name, robot in spec.robots.items():
@@ -456,7 +457,18 @@ def _slots_of_modifiers(
 
 
 def _slots(name: str, component: Component, settings: ComponentSettings, carrier: Carrier) -> dict[str, int]:
-    return {f"{name}.{field}": size for field, size in component.slots_on(settings, carrier).items()}
+    return _behind(name, component.slots_on(settings, carrier))
+
+
+def _kept(slots: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return slots, whose counts stay the objects that they are: compiled, a count that is taken as an `int` becomes a
+    plain one, which refers to nothing."""
+    return slots
+
+
+def _behind(name: str, slots: Mapping[str, int]) -> dict[str, int]:
+    """Return the slots of a component by their names on an entity."""
+    return {f"{name}.{slot}": count for slot, count in _kept(slots).items()}
 
 
 def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:
