@@ -66,6 +66,7 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._by_island = layout.couples
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
+        self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
         self._waiting = [
@@ -195,7 +196,7 @@ class Stepper:
             return
         world, before = self.world, numbers.copy()
         start = work.start or before
-        rigid = [entity for entity in bodies if entity.index in self._rigid]
+        rigid = bodies if self._all_rigid else [entity for entity in bodies if entity.index in self._rigid]
         if rigid and self._by_island:
             self._solve_islands(cast("IslandEngine", engine), work, start)
         elif rigid:

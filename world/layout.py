@@ -173,6 +173,8 @@ class Layout:
         """Free rigid bodies, in name order."""
         self.couples = any(entity.is_rigid and entity.kind.couples for entity in entities)
         """Whether it has rigid bodies whose islands need a solve of their own."""
+        self.resting = tuple([entity for entity in entities if "slow_ticks" in entity.offsets])
+        """Bodies that may come to rest, in name order."""
         self.shared: dict[int, tuple[WorldSpec, object]] = {}
         """What the forms of this layout share, by the identity of the world, which is kept with it."""
         self._digest = b""
