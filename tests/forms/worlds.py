@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
+from math import inf
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -34,12 +35,16 @@ class Driver:
         assert kind.value is not None
         self._value: type[Struct] = kind.value
         self._robots = parameters["robots"]
+        fields = PayloadCodec(kind.value, kind.name).fields
+        self._is_several = fields[-1].is_several
         bounds = parameters["bounds"]
-        found = [one for one in CommandEncoder(deployment).actuators(self._robots[0]) if one.limits]
-        limits = sorted(found[0].limits.items()) if found else []
-        least = [max(abs(low), abs(high)) for _, (low, high) in limits] * len(bounds)
-        self._bounds = [min(bound, most) for bound, most in zip(bounds, least, strict=False)] if limits else bounds
-        self._is_several = PayloadCodec(kind.value, kind.name).fields[-1].is_several
+        names = [fields[-1].name] * len(bounds) if self._is_several else [field.name for field in fields]
+        encoder = CommandEncoder(deployment)
+        self._bounds: dict[str, list[float]] = {}
+        for robot in self._robots:
+            limits = next((one.limits for one in encoder.actuators(robot) if one.limits), {})
+            most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
+            self._bounds[robot] = list(map(min, bounds, most))
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
@@ -50,7 +55,7 @@ class Driver:
         words = draw_words(draw_key(3, "driver", robot), tick)
         more = draw_words(draw_key(4, "driver", robot), tick)
         shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
-        numbers = [bound * share for bound, share in zip(self._bounds, shares, strict=False)]
+        numbers = [bound * share for bound, share in zip(self._bounds[robot], shares, strict=False)]
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 
 
