@@ -27,6 +27,7 @@ from bench import (
     packets,
     rays,
     realtime,
+    rigid_fleet,
     swarm,
     table_one_process,
     validate,
@@ -90,6 +91,12 @@ BENCHES: Final = (
         "robots that move by kinematics, with their poses, in one process",
         with_default(fleet.fleet),
         fleet.lines,
+    ),
+    Bench(
+        "rigid-fleet",
+        "rigid robots on wheels among boxes at rest, in one process and by one node and two",
+        with_default(rigid_fleet.rigid_fleet),
+        rigid_fleet.lines,
     ),
     Bench(
         "certificates",

@@ -322,12 +322,12 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
 
 def _start_findings(deployment: Deployment) -> Iterator[Finding]:
     """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies."""
-    models = {one.model for one in (*deployment.robots.values(), *deployment.objects.values())}
-    if any(stands_upright(model) for model in models):
+    if any(map(stands_upright, deployment.robots.values())):
         from foosim.world.clearance.start import start_findings  # brings numpy
 
         yield from start_findings(deployment)
-    if any(one.is_rigid and one.couples for one in map(registry.find_model, models)):
+    bodies = *deployment.robots.values(), *deployment.objects.values()
+    if any(one.is_rigid and one.couples for one in map(registry.model_of, bodies)):
         from foosim.world.clearance.overlaps import overlap_findings  # brings numpy
 
         yield from overlap_findings(deployment)

@@ -201,6 +201,7 @@ class Stepper:
             self._solve_islands(cast("IslandEngine", engine), work, start)
         elif rigid:
             self._solve_together(cast("Engine", engine), rigid, work, start)
+        world.derive(rigid, numbers, work.tick)
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick)
         world.apply_entity_rules(bodies, start, numbers, work.tick)

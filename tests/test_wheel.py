@@ -28,6 +28,7 @@ RUNS = {
         *("--set", f"network={{{AIR}}}"),
     ),
     "warehouse": ("warehouse.yaml", "--for", "1s"),
+    "yard": ("yard.yaml", "--for", "1s"),
 }
 pytestmark = pytest.mark.timeout(900)  # the compiler alone takes a minute of a core that others use as well
 

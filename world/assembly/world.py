@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final
 
 from foosim.common.errors import Refused
@@ -266,6 +267,11 @@ class World:
                     self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
+        self._derive: Mapping[int, Callable[[WritableView], None]] = {
+            entity.index: self.models[entity.index].derive  # type: ignore[attr-defined]
+            for entity in layout.entities
+            if entity.is_rigid and hasattr(self.models[entity.index], "derive")
+        }
 
     def _watch(self) -> None:
         """Put what compares frames around all forms."""
@@ -396,6 +402,20 @@ class World:
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return asked
+
+    def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
+        """Let the models of these rigid bodies write what follows from their new state, where that is finite."""
+        if not self._derive:
+            return
+        view = WritableView(tick, numbers)
+        for entity in entities:
+            derive = self._derive.get(entity.index)
+            if derive is None or not isfinite(sum(numbers[entity.start : entity.split])):
+                continue
+            try:
+                derive(view)
+            except BaseException as error:
+                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
 
     def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
         """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""

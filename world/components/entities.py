@@ -45,7 +45,8 @@ class Model(Protocol):
     `check_place(position, velocity)` raises BadValue where a running world cannot have another one, and
     `place_at(view, position, velocity)` sets it there (m, m/s, world frame), for models that can be added;
     `out_of_bounds(numbers)` says what is wrong with a state that no run should come to, empty if nothing is;
-    `stir(view)` sets it in motion, for the fixed small run that tells engines apart.
+    `stir(view)` sets it in motion, for the fixed small run that tells engines apart;
+    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed, which is finite.
     """
 
     def body(self) -> Body | None:

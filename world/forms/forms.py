@@ -197,7 +197,7 @@ class Model(Form):
     that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and sends and
     receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a deployment.
     `units` are those of its fields' numbers, the last one standing for all behind it; fields that every model calls the
-    same need none.
+    same need none. `variants` are what it is instead where its setting `dynamics` has one of these values.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -212,6 +212,11 @@ class Model(Form):
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    variants: Mapping[str, Model] = field(default_factory=dict)
+
+    def variant(self, dynamics: object) -> Model:
+        """Return what entities of it are whose setting `dynamics` has this value."""
+        return self.variants.get(dynamics, self) if isinstance(dynamics, str) else self
 
     @property
     def is_solved(self) -> bool:
