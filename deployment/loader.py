@@ -56,6 +56,7 @@ from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
+from foosim.world.forms.forms import Engine
 from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
@@ -298,9 +299,24 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
         rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
         for part in () if deployment.lacks_files else _state_findings(deployment):
             between = between or first(part)
-        between = between or first(findings_of(deployment), rules, place_findings(deployment))
+        findings = findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment)
+        between = between or first(*findings)
     made = [places.problem(finding, is_made=True) for finding in between]
     return deployment, [*made, *map(places.problem, within)]
+
+
+def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
+    """A rigid body that the engine does not have."""
+    engine = registry.find("engine", deployment.engine)
+    assert isinstance(engine, Engine), engine
+    if engine.islands:
+        return
+    for name, settings in (*deployment.robots.items(), *deployment.objects.items()):
+        model = registry.model_of(settings)
+        if model.is_rigid and model.couples:
+            what = f"the engine has no rigid bodies such as {name}, a {model.name} (bullet has bodies of any kind)"
+            yield Finding(("engine",), what, engine.name)
+            return
 
 
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from foosim.world.layout import Layout
 
 
-@engine("bullet", meshes=True)
+@engine("bullet", meshes=True, islands=True)
 class Bullet:
     """Rigid bodies by the Bullet library, with scenery of any shape."""
 

@@ -103,3 +103,13 @@ def test_objects(settings: dict[str, Any], what: str, tmp_path: Path) -> None:
     box = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"x": "3 m", "z": "10 cm"}, **settings}
     found = said(folder=tmp_path, objects={"a": box})
     assert found.partition(": ")[2].startswith(what), found
+
+
+def test_an_engine_that_does_not_have_such_bodies(tmp_path: Path) -> None:
+    box = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"x": "2 m", "z": "10 cm"}}
+    text = yard_text({"base": {"model": "differential_drive"}}, engine="pure", objects={"crate": box})
+    with pytest.raises(Refused) as refused:
+        pin_assets(text, "yard.yaml", tmp_path)
+    what = "engine: the engine has no rigid bodies such as crate, a box (bullet has bodies of any kind), 'pure'"
+    assert str(refused.value).endswith(what)
+    pin_assets(text.replace("engine: pure", "engine: bullet"), "yard.yaml", tmp_path)

@@ -301,9 +301,14 @@ class EntityRule(Form):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Engine(Form):
-    """What computes rigid bodies. `meshes` says that it has scenery of triangles."""
+    """What computes rigid bodies.
+
+    `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
+    after the other (`node.physics.interface.IslandEngine`).
+    """
 
     meshes: bool = False
+    islands: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

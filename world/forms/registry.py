@@ -202,11 +202,10 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Cal
     return _registering(lambda made: Scene(form="scene", name=name, made=made, settings=settings, kit=kit))
 
 
-def engine(name: str, *, meshes: bool) -> Callable[[Made], Made]:
+def engine(name: str, *, meshes: bool, islands: bool = False) -> Callable[[Made], Made]:
     """Register an engine: a class with the methods of `node.physics.interface.EngineKind`."""
-    return _registering(
-        lambda made: Engine(form="engine", name=name, made=made, settings=ComponentSettings, meshes=meshes)
-    )
+    about = {"meshes": meshes, "islands": islands}
+    return _registering(lambda made: Engine(form="engine", name=name, made=made, settings=ComponentSettings, **about))
 
 
 def kit(name: str, settings: type[SpecBase], **about: Any) -> Callable[[Made], Made]:
