@@ -204,8 +204,11 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Cal
 
 def engine(name: str, *, meshes: bool, islands: bool = False) -> Callable[[Made], Made]:
     """Register an engine: a class with the methods of `node.physics.interface.EngineKind`."""
-    about = {"meshes": meshes, "islands": islands}
-    return _registering(lambda made: Engine(form="engine", name=name, made=made, settings=ComponentSettings, **about))
+    return _registering(
+        lambda made: Engine(
+            form="engine", name=name, made=made, settings=ComponentSettings, meshes=meshes, islands=islands
+        )
+    )
 
 
 def kit(name: str, settings: type[SpecBase], **about: Any) -> Callable[[Made], Made]:
