@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from mypy_extensions import mypyc_attr
@@ -68,7 +68,11 @@ class NodeStatistics:
     held: int
 
 
-@dataclass(frozen=True)
+Groups: TypeAlias = tuple[tuple[Entity, ...], ...]
+"""Entities that a node solves together, or that are in the way of such."""
+
+
+@dataclass
 class _Term:
     """The state that changes with an epoch or a layout: solvers and writers."""
 
@@ -76,6 +80,19 @@ class _Term:
     slots: Slots
     assignment: Assignment
     mine: tuple[Entity, ...]
+    _share: Share | None = None
+    _members: tuple[Groups, Groups] = ((), ())
+
+    def members(self, share: Share) -> tuple[Groups, Groups]:
+        """Return the entities of a share's islands, and those in the way of each; a share is often that of before."""
+        if share is not self._share:
+            entities = self.assignment.layout.entities
+            islands, movers = (
+                tuple([tuple([entities[index] for index in group]) for group in groups])
+                for groups in (share.islands, share.movers)
+            )
+            self._share, self._members = share, (islands, movers)
+        return self._members
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -326,9 +343,7 @@ class NodeCore:
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
-        entities = layout.entities
-        islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
-        movers = tuple(tuple(entities[index] for index in near) for near in share.movers)
+        islands, movers = term.members(share)
         self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers)
         return True
 

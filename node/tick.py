@@ -66,6 +66,10 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._by_island = layout.couples
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
+        self._islands: tuple[tuple[Entity, ...], ...] | None = None
+        self._bodies: list[Entity] = []
+        self._quarantined: list[int] = []
+        """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
@@ -186,8 +190,12 @@ class Stepper:
     def solve(self, engine: AnyEngine, work: Work) -> None:
         """Load, command, step, read: write the next state of every body of `work` into its numbers."""
         numbers = work.numbers
-        bodies = [entity for island in work.islands for entity in island]
-        if any(numbers[entity.offsets["quarantined"]] != 0.0 for entity in bodies):
+        if work.islands is not self._islands:
+            self._islands = work.islands
+            self._bodies = [entity for island in work.islands for entity in island]
+            self._quarantined = [entity.offsets["quarantined"] for entity in self._bodies]
+        bodies = self._bodies
+        if any(map(numbers.__getitem__, self._quarantined)):
             for entity in bodies:
                 if numbers[entity.offsets["quarantined"]] != 0.0:
                     _clear_results(entity, numbers)
