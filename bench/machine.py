@@ -84,6 +84,15 @@ def use_of(pid: int) -> Use | None:
     return Use((int(fields[11]) + int(fields[12])) / TICKS_PER_S, pages * PAGE_BYTES / 1e6)
 
 
+def pss_mb(pid: int) -> float:
+    """Return the memory of a process; what it shares with others counts in part."""
+    try:
+        lines = (PROC / str(pid) / "smaps_rollup").read_text().splitlines()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) * 1024 / 1e6
+
+
 def free_ports() -> int:
     """Return a port that was free a moment ago, as the one above it: both planes of a run."""
     while True:
