@@ -20,6 +20,8 @@ from itertools import pairwise
 from math import fsum, sqrt
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
@@ -68,7 +70,13 @@ MESH_PIECE: Final = 4096
 PARKING_Z_M: Final = 1000.0
 PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
+RESIDUAL: Final = 1e-12
+"""The solver stops before its last iteration when one changes no speed by more than 1 um/s (or urad/s): this is its square."""
+EVERYWHERE: Final = (-1, -1, -2, -2)
+"""The contacts of any two bodies and links."""
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
+NOBODY: Final = (NO_ENTITY,) * PARTNERS_MAX
+NO_IMPULSES: Final = (0.0,) * PARTNERS_MAX
 
 Composition = tuple[tuple[int, ...], tuple[int, ...]]
 """The kinds of an island's bodies, in name order, and those of the movers in their way."""
@@ -90,6 +98,32 @@ class _Made:
     end: int | None
     shaped: tuple[int, ...]
     parking: Vector
+
+
+class _Touch:
+    """The contacts of two bodies within a tick: their normal forces (N), and a bit for each substep with one."""
+
+    __slots__ = ("forces", "substeps")
+
+    def __init__(self) -> None:
+        self.forces: list[float] = []
+        self.substeps = 0
+
+
+class _Slots:
+    """Where the numbers of an entity are in a frame; -1 for those that it does not have."""
+
+    def __init__(self, entity: Entity) -> None:
+        self.position, self.orientation = _at(entity, "position"), _at(entity, "orientation")
+        self.velocity, self.spin = _at(entity, "linear_velocity"), _at(entity, "angular_velocity")
+        self.joint_positions, self.joint_velocities = _at(entity, "joint_positions"), _at(entity, "joint_velocities")
+        self.joint_efforts = _at(entity, "joint_efforts")
+        self.contacts = _at(entity, "contacts")
+        self.partners, self.partner_impulses = _at(entity, "partners"), _at(entity, "partner_impulses")
+
+
+def _at(entity: Entity, field: str) -> int:
+    return entity.offsets.get(field, -1)
 
 
 class BulletIslands:
@@ -246,6 +280,7 @@ def _inertia_about(link: Link, axis: Vector, centre: Vector, joint: str) -> floa
     return about_centre + link.mass * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)  # tests break its rules
 class CompositionEngine:
     """A physics client with scenery and the bodies of one composition, all of them parked between two loads."""
 
@@ -274,14 +309,18 @@ class CompositionEngine:
         self._count = len(bodies)
         self._place = {made.id: place for place, made in enumerate(self._made)}
         """Of the bodies by their ids: the place in the island, movers behind."""
-        self._touching: set[int] = set()
-        self._impulses: dict[int, dict[int, list[float]]] = {}
-        self._logs: dict[int, tuple[float, float, float]] = {}
+        self._known_slots: dict[int, _Slots] = {}
+        """By the index of the entity."""
+        self._slots: list[_Slots] = []
+        """Of the bodies of the island that was loaded last."""
+        self._touches: dict[tuple[int, int], _Touch] = {}
+        """Of the tick, by the ids of both bodies."""
         for made in self._made:
             self._park(made)
 
     def _settings(self) -> dict[str, Any]:
-        return settings_of(self._physics, self._dt)
+        """Return the parameters of the world. A solve has one island, so that it may stop on what is left of that."""
+        return {**settings_of(self._physics, self._dt), "solverResidualThreshold": RESIDUAL}
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -386,40 +425,42 @@ class CompositionEngine:
         of contacts, which is solved in its order. To set a filter makes another box for a link in the broad phase, and
         ends its pairs at once.
         """
-        client = self._client
+        client, renew = self._client, p.setCollisionFilterGroupMask
         for made in self._made:
             self._park(made)
         for made in self._made:
             for index in made.shaped:
-                p.setCollisionFilterGroupMask(made.id, index, BODIES, BODIES | SCENERY, physicsClientId=client)
-        p.performCollisionDetection(physicsClientId=client)
+                renew(made.id, index, BODIES, BODIES | SCENERY, client)
+        p.performCollisionDetection(client)
 
     def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
         """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
         self._wipe()
-        client, reset = self._client, p.resetJointState
-        last = self._substeps - 1.0
-        self._touching = set()
-        for place, (entity, made, body) in enumerate(
-            zip(island.bodies, self._made, bodies[: self._count], strict=False)
-        ):
-            offsets = entity.offsets
+        client, place = self._client, p.resetBasePositionAndOrientation
+        self._slots = [self._slots_of(entity) for entity in island.bodies]
+        for index, slots in enumerate(self._slots):
+            made = self._made[index]
             if made.joints:  # before the base: a link's box in the broad phase is that of the last long way
-                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
-                for number, joint in enumerate(made.joints):
-                    reset(made.id, joint, numbers[at + number], numbers[speed + number], client)
+                at, speed, count = slots.joint_positions, slots.joint_velocities, len(made.joints)
+                positions = [(value,) for value in numbers[at : at + count]]
+                speeds = [(value,) for value in numbers[speed : speed + count]]
+                p.resetJointStatesMultiDof(made.id, made.joints, positions, speeds, client)
             if made.is_free:
-                at, turned = offsets["position"], offsets["orientation"]
-                speed, spin = offsets["linear_velocity"], offsets["angular_velocity"]
-                p.resetBasePositionAndOrientation(made.id, numbers[at : at + 3], numbers[turned : turned + 4], client)
+                at, turned, speed, spin = slots.position, slots.orientation, slots.velocity, slots.spin
+                place(made.id, numbers[at : at + 3], numbers[turned : turned + 4], client)
                 p.resetBaseVelocity(made.id, numbers[speed : speed + 3], numbers[spin : spin + 3], client)
             else:
-                p.resetBasePositionAndOrientation(made.id, body.position, body.orientation, client)
-            if numbers[offsets["contacts"] + 2] == last:
-                self._touching.add(place)
-        for entity, made, body in zip(island.movers, self._made[self._count :], bodies[self._count :], strict=True):
-            self._load_mover(entity, made, body, start)
+                place(made.id, bodies[index].position, bodies[index].orientation, client)
+        for number, mover in enumerate(island.movers, self._count):
+            self._load_mover(mover, self._made[number], bodies[number], start)
         self._command(island)
+
+    def _slots_of(self, entity: Entity) -> _Slots:
+        """Return where the numbers of an entity are; all entities that an engine meets are of one layout."""
+        slots = self._known_slots.get(entity.index)
+        if slots is None:
+            slots = self._known_slots[entity.index] = _Slots(entity)
+        return slots
 
     def _load_mover(self, entity: Entity, made: _Made, body: Body, start: Sequence[float]) -> None:
         at, turned = entity.offsets["position"], entity.offsets["orientation"]
@@ -429,19 +470,13 @@ class CompositionEngine:
 
     def _command(self, island: Island) -> None:
         """Set the motors of joints: speeds, and the greatest forces with which they are reached."""
+        client, mode, drive = self._client, p.VELOCITY_CONTROL, p.setJointMotorControlArray
         for made, drives in zip(self._made, island.drives, strict=False):
             if made.joints:
                 motors = drives.motors
                 speeds = [motor.speed for motor in motors] if motors else made.zeros
                 forces = [motor.force for motor in motors] if motors else made.zeros
-                p.setJointMotorControlArray(
-                    made.id,
-                    made.joints,
-                    p.VELOCITY_CONTROL,
-                    targetVelocities=speeds,
-                    forces=forces,
-                    physicsClientId=self._client,
-                )
+                drive(made.id, made.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
 
     def _push(self, island: Island) -> None:
         """Apply the forces on bases, which Bullet forgets after each substep."""
@@ -452,73 +487,94 @@ class CompositionEngine:
                 p.applyExternalTorque(made.id, -1, torque, p.LINK_FRAME, physicsClientId=self._client)
 
     def step(self, island: Island) -> None:
-        """Advance by the substeps of a tick and log the contacts."""
-        self._impulses, self._logs = {}, {}
+        """Advance by the substeps of a tick and note what touches."""
+        touches: dict[tuple[int, int], _Touch] = {}
+        self._touches = touches
         pushed = any(drives.wrench is not None for drives in island.drives)
+        client, step, contacts = self._client, p.stepSimulation, p.getContactPoints
         for substep in range(self._substeps):
             if pushed:
                 self._push(island)
-            p.stepSimulation(self._client)
-            self._log_contacts(substep)
-
-    def _log_contacts(self, substep: int) -> None:
-        """Count touches that begin, add up impulses by partner, note the last substep.
-
-        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
-        """
-        touched: set[int] = set()
-        places, dt, silent = self._place, self._dt, self._silent
-        for point in p.getContactPoints(physicsClientId=self._client):
-            force = point[9]
-            if force <= 0.0 or point[1] in silent or point[2] in silent:
-                continue
-            one, other = places.get(point[1], -1), places.get(point[2], -1)
-            for place, partner in ((one, other), (other, one)):
-                if 0 <= place < self._count:
-                    touched.add(place)
-                    self._impulses.setdefault(place, {}).setdefault(partner, []).append(force * dt)
-        for place in touched:
-            count, _, _ = self._logs.get(place, NO_CONTACT)
-            self._logs[place] = (count + (place not in self._touching), 0.0, float(substep))
-        self._touching = touched
+            step(client)
+            for point in contacts(*EVERYWHERE, client):
+                force = point[9]
+                if force > 0.0:
+                    pair = point[1:3]
+                    touch = touches.get(pair)
+                    if touch is None:
+                        touches[pair] = touch = _Touch()
+                    touch.forces.append(force)
+                    touch.substeps |= 1 << substep
 
     def read(self, island: Island, numbers: list[float]) -> None:
         """Write the state of the island's bodies, and what they touched, into the numbers."""
-        client = self._client
-        everybody = (*island.bodies, *island.movers)
-        for place, (entity, made) in enumerate(zip(island.bodies, self._made, strict=False)):
-            offsets = entity.offsets
+        client, met = self._client, self._met()
+        for place, slots in enumerate(self._slots):
+            made = self._made[place]
             if made.is_free:
-                position, orientation = p.getBasePositionAndOrientation(made.id, client)
-                velocity, spin = p.getBaseVelocity(made.id, client)
-                at, turned = offsets["position"], offsets["orientation"]
-                numbers[at : at + 3], numbers[turned : turned + 4] = position, orientation
-                at, turned = offsets["linear_velocity"], offsets["angular_velocity"]
-                numbers[at : at + 3], numbers[turned : turned + 3] = velocity, spin
+                at, turned, speed, spin = slots.position, slots.orientation, slots.velocity, slots.spin
+                numbers[at : at + 3], numbers[turned : turned + 4] = p.getBasePositionAndOrientation(made.id, client)
+                numbers[speed : speed + 3], numbers[spin : spin + 3] = p.getBaseVelocity(made.id, client)
             if made.joints:
-                self._read_joints(made, entity, numbers, island.drives[place].motors)
-            self._read_log(place, entity, everybody, numbers)
+                self._read_joints(made, slots, numbers, island.drives[place].motors)
+            self._read_log(place, slots, island, met.get(place, ()), numbers)
 
-    def _read_joints(self, made: _Made, entity: Entity, numbers: list[float], motors: Sequence[Motor]) -> None:
+    def _read_joints(self, made: _Made, slots: _Slots, numbers: list[float], motors: Sequence[Motor]) -> None:
         states = p.getJointStates(made.id, made.joints, self._client)
-        offsets = entity.offsets
-        at, speed, effort = offsets["joint_positions"], offsets["joint_velocities"], offsets["joint_efforts"]
+        at, speed, effort = slots.joint_positions, slots.joint_velocities, slots.joint_efforts
         for number, (position, velocity, _, applied) in enumerate(states):
             numbers[at + number], numbers[speed + number] = position, velocity
             # Without a force Bullet keeps what a motor applied last.
             numbers[effort + number] = applied if motors and motors[number].force > 0.0 else 0.0
 
-    def _read_log(self, place: int, entity: Entity, everybody: Sequence[Entity], numbers: list[float]) -> None:
-        at = entity.offsets["contacts"]
-        count, _, last = self._logs.get(place, NO_CONTACT)
-        by_partner = {partner: fsum(parts) for partner, parts in self._impulses.get(place, {}).items()}
-        numbers[at : at + 3] = count, fsum(by_partner.values()), last
-        if "partners" not in entity.offsets:
+    def _met(self) -> dict[int, list[tuple[int, _Touch]]]:
+        """Return what each body touched in the tick, by its place: the partner's place, -1 for scenery, and how."""
+        found: dict[int, list[tuple[int, _Touch]]] = {}
+        silent, places, count = self._silent, self._place, self._count
+        for (one_id, other_id), touch in self._touches.items():
+            if one_id in silent or other_id in silent:
+                continue
+            one, other = places.get(one_id, -1), places.get(other_id, -1)
+            if 0 <= one < count:
+                found.setdefault(one, []).append((other, touch))
+            if 0 <= other < count:
+                found.setdefault(other, []).append((one, touch))
+        return found
+
+    def _read_log(
+        self, place: int, slots: _Slots, island: Island, met: Sequence[tuple[int, _Touch]], numbers: list[float]
+    ) -> None:
+        """Write what a body touched: how many touches began, the impulse (N s), and the last substep with a contact.
+
+        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
+        """
+        at, dt = slots.contacts, self._dt
+        by_partner: dict[int, float] = {}
+        if not met:
+            numbers[at : at + 3] = NO_CONTACT
+        else:
+            substeps = 0
+            parts: dict[int, list[float]] = {}
+            for partner, touch in met:
+                substeps |= touch.substeps
+                parts.setdefault(partner, []).extend([force * dt for force in touch.forces])
+            by_partner = {partner: fsum(impulses) for partner, impulses in parts.items()}
+            before = substeps << 1 | (numbers[at + 2] == self._substeps - 1.0)
+            began = (substeps & ~before).bit_count()
+            numbers[at : at + 3] = float(began), fsum(by_partner.values()), substeps.bit_length() - 1.0
+        if slots.partners >= 0:
+            self._read_partners(slots, island, by_partner, numbers)
+
+    def _read_partners(self, slots: _Slots, island: Island, by_partner: dict[int, float], numbers: list[float]) -> None:
+        """Write the partners with the greatest impulses, by their indices."""
+        met = sorted([(-impulse, partner) for partner, impulse in by_partner.items() if partner >= 0])[:PARTNERS_MAX]
+        at, impulses = slots.partners, slots.partner_impulses
+        if not met:
+            numbers[at : at + PARTNERS_MAX], numbers[impulses : impulses + PARTNERS_MAX] = NOBODY, NO_IMPULSES
             return
-        met = sorted((-impulse, partner) for partner, impulse in by_partner.items() if partner >= 0)[:PARTNERS_MAX]
-        found = sorted((float(everybody[partner].index), -impulse) for impulse, partner in met)
+        everybody = (*island.bodies, *island.movers)
+        found = sorted([(float(everybody[partner].index), -impulse) for impulse, partner in met])
         missing = PARTNERS_MAX - len(found)
-        at, impulses = entity.offsets["partners"], entity.offsets["partner_impulses"]
         numbers[at : at + PARTNERS_MAX] = [index for index, _ in found] + [NO_ENTITY] * missing
         numbers[impulses : impulses + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing
 
