@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import yaml
 
-from bench.bare_tick import bare_tick_us
+from bench.bare_tick import BareTable
 from bench.machine import pss_mb
 from bench.runs import ROOT
 from foosim.deployment.assets import pin_assets
@@ -40,8 +40,10 @@ ROBOTS: Final = 50
 SETTLED_TICKS: Final = 120
 """Boxes that are put down are at rest after half a second."""
 TICKS_PER_S: Final = 100
-BLOCKS: Final = 10
-TO_REACH: Final = {"wakes": 0.4, "rest": 0.1, "arm": 1.8, "robots": 60.0}
+TICKS_OF_A_BLOCK: Final = 20
+BARE_TICKS: Final = 50
+"""Of each block, for b."""
+TO_REACH: Final = {"wakes": 0.4, "rest": 2.0, "arm": 1.8, "robots": 60.0}
 MEMORY_MB: Final = 300.0
 
 
@@ -97,7 +99,7 @@ class Ticks:
         for _ in range(ticks):
             if before is not None:
                 before(self.tick)
-            begun_ns = time.perf_counter_ns()
+            begun_ns = time.process_time_ns()
             numbers = self.numbers.copy()
             share = self._assignment.shares(numbers)[NODE]
             entities = self._layout.entities
@@ -106,7 +108,7 @@ class Ticks:
             work = Work(self.tick, self._layout, islands, share.solved, numbers, {}, self.numbers, movers)
             self._stepper.solve(self._engine, work)
             self.numbers = work.numbers
-            spent_ns += time.perf_counter_ns() - begun_ns
+            spent_ns += time.process_time_ns() - begun_ns
             self.tick += 1
         assert not self._stepper.quarantined, self._stepper.quarantined
         return spent_ns / 1e3 / ticks
@@ -141,41 +143,53 @@ def boxes(count: int, x: float = 0.0) -> dict[str, Any]:
     return {"box": {**box, "at": {"x": f"{x} m", "z": "10 cm"}, "count": count, "spacing": {"y": "1 m"}}}
 
 
-def _medians(runs: Sequence[Callable[[], float]]) -> tuple[list[float], float]:
-    """Return the median of each of some measurements taken by turns, and b of the same minutes."""
-    found: list[list[float]] = [[] for _ in runs]
-    bare = []
-    for _ in range(BLOCKS):
-        bare.append(bare_tick_us())
-        for number, run in enumerate(runs):
-            found[number].append(run())
-    return [median(times) for times in found], median(bare)
+def _ratios(ways: Sequence[Callable[[], float]], blocks: int) -> tuple[list[float], list[float], float]:
+    """Measure some things by turns with b; return the medians of their times (us), of their ratios to b, and b (us).
+
+    Times are of the processor: other processes take less part in them.
+    """
+    bare, table = [], BareTable()
+    found: list[list[float]] = [[] for _ in ways]
+    table.run(BARE_TICKS)
+    for _ in range(blocks):
+        begun_ns = time.process_time_ns()
+        table.run(BARE_TICKS)
+        bare.append((time.process_time_ns() - begun_ns) / 1e3 / BARE_TICKS)
+        for number, way in enumerate(ways):
+            found[number].append(way())
+    table.close()
+    ratios = [median([us / b for us, b in zip(times, bare, strict=True)]) for times in found]
+    return [median(times) for times in found], ratios, median(bare)
 
 
-def _of_boxes(ticks: int) -> list[Cost]:
+def _of_boxes(blocks: int) -> list[Cost]:
     """What boxes cost that wake, and that are at rest."""
     world = Ticks(text_of(boxes(BOXES)))
-    slow = [world.slots(f"box-{number}", "slow_ticks").start for number in range(1, WAKE + 1)]
+    slow = [world.slots(f"box-{number}", "slow_ticks").start for number in range(1, BOXES + 1)]
     world.run(SETTLED_TICKS)
+    settled = world.numbers.copy()
 
     def wake(tick: int) -> None:
-        for at in slow:
+        for at in slow[:WAKE]:
             world.numbers[at] = 0.0
 
     def at_rest() -> float:
-        world.run(SETTLED_TICKS)
-        return world.run(ticks)
+        world.numbers = settled.copy()
+        return world.run(TICKS_OF_A_BLOCK)
 
-    (awake, rest), b = _medians([lambda: world.run(ticks, wake), at_rest])
+    def more() -> float:
+        rest = at_rest()
+        return (world.run(TICKS_OF_A_BLOCK, wake) - rest) / WAKE
+
+    (each, rest), (each_b, rest_b), b = _ratios([more, at_rest], blocks)
     world.close()
-    each = (awake - rest) / WAKE
     return [
-        Cost("wakes", "each box that wakes", each, each / b, b),
-        Cost("rest", "each box at rest", rest / BOXES, rest / BOXES / b, b),
+        Cost("wakes", "each box that wakes", each, each_b, b),
+        Cost("rest", f"{BOXES} boxes at rest", rest, rest_b, b),
     ]
 
 
-def _of_arm(ticks: int) -> list[Cost]:
+def _of_arm(blocks: int) -> list[Cost]:
     """What an arm costs that swings above two boxes in its reach."""
     robot = {"model": "urdf", "file": "arm.urdf", "fixed": True, "actuators": {"joints": {"kind": "joint_position"}}}
     world = Ticks(text_of(boxes(2, x=0.5), {"arm": robot}))
@@ -186,13 +200,13 @@ def _of_arm(ticks: int) -> list[Cost]:
         world.numbers[wanted] = [0.5 * sin(0.05 * tick + joint) for joint in range(count)]
 
     world.run(SETTLED_TICKS, swing)
-    (us,), b = _medians([lambda: world.run(ticks, swing)])
+    (us,), (ratio,), b = _ratios([lambda: world.run(TICKS_OF_A_BLOCK, swing)], blocks)
     world.close()
-    return [Cost("arm", "an arm of seven joints with two boxes", us, us / b, b)]
+    return [Cost("arm", "an arm of seven joints with two boxes", us, ratio, b)]
 
 
-def _of_robots(ticks: int) -> list[Cost]:
-    """What fifty robots that are rigid bodies cost among boxes at rest: they fly above, each by itself."""
+def _of_robots(blocks: int) -> list[Cost]:
+    """What fifty robots that are rigid bodies cost among boxes at rest: they fly beside these, each by itself."""
     robots = {
         f"r{number:02}": {
             "model": "quadrotor",
@@ -216,9 +230,9 @@ def _of_robots(ticks: int) -> list[Cost]:
             world.numbers[at] = [500.0] * (at.stop - at.start)
 
     world.run(SETTLED_TICKS, hold)
-    (us,), b = _medians([lambda: world.run(ticks, hold)])
+    (us,), (ratio,), b = _ratios([lambda: world.run(TICKS_OF_A_BLOCK, hold)], blocks)
     world.close()
-    return [Cost("robots", f"{ROBOTS} rigid robots among {BOXES} boxes at rest", us, us / b, b)]
+    return [Cost("robots", f"{ROBOTS} rigid robots among {BOXES} boxes at rest", us, ratio, b)]
 
 
 def various(kinds: int) -> str:
@@ -247,10 +261,10 @@ def hold_engines(count: int) -> None:
     world.close()
 
 
-def islands(seconds: float = 0.5) -> list[Cost | Memory]:
-    """Measure all; `seconds` is the simulated time of each block."""
-    ticks = max(10, round(seconds * TICKS_PER_S))
-    return [*_of_boxes(ticks), *_of_arm(ticks), *_of_robots(ticks), engines_memory()]
+def islands(seconds: float = 10.0) -> list[Cost | Memory]:
+    """Measure all; `seconds` is the simulated time of each."""
+    blocks = max(3, round(seconds * TICKS_PER_S / TICKS_OF_A_BLOCK))
+    return [*_of_boxes(blocks), *_of_arm(blocks), *_of_robots(blocks), engines_memory()]
 
 
 def lines(rows: Sequence[Cost | Memory]) -> list[str]:
