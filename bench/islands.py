@@ -28,9 +28,9 @@ from foosim.deployment.loader import load_deployment
 from foosim.node.physics.bullet_islands import ENGINES_MAX
 from foosim.node.physics.making import build_in_steps, prepare_spares
 from foosim.node.tick import Stepper, Work
-from foosim.world.assembly.islands import Assignment, reach_of
+from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.layout import build_layout
+from foosim.world.layout import Entity, build_layout
 
 NAME: Final = "islands.yaml"
 NODE: Final = "n"
@@ -86,6 +86,9 @@ class Ticks:
         self._assignment = Assignment(layout, reach_of(deployment, layout), (NODE,), owners)
         self.numbers = initial_numbers(deployment, layout)
         self.tick = 0
+        self._share: Share | None = None
+        self._islands: tuple[tuple[Entity, ...], ...] = ()
+        self._movers: tuple[tuple[Entity, ...], ...] = ()
 
     def slots(self, name: str, field: str) -> slice:
         """Return where a field of an entity is in the numbers."""
@@ -102,10 +105,12 @@ class Ticks:
             begun_ns = time.process_time_ns()
             numbers = self.numbers.copy()
             share = self._assignment.shares(numbers)[NODE]
-            entities = self._layout.entities
-            islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
-            movers = tuple(tuple(entities[index] for index in near) for near in share.movers)
-            work = Work(self.tick, self._layout, islands, share.solved, numbers, {}, self.numbers, movers)
+            if share is not self._share:
+                entities = self._layout.entities
+                self._share = share
+                self._islands = tuple([tuple([entities[index] for index in island]) for island in share.islands])
+                self._movers = tuple([tuple([entities[index] for index in near]) for near in share.movers])
+            work = Work(self.tick, self._layout, self._islands, share.solved, numbers, {}, self.numbers, self._movers)
             self._stepper.solve(self._engine, work)
             self.numbers = work.numbers
             spent_ns += time.process_time_ns() - begun_ns

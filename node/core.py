@@ -119,6 +119,10 @@ class NodeCore:
         self._remembered: dict[int, float] = {}
         """What the sensors of this node remember of the present frame: numbers of the next one, by place."""
         self._barrier: Barrier | None = None
+        self._share: Share | None = None
+        self._islands: tuple[tuple[Entity, ...], ...] = ()
+        self._movers: tuple[tuple[Entity, ...], ...] = ()
+        """The share of the last tick, its islands, and the movers in the way of each."""
         self._input_digest = b""
         self._sensed = False
         self._patience = Patience(now_ns)
@@ -332,10 +336,12 @@ class NodeCore:
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
-        entities = layout.entities
-        islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
-        movers = tuple(tuple(entities[index] for index in near) for near in share.movers)
-        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers)
+        if share is not self._share:  # shares are kept: one that is the same has the same islands
+            entities = layout.entities
+            self._share = share
+            self._islands = tuple([tuple([entities[index] for index in island]) for island in share.islands])
+            self._movers = tuple([tuple([entities[index] for index in near]) for near in share.movers])
+        self.work = Work(frame.tick, layout, self._islands, share.solved, numbers, outboxes, start, self._movers)
         return True
 
     def _collect(self, now_ns: int) -> bool:

@@ -71,7 +71,7 @@ PARKING_Z_M: Final = 1000.0
 PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
 RESIDUAL: Final = 1e-12
-"""The solver stops before its last iteration when one changes no speed by more than 1 um/s (or urad/s): this is its square."""
+"""The solver stops when an iteration changes no speed by more than 1 um/s or 1 urad/s: this is the square of it."""
 EVERYWHERE: Final = (-1, -1, -2, -2)
 """The contacts of any two bodies and links."""
 NO_CONTACT: Final = (0.0, 0.0, -1.0)

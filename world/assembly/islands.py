@@ -168,6 +168,8 @@ class Assignment:
         self.roster = tuple(roster)
         self.owners = dict(owners)
         self._shares: dict[Touching, dict[str, Share]] = {}
+        self._divided: tuple[list[BodyIsland], dict[str, Share]] = [], {}
+        """The islands of any bodies that were divided last, and their shares."""
 
     def solver_of(self, island: Island) -> str:
         """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
@@ -176,7 +178,10 @@ class Assignment:
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers."""
         if isinstance(self.reach, Volumes):
-            return self._divide_any(self.reach.islands(numbers))
+            islands = self.reach.islands(numbers)
+            if not self._divided[1] or islands is not self._divided[0]:
+                self._divided = islands, self._divide_any(islands)
+            return self._divided[1]
         touching = touching_of(numbers, self.reach)
         if len(self.reach.balls) > 1:
             return self._divide(islands_of(numbers, self.reach, touching))

@@ -38,11 +38,12 @@ class Rest:
         self, bodies: Sequence[Entity], movers: Sequence[Entity], numbers: Sequence[float], start: Sequence[float]
     ) -> bool:
         """Whether an island is copied unless it is driven: `start` are the numbers at the start of the tick."""
+        slots, ticks = self._slots, self.ticks
         for entity in bodies:
-            at = self._slots.get(entity.index)
-            if at is None or numbers[at] < self.ticks:
+            at = slots.get(entity.index)
+            if at is None or numbers[at] < ticks:
                 return False
-        return not any(_moves(mover, start) for mover in movers)
+        return not movers or not any(_moves(mover, start) for mover in movers)
 
     def keep(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
         """Leave bodies at rest as they are; what they touch they have touched before."""

@@ -9,7 +9,7 @@ go on by a motion) are in no island: each island has those in whose way it is. E
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from typing import Final, TypeAlias
 
@@ -27,6 +27,20 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+
+X, Y, Z, W = range(4)
+ROTATION: Final = np.array(
+    [
+        [Y, X, X, X, X, Y, X, Y, X],
+        [Y, Y, Z, Y, X, Z, Z, Z, X],
+        [Z, Z, Y, Z, Z, X, Y, X, Y],
+        [Z, W, W, W, Z, W, W, W, Y],
+    ]
+)
+"""Of each element of a rotation matrix the parts of the quaternion in its two products: x y - z w, and so on."""
+SIGNS: Final = np.array([1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
+TWICE: Final = np.array([-2.0, 2.0, 2.0, 2.0, -2.0, 2.0, 2.0, 2.0, -2.0])
+UNIT: Final = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,30 +75,52 @@ class Volumes:
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
         self._free = np.array([row for row, _, _ in free], np.intp)
-        self._positions = np.array([entity.offsets["position"] for _, entity, _ in free], np.intp)
-        self._orientations = np.array([entity.offsets["orientation"] for _, entity, _ in free], np.intp)
+        self._poses = np.array([_pose_places(entity) for _, entity, _ in free], np.intp).reshape(-1, 7)
+        """Places of the position and of the quaternion's parts of each free body."""
         self._position_of = {entity.index: entity.offsets["position"] for _, entity, _ in free}
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
-        self._middles = np.array(middles).reshape(-1, 3)
-        self._halves = np.array(halves).reshape(-1, 3)
-        self._grown = np.array([body.speed_limit * tick_s + MARGIN_M for _, _, body in free])
+        self._middles = np.array(middles).reshape(-1, 1, 3)
+        self._halves = np.array(halves).reshape(-1, 1, 3)
+        self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
             if not body.is_free:
                 low, high = swept_box(body)
                 self._boxes[row] = [[side - MARGIN_M for side in low], [side + MARGIN_M for side in high]]
         self._fixed = {entity.index: body.position for entity, body in felt if not body.is_free}
+        robots = [entity.is_robot for entity in self._entities if entity.is_rigid]
+        self._has_choice = sum(robots) > 1 and not all(robots)
+        """Whether an island may have several robots and an object: then its solver depends on where they are."""
         self._alone = [
             (entity.index, entity.name if entity.is_robot else "")
             for entity in layout.entities
             if entity.is_solved and not entity.is_rigid
         ]
         """Movers and others that touch nobody: each is solved by itself."""
+        self._found: tuple[list[tuple[int, int]], list[BodyIsland]] | None = None
+        """The pairs and the islands that were found last."""
 
     def islands(self, numbers: Sequence[float]) -> list[BodyIsland]:
-        """Return the islands of an edited frame, and those that move alone, in the order of their first entities."""
-        boxes = self._boxes_at(numbers)
-        pairs = overlapping(boxes)
+        """Return the islands of an edited frame, and those that move alone, in the order of their first entities.
+
+        It is the same list as the last one where it is equal to that.
+        """
+        pairs = overlapping(self._boxes_at(numbers))
+        if self._found is None or pairs != self._found[0]:
+            self._found = pairs, self._islands_of(pairs)
+        found = [self._with_nearest(island, numbers) for island in self._found[1]] if self._has_choice else None
+        if found is not None and found != self._found[1]:
+            self._found = pairs, found
+        return self._found[1]
+
+    def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
+        if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice
+            return island
+        nearest = self._nearest([self._layout.entities[index] for index in island.entities], numbers)
+        return island if nearest == island.nearest else replace(island, nearest=nearest)
+
+    def _islands_of(self, pairs: Sequence[tuple[int, int]]) -> list[BodyIsland]:
+        """Return the islands that follow from the pairs of rows that could touch; the robot of each is its first."""
         group = list(range(len(self._entities)))
         movers: list[tuple[int, int]] = []
         for one, other in pairs:
@@ -105,7 +141,8 @@ class Volumes:
             entities = [self._entities[row] for row in rows]
             near = tuple(sorted(in_the_way.get(root, ())))
             indices = tuple([entity.index for entity in entities])
-            found.append(BodyIsland(indices, near, self._nearest(entities, numbers)))
+            first = next((entity.name for entity in entities if entity.is_robot), "")
+            found.append(BodyIsland(indices, near, first))
         found += [BodyIsland((index,), (), name) for index, name in self._alone]
         return sorted(found, key=lambda island: island.entities)
 
@@ -113,18 +150,14 @@ class Volumes:
         """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
         boxes = self._boxes.copy()
         if len(self._free):
-            values = np.array(numbers)
-            x, y, z, w = (values[self._orientations + part] for part in range(4))
-            rows = _rotation(x, y, z, w)
-            middle = np.stack([values[self._positions + axis] for axis in range(3)])
-            half = np.zeros_like(middle)
-            for axis in range(3):
-                for part in range(3):
-                    middle[axis] += rows[axis][part] * self._middles[:, part]
-                    half[axis] += np.abs(rows[axis][part]) * self._halves[:, part]
-            half += self._grown
-            boxes[self._free, 0] = (middle - half).T
-            boxes[self._free, 1] = (middle + half).T
+            poses = np.array(numbers)[self._poses]
+            turned = _rotations(poses[:, 3:])
+            along = turned * self._middles
+            spread = np.abs(turned) * self._halves
+            middle = poses[:, :3] + (along[:, :, 0] + along[:, :, 1] + along[:, :, 2])
+            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown
+            boxes[self._free, 0] = middle - half
+            boxes[self._free, 1] = middle + half
         return boxes
 
     def _nearest(self, entities: Sequence[Entity], numbers: Sequence[float]) -> str:
@@ -146,7 +179,7 @@ class Volumes:
         return self._fixed[entity.index] if at is None else (numbers[at], numbers[at + 1], numbers[at + 2])
 
 
-def solver_by_name(first: str, roster: Sequence[str]) -> str:
+def solver_by_name(first: str, roster: tuple[str, ...]) -> str:
     """Return the node that solves an island without a robot: it follows from the name of its first entity, so that
     loose objects spread over the nodes."""
     return roster[int.from_bytes(blake2b(first.encode(), digest_size=8).digest(), "little") % len(roster)]
@@ -155,23 +188,28 @@ def solver_by_name(first: str, roster: Sequence[str]) -> str:
 def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     """Return the pairs of boxes (n, 2, 3) that overlap, each with the lower row first, in order.
 
-    Boxes are swept along x, those of one least x by their rows.
+    Boxes are swept along the axis along which their least coordinates vary most, so that a row of boxes costs as
+    little whichever way it goes. The pairs are the same along any.
     """
-    order = np.argsort(boxes[:, 0, 0], kind="stable")
+    count = len(boxes)
+    if count < 2:
+        return []
+    axis = int(boxes[:, 0].var(axis=0).argmax())
+    order = np.argsort(boxes[:, 0, axis], kind="stable")
     low, high = boxes[order, 0], boxes[order, 1]
-    ends = np.searchsorted(low[:, 0], high[:, 0], side="right")
-    rows = order.tolist()
-    pairs: list[tuple[int, int]] = []
-    for place, end in enumerate(ends.tolist()):
-        if end <= place + 1:
-            continue
-        others = slice(place + 1, end)
-        near = (low[others, 1] <= high[place, 1]) & (high[others, 1] >= low[place, 1])
-        near &= (low[others, 2] <= high[place, 2]) & (high[others, 2] >= low[place, 2])
-        for other in near.nonzero()[0].tolist():
-            one, two = rows[place], rows[place + 1 + other]
-            pairs.append((one, two) if one < two else (two, one))
-    return sorted(pairs)
+    ends = np.searchsorted(low[:, axis], high[:, axis], side="right")
+    counts = ends - np.arange(1, count + 1)  # how many of the later ones begin before a box ends
+    ones = np.repeat(np.arange(count), counts)
+    others = np.arange(len(ones)) - np.repeat(np.cumsum(counts) - counts, counts) + ones + 1
+    meet = ((low[others] <= high[ones]) & (high[others] >= low[ones])).all(axis=1)
+    pairs = np.sort(np.stack((order[ones[meet]], order[others[meet]]), axis=1), axis=1)
+    return sorted(map(tuple, pairs.tolist()))
+
+
+def _pose_places(entity: Entity) -> list[int]:
+    """Return the places of a free body's position and of its quaternion's parts."""
+    at, turned = entity.offsets["position"], entity.offsets["orientation"]
+    return [*range(at, at + 3), *range(turned, turned + 4)]
 
 
 def _own_box(body: Body) -> tuple[Vector, Vector]:
@@ -189,13 +227,12 @@ def _own_box(body: Body) -> tuple[Vector, Vector]:
     return middle, (x, y, z)
 
 
-def _rotation(x: Numbers, y: Numbers, z: Numbers, w: Numbers) -> list[list[Numbers]]:
-    """Return the rows of the rotation matrices of unit quaternions."""
-    return [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
+def _rotations(quaternions: Numbers) -> Numbers:
+    """Return the rotation matrices (n, 3, 3) of unit quaternions (n, 4): x, y, z, w."""
+    squares = quaternions[:, :, None] * quaternions[:, None, :]
+    first, second = squares[:, ROTATION[0], ROTATION[1]], squares[:, ROTATION[2], ROTATION[3]]
+    parts: Numbers = (UNIT + (first + SIGNS * second) * TWICE).reshape(-1, 3, 3)
+    return parts
 
 
 def _root(group: list[int], row: int) -> int:
