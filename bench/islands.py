@@ -25,7 +25,7 @@ from bench.machine import pss_mb
 from bench.runs import ROOT
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.node.physics.bullet_islands import ENGINES_MAX
+from foosim.node.physics.interface import ISLAND_ENGINES_MAX
 from foosim.node.physics.making import build_in_steps, prepare_spares
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.islands import Assignment, Share, reach_of
@@ -251,9 +251,9 @@ def various(kinds: int) -> str:
 
 def engines_memory() -> Memory:
     """Measure the memory of eight engines in a process of its own."""
-    program = f"from bench.islands import hold_engines; hold_engines({ENGINES_MAX})"
+    program = f"from bench.islands import hold_engines; hold_engines({ISLAND_ENGINES_MAX})"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    return Memory(ENGINES_MAX, float(done.stdout.split()[-1]))
+    return Memory(ISLAND_ENGINES_MAX, float(done.stdout.split()[-1]))
 
 
 def hold_engines(count: int) -> None:

@@ -14,7 +14,7 @@ the start of the tick, so that others are pushed by it. (Nothing is pushed by a 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import fsum, sqrt
@@ -33,10 +33,10 @@ from foosim.node.physics.bullet_client import (
     settings_of,
     start_client,
 )
-from foosim.node.physics.interface import Island
+from foosim.node.physics.interface import ISLAND_ENGINES_MAX, Island
 from foosim.world.assembly.sections import physics_of
-from foosim.world.assembly.volumes import is_felt
-from foosim.world.assembly.world import build_scene
+from foosim.world.assembly.volumes import Volumes, is_felt
+from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.components.drives import Motor
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
@@ -63,8 +63,6 @@ from foosim.world.scene import (
 BODIES: Final = 1
 SCENERY: Final = 2
 """Collision groups: bodies meet everything, what stands meets bodies alone."""
-ENGINES_MAX: Final = 8
-"""Engines that a node keeps: those that were used last."""
 MESH_PIECE: Final = 4096
 """Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 PARKING_Z_M: Final = 1000.0
@@ -72,11 +70,12 @@ PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
 RESIDUAL: Final = 1e-12
 """The solver stops when an iteration changes no speed by more than 1 um/s or 1 urad/s: this is the square of it."""
-EVERYWHERE: Final = (-1, -1, -2, -2)
+EVERYWHERE: Final[tuple[int, ...]] = (-1, -1, -2, -2)
 """The contacts of any two bodies and links."""
-NO_CONTACT: Final = (0.0, 0.0, -1.0)
-NOBODY: Final = (NO_ENTITY,) * PARTNERS_MAX
-NO_IMPULSES: Final = (0.0,) * PARTNERS_MAX
+DONE: Final = "done"
+NO_CONTACT: Final[tuple[float, ...]] = (0.0, 0.0, -1.0)
+NOBODY: Final[tuple[float, ...]] = (NO_ENTITY,) * PARTNERS_MAX
+NO_IMPULSES: Final[tuple[float, ...]] = (0.0,) * PARTNERS_MAX
 
 Composition = tuple[tuple[int, ...], tuple[int, ...]]
 """The kinds of an island's bodies, in name order, and those of the movers in their way."""
@@ -150,31 +149,79 @@ class BulletIslands:
         self._unnamed = list(known)
         self._engines: dict[Composition, CompositionEngine] = {}
         """The one that was used last at the end."""
-        self.missed = 0
-        """How many engines were built in the middle of a tick."""
+        self._used: set[Composition] = set()
+        """Those that were used, or expected, since the last look ahead."""
+        self._expected: list[Composition] = []
+        self._begun: tuple[Composition, CompositionEngine] | None = None
+        """The engine that is built between ticks, and of what."""
+        self.missed = ""
 
     @classmethod
     def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletIslands]:
-        """Make one with the engines of single bodies, an engine at a time."""
+        """Make one with the engines of the islands at the start and of single bodies, a body at a time."""
         made = cls(deployment, layout)
-        for composition in made.compositions_alone():
+        yield
+        entities = layout.entities
+        islands = Volumes(deployment, layout).islands(initial_numbers(deployment, layout))
+        first = [
+            made._composition(
+                [entities[index] for index in island.entities], [entities[index] for index in island.movers]
+            )
+            for island in islands
+            if entities[island.entities[0]].is_rigid
+        ]
+        alone: list[Composition] = [((kind,), ()) for kind, body in enumerate(made._unnamed) if not _is_mover(body)]
+        made._expected = list(dict.fromkeys([*first, *alone]))[:ISLAND_ENGINES_MAX]
+        while made.build_some():
             yield
-            made.build(composition)
         return made
 
-    def compositions_alone(self) -> list[Composition]:
-        """Return the compositions of single bodies, in the order of their kinds: those that are needed first."""
-        alone: list[Composition] = [((kind,), ()) for kind, body in enumerate(self._unnamed) if not _is_mover(body)]
-        return alone[:ENGINES_MAX]
+    def _composition(self, bodies: Iterable[Entity], movers: Iterable[Entity]) -> Composition:
+        kinds = self._kinds
+        return tuple([kinds[entity.index] for entity in bodies]), tuple([kinds[entity.index] for entity in movers])
 
-    def build(self, composition: Composition) -> CompositionEngine:
-        """Build and keep the engine of a composition; the one that was not used for longest goes."""
-        while len(self._engines) >= ENGINES_MAX:
+    def expect(self, islands: Sequence[tuple[tuple[Entity, ...], tuple[Entity, ...]]]) -> None:
+        """Have the engines of islands built by `build_some`, as far as no other one that is in use has to go."""
+        coming = list(dict.fromkeys([self._composition(*island) for island in islands]))
+        in_use = self._used.intersection(self._engines)
+        ready = [composition for composition in coming if composition in self._engines]
+        wanted = [composition for composition in coming if composition not in self._engines]
+        self._expected = wanted[: max(0, ISLAND_ENGINES_MAX - len(in_use.union(ready)) - (self._begun is not None))]
+        self._used = set()
+        for composition in ready:
+            self._engines[composition] = self._engines.pop(composition)
+
+    def build_some(self) -> bool:
+        """Build a body of an engine that is expected; False when there is none."""
+        if self._begun is None:
+            while self._expected and self._expected[0] in self._engines:
+                del self._expected[0]
+            if not self._expected:
+                return False
+            composition = self._expected.pop(0)
+            self._begun = composition, self._begin(composition)
+        composition, engine = self._begun
+        if not engine.build_some():
+            self._engines[composition], self._begun = engine, None
+        return True
+
+    def _begin(self, composition: Composition) -> CompositionEngine:
+        """Return the engine of a composition, of which nothing is built; the one not used for longest goes for it."""
+        while len(self._engines) + (self._begun is not None) >= ISLAND_ENGINES_MAX:
             self._engines.pop(next(iter(self._engines))).close()
         bodies = [self._unnamed[kind] for kind in composition[0]]
         movers = [self._unnamed[kind] for kind in composition[1]]
-        engine = CompositionEngine(self._physics, self._dt, self._substeps, self._scenery, bodies, movers)
-        self._engines[composition] = engine
+        physics, step_s, substeps = self._physics, self._dt, self._substeps
+        return CompositionEngine(physics, step_s, substeps, self._scenery, bodies, movers, at_once=False)
+
+    def _build_now(self, composition: Composition) -> CompositionEngine:
+        """Return an engine that was not expected, or is not complete."""
+        if self._begun is not None and self._begun[0] == composition:
+            engine, self._begun = self._begun[1], None
+        else:
+            engine = self._begin(composition)
+        while engine.build_some():
+            continue
         return engine
 
     def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
@@ -182,26 +229,23 @@ class BulletIslands:
 
         `start` are the numbers of the tick's start, at which movers are.
         """
-        kinds = self._kinds
-        composition = (
-            tuple([kinds[entity.index] for entity in island.bodies]),
-            tuple([kinds[entity.index] for entity in island.movers]),
-        )
+        composition = self._composition(island.bodies, island.movers)
         engine = self._engines.pop(composition, None)
         if engine is None:
-            engine = self.build(composition)
-            self.missed += 1
-        else:
-            self._engines[composition] = engine
+            engine = self._build_now(composition)
+            self.missed = ", ".join([entity.name for entity in (*island.bodies, *island.movers)])
+        self._engines[composition] = engine
+        self._used.add(composition)
         engine.load(island, [self._bodies[entity.index] for entity in (*island.bodies, *island.movers)], numbers, start)
         engine.step(island)
         engine.read(island, numbers)
 
     def close(self) -> None:
         """Free all engines."""
-        for engine in self._engines.values():
+        for engine in (*self._engines.values(), *([] if self._begun is None else [self._begun[1]])):
             engine.close()
         self._engines.clear()
+        self._begun = None
 
 
 def _without_names(body: Body, *, is_mover: bool) -> Body:
@@ -292,22 +336,16 @@ class CompositionEngine:
         scenery: Sequence[Shape],
         bodies: Sequence[Body],
         movers: Sequence[Body],
+        *,
+        at_once: bool = True,
     ) -> None:
+        """Without `at_once` nothing is built but by `build_some`."""
         self._physics, self._dt, self._substeps = physics, substep_s, substeps
-        self._client = start_client(self._settings(), physics.gravity)
+        self._client = -1
         self._silent: set[int] = set()
-        for shape in scenery:
-            self._make_scenery(shape)
         self._made: list[_Made] = []
-        at = PARKING_Z_M
-        for body in (*bodies, *movers):
-            reach = _reach(body)
-            at += reach
-            self._made.append(self._make(body, (0.0, 0.0, at)))
-            at += reach + PARKING_GAP_M
-        self._tie()
         self._count = len(bodies)
-        self._place = {made.id: place for place, made in enumerate(self._made)}
+        self._place: dict[int, int] = {}
         """Of the bodies by their ids: the place in the island, movers behind."""
         self._known_slots: dict[int, _Slots] = {}
         """By the index of the entity."""
@@ -315,14 +353,38 @@ class CompositionEngine:
         """Of the bodies of the island that was loaded last."""
         self._touches: dict[tuple[int, int], _Touch] = {}
         """Of the tick, by the ids of both bodies."""
-        for made in self._made:
-            self._park(made)
+        self._steps: Iterator[None] | None = self._build(tuple(scenery), (*bodies, *movers))
+        while at_once and self.build_some():
+            continue
 
     def _settings(self) -> dict[str, Any]:
         """Return the parameters of the world. A solve has one island, so that it may stop on what is left of that."""
         return {**settings_of(self._physics, self._dt), "solverResidualThreshold": RESIDUAL}
 
     # --- building ----------------------------------------------------------------------------------------------------
+
+    def build_some(self) -> bool:
+        """Build a body, or a piece of scenery; False when all is built, at the last step at the latest."""
+        if self._steps is not None and next(self._steps, DONE) is DONE:
+            self._steps = None
+        return self._steps is not None
+
+    def _build(self, scenery: Sequence[Shape], bodies: Sequence[Body]) -> Iterator[None]:
+        self._client = start_client(self._settings(), self._physics.gravity)
+        for shape in scenery:
+            yield
+            self._make_scenery(shape)
+        at = PARKING_Z_M
+        for body in bodies:
+            yield
+            reach = _reach(body)
+            at += reach
+            made = self._make(body, (0.0, 0.0, at))
+            self._place[made.id] = len(self._made)
+            self._made.append(made)
+            self._park(made)
+            at += reach + PARKING_GAP_M
+        self._tie()
 
     def _make_scenery(self, shape: Shape) -> None:
         """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""

@@ -190,6 +190,18 @@ class Assignment:
             shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
 
+    def approaching(self, numbers: Sequence[float], node: str, ticks: int) -> list[BodyIsland]:
+        """Return the islands that a node may have to solve within some ticks beside those of this one, the likely ones
+        first. No result follows from them."""
+        if not isinstance(self.reach, Volumes):
+            return []
+        return [island for island in self.reach.approaching(numbers, ticks) if self._solver_of_any(island) == node]
+
+    def _solver_of_any(self, island: BodyIsland) -> str:
+        if island.nearest:
+            return self.owners[island.nearest]
+        return solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
+
     def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:
         mine: dict[str, list[tuple[int, ...]]] = {node: [] for node in self.roster}
         solved: dict[str, list[int]] = {node: [] for node in self.roster}
@@ -204,10 +216,7 @@ class Assignment:
         mine: dict[str, list[BodyIsland]] = {node: [] for node in self.roster}
         solved: dict[str, list[int]] = {node: [] for node in self.roster}
         for island in islands:
-            if island.nearest:
-                solver = self.owners[island.nearest]
-            else:
-                solver = solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
+            solver = self._solver_of_any(island)
             mine[solver].append(island)
             solved[solver].extend(island.entities)
         self._add_unsolved(solved)

@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
+from math import inf
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.world.assembly.rest import is_slow, moves
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -27,6 +29,8 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+LOOKED_AT: Final = 64
+"""Bodies that a look ahead starts from, and islands that it finds."""
 
 X, Y, Z, W = range(4)
 ROTATION: Final = np.array(
@@ -81,6 +85,8 @@ class Volumes:
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
         self._middles = np.array(middles).reshape(-1, 1, 3)
         self._halves = np.array(halves).reshape(-1, 1, 3)
+        self._ways = np.array([body.speed_limit * tick_s if body.is_free else 0.0 for _, body in felt])
+        """How far each body gets in a tick (m)."""
         self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
@@ -112,6 +118,43 @@ class Volumes:
         if found is not None and found != self._found[1]:
             self._found = pairs, found
         return self._found[1]
+
+    def approaching(self, numbers: Sequence[float], ticks: int) -> list[BodyIsland]:
+        """Return the islands that may come about within some ticks: two of the present ones together, or one with a
+        mover. Those come first whose volumes are nearest. At least one of the two moves.
+
+        Volumes grow by their declared speed limits x so many ticks. What moves is limited to the first `LOOKED_AT`
+        bodies and movers, so that a look costs little in any world.
+        """
+        present = self.islands(numbers)
+        boxes = self._boxes_at(numbers)
+        entities = self._entities
+        moving = [row for row, entity in enumerate(entities) if _is_fast(entity, numbers)][:LOOKED_AT]
+        if not moving:
+            return []
+        gaps = np.maximum(boxes[moving, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[moving, None, 1])
+        gap = gaps.max(axis=2)
+        reach = self._ways * (ticks - 1)
+        near = (gap > 0.0) & (gap <= np.array(reach[moving])[:, None] + reach[None, :])
+        home = {index: number for number, island in enumerate(present) for index in island.entities}
+        found: dict[tuple[int, int], float] = {}
+        for at, other in np.argwhere(near).tolist():
+            one, two = entities[moving[at]], entities[other]
+            if one.is_rigid or two.is_rigid:
+                pair = home[one.index], home[two.index]
+                pair = pair if pair[0] < pair[1] else (pair[1], pair[0])
+                if pair[0] != pair[1]:
+                    found[pair] = min(found.get(pair, inf), float(gap[at, other]))
+        nearest = sorted(found, key=lambda pair: (found[pair], pair))[:LOOKED_AT]
+        return [self._together(present[one], present[other], numbers) for one, other in nearest]
+
+    def _together(self, one: BodyIsland, other: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
+        """Return two islands as one; a mover, which is alone in its island, is in the way of the other."""
+        members = sorted([*one.entities, *other.entities])
+        bodies = [self._layout.entities[index] for index in members if self._layout.entities[index].is_rigid]
+        alone = {index for index in members if not self._layout.entities[index].is_rigid}
+        movers = tuple(sorted({*one.movers, *other.movers, *alone}))
+        return BodyIsland(tuple([entity.index for entity in bodies]), movers, self._nearest(bodies, numbers))
 
     def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
         if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice
@@ -204,6 +247,11 @@ def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     meet = ((low[others] <= high[ones]) & (high[others] >= low[ones])).all(axis=1)
     pairs = np.sort(np.stack((order[ones[meet]], order[others[meet]]), axis=1), axis=1)
     return sorted(map(tuple, pairs.tolist()))
+
+
+def _is_fast(entity: Entity, numbers: Sequence[float]) -> bool:
+    """Whether a body or a mover may get anywhere."""
+    return not is_slow(entity, numbers) if entity.is_rigid else moves(entity, numbers)
 
 
 def _pose_places(entity: Entity) -> list[int]:
