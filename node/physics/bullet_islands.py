@@ -86,7 +86,7 @@ class _Made:
     """A body in an engine: its id, its joints that move, and where it is parked.
 
     `joints` are indices of Bullet; `is_free` says that the base moves; `end` is the link that a tie holds, if any can;
-    `shaped` are the links that have a shape, -1 being the base.
+    `shaped` are the links that have a shape, -1 being the base, and the groups that each meets.
     """
 
     id: int
@@ -95,7 +95,7 @@ class _Made:
     zeros: tuple[float, ...]
     is_free: bool
     end: int | None
-    shaped: tuple[int, ...]
+    shaped: tuple[tuple[int, int], ...]
     parking: Vector
 
 
@@ -292,6 +292,21 @@ def _of_one(link: Link) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
     return (others, tuple(hulls)) if others else (tuple(hulls[:1]), tuple(hulls[1:]))
 
 
+def _shaped(base: Link | None, links: Sequence[Link]) -> tuple[tuple[int, int], ...]:
+    """Return the links that have a shape, by Bullet's indices, and the groups that each meets.
+
+    Links of a body on a fixed base that no joint moves meet no scenery: nothing can happen between the two.
+    """
+    found = [(-1, BODIES | SCENERY)] if base is not None and base.shapes else []
+    standing: set[int] = set()
+    for index, link in enumerate(links):
+        if base is None and link.joint == "fixed" and (link.parent < 0 or link.parent in standing):
+            standing.add(index)
+        if link.shapes:
+            found.append((index, BODIES if index in standing else BODIES | SCENERY))
+    return tuple(found)
+
+
 def _reach(body: Body) -> float:
     """Return how far a body reaches from its base over all its joints' positions (m)."""
     low, high = swept_box(body)
@@ -428,6 +443,9 @@ class CompositionEngine:
             self._finish(made, -1, base, None)
         for index, link in enumerate(links):
             self._finish(made, index, link, links[link.parent] if link.parent >= 0 else base)
+        shaped = _shaped(base, links)
+        for index, mask in shaped:
+            p.setCollisionFilterGroupMask(made, index, BODIES, mask, client)
         p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
         joints = tuple([index for index, link in enumerate(links) if link.joint in MOVING])
         zeros = (0.0,) * len(joints)
@@ -436,10 +454,7 @@ class CompositionEngine:
                 made, joints, p.VELOCITY_CONTROL, targetVelocities=zeros, forces=zeros, physicsClientId=client
             )
         end = -1 if mass > 0.0 else (joints[0] if joints else None)
-        shaped = [index for index, link in enumerate(links) if link.shapes]
-        if base is not None and base.shapes:
-            shaped.insert(0, -1)
-        return _Made(made, body, joints, zeros, base is not None, end, tuple(shaped), parking)
+        return _Made(made, body, joints, zeros, base is not None, end, shaped, parking)
 
     def _tie(self) -> None:
         """Tie all that moves into one of Bullet's islands, by gears without a force, which have no row in a solve.
@@ -462,7 +477,6 @@ class CompositionEngine:
     def _finish(self, made: int, index: int, link: Link, parent: Link | None) -> None:
         """Set what a link that was made weighs, and what others feel of it."""
         client = self._client
-        p.setCollisionFilterGroupMask(made, index, BODIES, BODIES | SCENERY, physicsClientId=client)
         if link.mass > 0.0:
             make_dynamics(client, made, index, link.mass, link.inertia)
         if link.shapes:
@@ -491,8 +505,8 @@ class CompositionEngine:
         for made in self._made:
             self._park(made)
         for made in self._made:
-            for index in made.shaped:
-                renew(made.id, index, BODIES, BODIES | SCENERY, client)
+            for index, mask in made.shaped:
+                renew(made.id, index, BODIES, mask, client)
         p.performCollisionDetection(client)
 
     def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
