@@ -138,10 +138,11 @@ class Ticks:
 
     def run_engine(self, ticks: int, before: Callable[[int], None] | None = None) -> float:
         """Compute some ticks; return what the engine takes of one (us): load, step and read of all islands."""
-        plain, self._engine = self._engine, MeteredEngine(self._engine)
+        plain, metered = self._engine, MeteredEngine(self._engine)
+        self._engine = metered
         self.run(ticks, before)
-        spent_ns, self._engine = self._engine.spent_ns, plain
-        return spent_ns / 1e3 / ticks
+        self._engine = plain
+        return metered.spent_ns / 1e3 / ticks
 
     def close(self) -> None:
         self._engine.close()

@@ -25,8 +25,10 @@ from mypy_extensions import mypyc_attr
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
+    MESH_PIECE,
     give_client,
     make_dynamics,
+    make_scenery,
     make_shape,
     make_surface,
     p,
@@ -63,8 +65,6 @@ from foosim.world.scene import (
 BODIES: Final = 1
 SCENERY: Final = 2
 """Collision groups: bodies meet everything, what stands meets bodies alone."""
-MESH_PIECE: Final = 4096
-"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 PARKING_Z_M: Final = 1000.0
 PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
@@ -388,34 +388,23 @@ class CompositionEngine:
         self._client = start_client(self._settings(), self._physics.gravity)
         for shape in scenery:
             yield
-            self._make_scenery(shape)
+            side = self._physics.sides[shape.surface]
+            made = make_scenery(self._client, shape, (SCENERY, BODIES), side)
+            if side.silent:
+                self._silent.add(made)
         at = PARKING_Z_M
         for body in bodies:
             yield
             reach = _reach(body)
             at += reach
-            made = self._make(body, (0.0, 0.0, at))
-            self._place[made.id] = len(self._made)
-            self._made.append(made)
-            self._park(made)
+            self._add(self._make(body, (0.0, 0.0, at)))
             at += reach + PARKING_GAP_M
         self._tie()
 
-    def _make_scenery(self, shape: Shape) -> None:
-        """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
-        side = self._physics.sides[shape.surface]
-        body: int = p.createMultiBody(
-            baseMass=0.0,
-            baseCollisionShapeIndex=make_shape(self._client, (shape,), placed=False),
-            basePosition=shape.position,
-            baseOrientation=shape.orientation,
-            useMaximalCoordinates=True,
-            physicsClientId=self._client,
-        )
-        p.setCollisionFilterGroupMask(body, -1, SCENERY, BODIES, physicsClientId=self._client)
-        make_surface(self._client, body, -1, side)
-        if side.silent:
-            self._silent.add(body)
+    def _add(self, made: _Made) -> None:
+        self._place[made.id] = len(self._made)
+        self._made.append(made)
+        self._park(made)
 
     def _make(self, body: Body, parking: Vector) -> _Made:
         """Make a body as a multibody: a rigid body's world inertia tensor is not reloaded with its pose."""
