@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 from math import inf
+from operator import itemgetter
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -29,6 +30,8 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+FEW: Final = 16
+"""Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
 LOOKED_AT: Final = 64
 """Bodies that a look ahead starts from, and islands that it finds."""
 
@@ -79,8 +82,8 @@ class Volumes:
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
         self._free = np.array([row for row, _, _ in free], np.intp)
-        self._poses = np.array([_pose_places(entity) for _, entity, _ in free], np.intp).reshape(-1, 7)
-        """Places of the position and of the quaternion's parts of each free body."""
+        self._poses = itemgetter(*[at for _, entity, _ in free for at in _pose_places(entity)]) if free else None
+        """Returns the position and the quaternion's parts of each free body, from a frame's numbers."""
         self._position_of = {entity.index: entity.offsets["position"] for _, entity, _ in free}
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
         self._middles = np.array(middles).reshape(-1, 1, 3)
@@ -192,8 +195,8 @@ class Volumes:
     def _boxes_at(self, numbers: Sequence[float]) -> Numbers:
         """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
         boxes = self._boxes.copy()
-        if len(self._free):
-            poses = np.array(numbers)[self._poses]
+        if self._poses is not None:
+            poses = np.array(self._poses(numbers)).reshape(-1, 7)
             turned = _rotations(poses[:, 3:])
             along = turned * self._middles
             spread = np.abs(turned) * self._halves
@@ -237,11 +240,13 @@ def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     count = len(boxes)
     if count < 2:
         return []
-    axis = int(boxes[:, 0].var(axis=0).argmax())
+    axis = int(boxes[:, 0].var(axis=0).argmax()) if count > FEW else 0
     order = np.argsort(boxes[:, 0, axis], kind="stable")
     low, high = boxes[order, 0], boxes[order, 1]
     ends = np.searchsorted(low[:, axis], high[:, axis], side="right")
     counts = ends - np.arange(1, count + 1)  # how many of the later ones begin before a box ends
+    if not counts.any():
+        return []
     ones = np.repeat(np.arange(count), counts)
     others = np.arange(len(ones)) - np.repeat(np.cumsum(counts) - counts, counts) + ones + 1
     meet = ((low[others] <= high[ones]) & (high[others] >= low[ones])).all(axis=1)
