@@ -125,6 +125,8 @@ class Solver:
             stepper = self._core.stepper(layout)
             if not self.fingerprint:
                 self.fingerprint = engine_fingerprint(engine, stepper)
+                if isinstance(engine, ForesightedEngine):
+                    engine.missed = ""  # of a run that is none
         except ComponentError as error:
             self._core.fail(error)
             return

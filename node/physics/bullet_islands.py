@@ -65,6 +65,8 @@ from foosim.world.scene import (
 BODIES: Final = 1
 SCENERY: Final = 2
 """Collision groups: bodies meet everything, what stands meets bodies alone."""
+SINGLE_MAX: Final = ISLAND_ENGINES_MAX // 2
+"""Engines of single bodies that stay while others come and go."""
 PARKING_Z_M: Final = 1000.0
 PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
@@ -183,13 +185,18 @@ class BulletIslands:
     def expect(self, islands: Sequence[tuple[tuple[Entity, ...], tuple[Entity, ...]]]) -> None:
         """Have the engines of islands built by `build_some`, as far as no other one that is in use has to go."""
         coming = list(dict.fromkeys([self._composition(*island) for island in islands]))
-        in_use = self._used.intersection(self._engines)
+        in_use = self._used.intersection(self._engines).union(self._kept())
         ready = [composition for composition in coming if composition in self._engines]
         wanted = [composition for composition in coming if composition not in self._engines]
         self._expected = wanted[: max(0, ISLAND_ENGINES_MAX - len(in_use.union(ready)) - (self._begun is not None))]
         self._used = set()
         for composition in ready:
             self._engines[composition] = self._engines.pop(composition)
+
+    def _kept(self) -> list[Composition]:
+        """Return the single bodies whose engines stay: islands end in these. That is half of all engines at most."""
+        alone = [composition for composition in self._engines if len(composition[0]) == 1 and not composition[1]]
+        return alone[-SINGLE_MAX:]
 
     def build_some(self) -> bool:
         """Build a body of an engine that is expected; False when there is none."""
@@ -206,9 +213,10 @@ class BulletIslands:
         return True
 
     def _begin(self, composition: Composition) -> CompositionEngine:
-        """Return the engine of a composition, of which nothing is built; the one not used for longest goes for it."""
+        """Return the engine of a composition, of which nothing is built. One not used for long goes for it."""
         while len(self._engines) + (self._begun is not None) >= ISLAND_ENGINES_MAX:
-            self._engines.pop(next(iter(self._engines))).close()
+            kept = self._kept()
+            self._engines.pop(next(known for known in self._engines if known not in kept)).close()
         bodies = [self._unnamed[kind] for kind in composition[0]]
         movers = [self._unnamed[kind] for kind in composition[1]]
         physics, step_s, substeps = self._physics, self._dt, self._substeps
