@@ -28,6 +28,7 @@ from bench import (
     packets,
     rays,
     realtime,
+    rigid_fleet,
     swarm,
     table_one_process,
     validate,
@@ -97,6 +98,12 @@ BENCHES: Final = (
         "rigid bodies island by island: boxes, an arm, robots, and the memory of their engines",
         with_default(islands.islands),
         islands.lines,
+    ),
+    Bench(
+        "rigid-fleet",
+        "rigid robots on wheels among boxes at rest, in one process and by one node and two",
+        with_default(rigid_fleet.rigid_fleet),
+        rigid_fleet.lines,
     ),
     Bench(
         "certificates",

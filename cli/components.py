@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.world.forms import registry
-from foosim.world.forms.forms import ROBOTS, Component, Form
+from foosim.world.forms.forms import ROBOTS, Component, Form, Model
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.registry import FORMS
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
@@ -18,7 +18,7 @@ OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
     "motion": ("writes",),
     "rule": ("each", "writes"),
-    "entity_rule": ("writes",),
+    "entity_rule": ("writes", "shared"),
     "kit": ("entities", "addable", "rules"),
 }
 """What is told of a form beside what all have: its fields."""
@@ -68,12 +68,23 @@ def as_json(component: Form) -> dict[str, Any]:
         "meshes": getattr(component, "meshes", False),
         **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.form, ())},
     }
+    if isinstance(component, Model) and component.variants:
+        about["variants"] = {
+            dynamics: {"class": f"{one.module}:{one.made.__qualname__}", **_moved(one)}
+            for dynamics, one in component.variants.items()
+        }
     if isinstance(component, Component) and component.value is not None:
         fields = PayloadCodec(component.value, component.name).fields
         about[CARRIES[component.form]] = [
             {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
         ]
     return about
+
+
+def _moved(model: Model) -> dict[str, Any]:
+    """Return what moves the entities of a model, and the slots of their state."""
+    slots = None if callable(model.slots) else {field: int(size) for field, size in model.slots.items()}
+    return {"is_rigid": model.is_rigid, "motion": model.motion, "slots": slots}
 
 
 def line(component: Form) -> str:
@@ -114,9 +125,14 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  slots of each {'robot' if whose == ROBOTS else whose}: {_counted(slots)}"
     if about.get("writes"):
         yield f"  writes: {', '.join(about['writes'])}"
+    if about.get("shared"):
+        yield f"  slots that are the model's where it has them: {', '.join(about['shared'])}"
     if about["form"] == "model":
         yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
-        yield f"  moved by: {'an engine' if about['is_rigid'] else about['motion'] or 'nothing'}"
+        yield f"  moved by: {_mover_of(about)}"
+        for dynamics, its in about.get("variants", {}).items():
+            slots = "by its settings" if its["slots"] is None else _counted(its["slots"])
+            yield f"  with dynamics: {dynamics}, moved by: {_mover_of(its)}; slots: {slots}"
     usual = "usual " if about["form"] == "model" else ""
     for key in ("actuators", "rules"):
         if about.get(key):
@@ -128,6 +144,10 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  beside the robots: {_paired(about['entities'])}"
     if about.get("addable"):
         yield f"  can be added: {', '.join(about['addable'])}"
+
+
+def _mover_of(about: Mapping[str, Any]) -> str:
+    return "an engine" if about["is_rigid"] else about["motion"] or "nothing"
 
 
 def _paired(kinds: Mapping[str, str]) -> str:

@@ -28,7 +28,8 @@ def path_text(location: Location) -> str:
 class Finding:
     """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key.
 
-    `other` is the same problem at the other of two values that do not fit: reported if that one was set.
+    `other` is the same problem at the other of two values that do not fit: reported if that one was set. `valid` are
+    the keys that could be in the place of an unknown one.
     """
 
     location: Location
@@ -37,3 +38,4 @@ class Finding:
     nearest: str | None = None
     at: Literal["value", "key", "missing"] = "value"
     other: "Finding | None" = None
+    valid: tuple[str, ...] = ()

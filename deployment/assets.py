@@ -6,6 +6,7 @@ which is that of its own file, or the one inside it that `assets:` names.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from foosim.deployment.loader import apply_sets, check_open_meshes, check_state_fields, load_deployment
@@ -13,6 +14,7 @@ from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
 from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
 from foosim.world.matter.mesh import AssetError, digest_of
+from foosim.world.models.urdf import SUFFIX
 from foosim.world.scenery import SceneryMesh
 
 
@@ -28,12 +30,21 @@ def read_robot(file: Path, assets: Path | None) -> Robot:
         raise AssetError(f"{file}: not in the asset folder {assets}") from None
     files = read_files(folder, ".", [path])
     for mesh in meshes_of(path, files[path]):
-        try:
-            files |= read_files(folder, ".", [mesh], files)
-        except AssetError as error:
-            place = place_of_mesh(path, files[path], mesh)
-            raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
+        files |= _read(folder, ".", mesh, files)
     return read_urdf(path, files)
+
+
+def _read(folder: Path, assets: str, path: str, known: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The content of one file by its path, beside those that are known. Raises AssetError, of a robot's mesh with the
+    place where the robot's file names it."""
+    try:
+        return read_files(folder, assets, [path], known)
+    except AssetError as error:
+        for robot, content in known.items():
+            if robot.endswith(SUFFIX) and path in meshes_of(robot, content):
+                place = place_of_mesh(robot, content, path)
+                raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
+        raise
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
@@ -46,7 +57,8 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
     deployment = load_deployment(text, name)
     files: dict[str, bytes] = {}
     while wanted := deployment.wanted(files):
-        files |= read_files(folder, deployment.assets, wanted, files)
+        for path in wanted:
+            files |= _read(folder, deployment.assets, path, files)
     if not files:
         return text, {}
     complete = deployment.with_assets(files)

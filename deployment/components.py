@@ -104,8 +104,8 @@ class _Reader:
         self.findings: list[Finding] = []
         self._refused: dict[int, Any] = {}
         """What stands for settings that were refused, by its identity."""
-        self._read: dict[tuple[str, Any, int], Any] = {}
-        """What was read without findings: by form, model and the identity of the plain data, which lives as long."""
+        self._read: dict[tuple[str, int, int], Any] = {}
+        """What was read without findings: by form and the identities of model and plain data, which live as long."""
 
     def is_kit(self, key: Any) -> bool:
         """Whether a kit has this name; one that cannot be imported is reported."""
@@ -147,7 +147,7 @@ class _Reader:
         except Refused as error:
             self.findings.append(Finding((*location, "model"), error.what, name))
         else:
-            return self._entity_of(model, location, robot)
+            return self._entity_of(model.variant(robot.get("dynamics")), location, robot)
         self._components_of(None, location, robot)
         return RobotSettings.model_construct(model=name)
 
@@ -184,7 +184,7 @@ class _Reader:
 
     def component(self, form: str, model: Model | None, location: Location, settings: Any) -> Any:
         """Return the settings of one component. What many robots share, by a template, is read once."""
-        key = form, None if model is None else model.name, id(settings)
+        key = form, id(model), id(settings)
         if key not in self._read:
             count = len(self.findings)
             read = self._read_component(form, model, location, settings)

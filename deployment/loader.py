@@ -55,6 +55,7 @@ from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.forms import registry
 from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
@@ -218,12 +219,13 @@ def check_open_meshes(text: Text, name: str, deployment: Deployment) -> None:
 
 
 def check_state_fields(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse robots whose models are made from files, where these do not give what the robots' components need.
+    """Refuse robots whose models are made from files, where these do not give what the robots' components need; and
+    what starts in a mesh.
 
     `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
     """
     findings = list(islice(field_findings(deployment), PROBLEMS_MAX + 1))
-    for part in _state_findings(deployment) if deployment.robot_files(deployment.asset_files) else ():
+    for part in _state_findings(deployment) if deployment.asset_files else ():
         findings = findings or list(islice(part, PROBLEMS_MAX + 1))
     refuse_findings(text, name, findings)
 
@@ -318,13 +320,17 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
     return trial_findings(deployment)
 
 
-def _start_findings(deployment: Deployment) -> Iterable[Finding]:
-    """The robots that start in something: those that move by kinematics and are no kit's."""
-    if not any(stands_upright(model) for model in {robot.model for robot in deployment.robots.values()}):
-        return ()
-    from foosim.world.clearance.start import start_findings  # brings numpy
+def _start_findings(deployment: Deployment) -> Iterator[Finding]:
+    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies."""
+    if any(map(stands_upright, deployment.robots.values())):
+        from foosim.world.clearance.start import start_findings  # brings numpy
 
-    return start_findings(deployment)
+        yield from start_findings(deployment)
+    bodies = *deployment.robots.values(), *deployment.objects.values()
+    if any(one.is_rigid and one.couples for one in map(registry.model_of, bodies)):
+        from foosim.world.clearance.overlaps import overlap_findings  # brings numpy
+
+        yield from overlap_findings(deployment)
 
 
 def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:

@@ -78,8 +78,7 @@ def settings_findings(error: ValidationError, settings: type[BaseModel], under: 
         if _is_cause(detail):
             finding = _finding(detail, detail["loc"], root)
             if finding.what == UNKNOWN and finding.nearest is None:
-                valid = ", ".join(root.follow(detail["loc"][:-1])[1].get("properties", ()))
-                finding = replace(finding, what=f"{UNKNOWN} (there are: {valid or 'none'})")
+                finding = replace(finding, what=f"{UNKNOWN} (there are: {', '.join(finding.valid) or 'none'})")
             yield replace(finding, location=(*under, *finding.location))
 
 
@@ -128,9 +127,9 @@ def _missing(location: Location, schema: Mapping[str, Any], value: object, conte
 
 
 def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
-    key = location[-1]
-    nearest = nearest_name(key, parent.get("properties", ()))
-    return Finding(location, UNKNOWN, key, None if nearest is None else repr(nearest), "key")
+    key, valid = location[-1], tuple(parent.get("properties", ()))
+    nearest = nearest_name(key, valid)
+    return Finding(location, UNKNOWN, key, None if nearest is None else repr(nearest), "key", valid=valid)
 
 
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:

@@ -7,7 +7,6 @@ else in the system sees committed frames only.
 
 from __future__ import annotations
 
-import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.handshake import Member
+from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
 from foosim.protocol.messages import (
     Build,
     Commit,
@@ -77,11 +76,6 @@ class _Term:
     slots: Slots
     assignment: Assignment
     mine: tuple[Entity, ...]
-
-
-def _sendable(text: str) -> str:
-    """Return a text without what UTF-8 does not have: an error of a user's code may say anything."""
-    return text.encode(errors="replace").decode()
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -156,6 +150,8 @@ class NodeCore:
             self._readers[channel.name](self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
         except ComponentError as error:
             self.fail(error)
+        except NotValidHere as error:
+            self.failure = error.what
         except Malformed as error:
             self._refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
@@ -180,11 +176,9 @@ class NodeCore:
 
     def fail(self, error: ComponentError) -> None:
         """A component has raised: compute no more, and have the run end, since the next owner would meet it, too."""
-        self.failure = _sendable(str(error))[: limits.TEXT_LENGTH_MAX]
+        self.failure = sendable(str(error))[: limits.TEXT_LENGTH_MAX]
         self.work = None
-        trace = _sendable("".join(traceback.format_exception(error.cause)))
-        component, end = error.component[: limits.TEXT_LENGTH_MAX], trace[-limits.TEXT_LENGTH_MAX :]
-        self._failed = FailedForm(error.entity, component, error.tick, end)
+        trace, self._failed = failed_form(error)
         self.actions.append(Log("error", f"{error}\n{trace}"))
         self.actions.append(Publish(channels.HEARTBEAT, self.name, encode(self._heartbeat())))
 
@@ -274,7 +268,7 @@ class NodeCore:
     def slow_form(self, text: str) -> Publish:
         """Return what tells the supervisor of what takes long at a tick. Any thread may call this."""
         tick = max(0, self.present()[0])
-        text = _sendable(text)[: limits.TEXT_LENGTH_MAX]
+        text = sendable(text)[: limits.TEXT_LENGTH_MAX]
         beat = Heartbeat(self.name, tick, self.epoch, "", "", self.busy, b"", slow=text)
         return Publish(channels.HEARTBEAT, self.name, encode(beat))
 

@@ -70,6 +70,7 @@ class Stepper:
         ] = (), []
         """The islands of the last tick, and what is solved of them."""
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
+        self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._sensing = Sensing()
         self._waiting = [
@@ -200,13 +201,14 @@ class Stepper:
             return
         world, before = self.world, numbers.copy()
         start = work.start or before
-        rigid = [entity for entity in bodies if entity.index in self._rigid]
+        rigid = bodies if self._all_rigid else [entity for entity in bodies if entity.index in self._rigid]
         changed = bodies
         if rigid and self._by_island:
             awake = self._solve_islands(cast("IslandEngine", engine), work, start, is_partial=is_partial)
             changed = [*awake, *[entity for entity in bodies if entity.index not in self._rigid]]
         elif rigid:
             self._solve_together(cast("Engine", engine), rigid, work, start)
+        world.derive(rigid, numbers, work.tick)
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick)
         world.apply_entity_rules(bodies, start, numbers, work.tick)

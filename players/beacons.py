@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from functools import lru_cache
 from math import isfinite
 from typing import Final, NamedTuple
 
@@ -16,6 +17,7 @@ FLEET: Final = "fleet"
 """Channels: from rover to rovers, from rover to base, from base to rovers."""
 
 VISITS_MAX: Final = 4
+DECODED_KEPT: Final = 256
 _TENTHS_MAX: Final = 65535
 _HEAD = struct.Struct("<BfffHHBB")
 _SEEN = struct.Struct("<ff")
@@ -74,7 +76,13 @@ def encode_beacon(beacon: Beacon) -> bytes:
 
 def decode_beacon(payload: object, rovers: int, spots: int) -> Beacon | None:
     """Return the beacon that a payload holds, of one of so many rovers on a map of so many spots; None for none."""
-    if not isinstance(payload, bytes) or len(payload) < _HEAD.size:
+    return _decoded(payload, rovers, spots) if isinstance(payload, bytes) else None
+
+
+@lru_cache(maxsize=DECODED_KEPT)
+def _decoded(payload: bytes, rovers: int, spots: int) -> Beacon | None:
+    """Return what `decode_beacon` does: all players of a process hear the same beacons."""
+    if len(payload) < _HEAD.size:
         return None
     number, x, y, heading, here, goal, percent, flags = _HEAD.unpack_from(payload)
     at, count = _HEAD.size, flags & ~_HAS_SEEN

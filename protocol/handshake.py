@@ -7,23 +7,53 @@ computed. Shared by node and vHub.
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable
 from typing import Final, Literal
 
 from foosim.common import limits
-from foosim.common.errors import DeploymentError, Malformed
+from foosim.common.errors import DeploymentError, Malformed, Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Build, Epoch, Fetch, FormVersion, Heartbeat, Hello, Piece, Ready, Recall, Refusal
+from foosim.protocol.messages import (
+    Build,
+    Epoch,
+    FailedForm,
+    Fetch,
+    FormVersion,
+    Heartbeat,
+    Hello,
+    Piece,
+    Ready,
+    Recall,
+    Refusal,
+)
 from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import AssetError
 
 AGAIN_NS: Final = 200_000_000
+
+
+def sendable(text: str) -> str:
+    """Return a text without what UTF-8 does not have: an error of a user's code may say anything."""
+    return text.encode(errors="replace").decode()
+
+
+class NotValidHere(Refused):
+    """The run's deployment cannot be used on this machine: it lacks a package, or a form fails here."""
+
+
+def failed_form(error: ComponentError) -> tuple[str, FailedForm]:
+    """Return the traceback of a form that has raised, and what a heartbeat says of it."""
+    trace = sendable("".join(traceback.format_exception(error.cause)))
+    component, end = error.component[: limits.TEXT_LENGTH_MAX], trace[-limits.TEXT_LENGTH_MAX :]
+    return trace, FailedForm(error.entity, component, error.tick, end)
 
 
 class Member:
@@ -43,6 +73,8 @@ class Member:
         self.name = name
         self.boot = boot
         self.refusal = ""
+        self.problem = ""
+        """Why the run's deployment cannot be used on this machine."""
         self.build: Build | None = None
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
@@ -73,9 +105,9 @@ class Member:
     def take_build(self, build: Build | Piece) -> bool:
         """Accept the supervisor's answer to hello, and then the files that it refers to; True when all have arrived.
 
-        False also for a message to another boot, or a duplicate.
+        False also for a message to another boot, or a duplicate. Raises NotValidHere: this process cannot take part.
         """
-        if build.boot != self.boot:
+        if build.boot != self.boot or self.problem:
             return False
         if self.build is not None:
             return isinstance(build, Build) and self._take_again(self.build, build)
@@ -98,7 +130,7 @@ class Member:
         try:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
-            raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
+            raise self._invalid(f"the deployment is not valid on its machine: {error.problems[0]}") from None
         if not deployment.lacks_files:  # else when they have come
             build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self._coming = build, deployment, Fetching(deployment, self._files)
@@ -109,12 +141,18 @@ class Member:
         try:
             deployment = deployment.with_assets(fetching.contents())
         except AssetError as error:
-            raise Malformed(f"a build with a file that is not valid here: {error}") from None
+            raise self._invalid(f"a file of the deployment is not valid on its machine: {error}") from None
         self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self.deployment = deployment
         self.build = build
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
+
+    def _invalid(self, what: str) -> NotValidHere:
+        self.problem = sendable(f"lost {self.name}: {what}")[: limits.TEXT_LENGTH_MAX]
+        self._coming, self.deadline_ns = None, 0
+        self._actions.append(Log("error", self.problem))
+        return NotValidHere(self.problem)
 
     def _fetch(self, fetching: Fetching) -> None:
         """Request the next missing piece."""
@@ -215,6 +253,10 @@ class Member:
             return
         if self.refusal:
             self.deadline_ns = now_ns + AGAIN_NS
+            return
+        if self.problem:
+            self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
+            self.deadline_ns = now_ns + limits.HEARTBEAT_NS
             return
         if self._coming is not None:
             self._fetch(self._coming[2])

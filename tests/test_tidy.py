@@ -336,6 +336,31 @@ def test_no_running_random_generator() -> None:
     assert not wrong, "\n".join(wrong)
 
 
+# What numpy hands to BLAS and LAPACK, or sums in an order of its own, by attributes of its modules and arrays.
+INEXACT = {"dot", "vdot", "inner", "matmul", "tensordot", "einsum", "linalg", "polyfit", "cov", "corrcoef"}
+ARRAYS = {"np", "numpy"}
+
+
+def test_no_blas_and_no_lapack() -> None:
+    """Their bits differ from one library, processor and count of rows to the next; a world has the same bits
+    everywhere. This holds for what a world is made of, and for the fates of packets."""
+    wrong = []
+    for path in python_files("common", "world", "node", "vhub"):
+        wrong += [
+            f"{name_of(path)}:{line}: imports {name}"
+            for line, name in imports_of(path)
+            if name.startswith(("numpy.linalg", "scipy")) or (name.startswith("numpy.") and name[6:] in INEXACT)
+        ]
+        for node in nodes_of(path):
+            if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
+                wrong.append(f"{name_of(path)}:{node.lineno}: a product of matrices: {ast.unparse(node)}")
+            elif isinstance(node, ast.Attribute) and node.attr in INEXACT:
+                of = ast.unparse(node.value)
+                if of in ARRAYS or of.startswith(("np.", "numpy.")) or node.attr in ("dot", "linalg"):
+                    wrong.append(f"{name_of(path)}:{node.lineno}: {of}.{node.attr}")
+    assert not wrong, "\n".join(wrong)
+
+
 def test_functions_are_short() -> None:
     long = [
         f"{name_of(path)}:{node.lineno}: {node.name}"

@@ -1,5 +1,6 @@
 """The wheel that pip builds from the sdist: it holds every module; what is compiled in it computes the same bits."""
 
+import json
 import os
 import re
 import shutil
@@ -11,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from tests.world.test_guide import PACKAGE, USES, examples
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = tuple(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"].values())
@@ -25,6 +28,7 @@ RUNS = {
         *("--set", f"network={{{AIR}}}"),
     ),
     "warehouse": ("warehouse.yaml", "--for", "1s"),
+    "yard": ("yard.yaml", "--for", "1s"),
 }
 pytestmark = pytest.mark.timeout(900)  # the compiler alone takes a minute of a core that others use as well
 
@@ -123,6 +127,39 @@ def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_
     command = installed.commands / "foosim-supervisor"
     shown = run(command, "check-component", "motor_current", *options, cwd=tmp_path, PYTHONPATH=str(tmp_path))
     assert "sensor motor_current: the same world on 1, 2 and 3 nodes" in shown
+
+
+@pytest.mark.parametrize(
+    ("names", "shows"),
+    [
+        (("currents.py", "low_pass.py"), "score"),
+        (("laps.py", "service.py"), "laps"),
+        (("omni.py",), "world"),
+        (("yards.py",), "world"),
+    ],
+)
+def test_the_guides_examples_run_from_an_empty_folder(
+    installed: Installed, tmp_path: Path, names: tuple[str, ...], shows: str
+) -> None:
+    """Each file as the guide has it, those of one deployment together, the package as pip installs it."""
+    use, files = USES[names[0]], examples()
+    needed = {*names, *use.files}
+    for name in needed:
+        (tmp_path / name).write_text(files[name])
+    if use.is_package:
+        (tmp_path / PACKAGE).write_text(files[PACKAGE])
+        pip = sys.executable, "-m", "pip", "--python", installed.commands / "python", "install"
+        run(*pip, "--no-deps", "--no-index", "--no-build-isolation", "--target", "packages", ".", cwd=tmp_path)
+        for name in needed - {use.deployment}:
+            (tmp_path / name).unlink()
+    if use.deployment not in needed:
+        shutil.copy(ROOT / use.deployment, tmp_path)
+    folder = tmp_path / "packages" if use.is_package else tmp_path
+    sets = [word for name in names for word in USES[name].arguments]
+    deployment, command = Path(use.deployment).name, installed.commands / "foosim-rehearse"
+    options = [deployment, "--set", "engine=pure", *sets, "--for", "400ms", "--json"]
+    result = json.loads(run(command, *options, cwd=tmp_path, PYTHONPATH=str(folder)))
+    assert result["ticks"] > 0 and not result["failed"] and shows in result
 
 
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")

@@ -18,11 +18,13 @@ key() {
 }
 
 # The first Python on PATH that satisfies a condition over `v`, its version. It must really run (pyenv leaves commands
-# on PATH that only print an error) and be able to make environments (Debian packs ensurepip apart from Python).
+# on PATH that only print an error) and be able to make environments (Debian packs ensurepip apart from Python). The
+# environment that is replaced is none: it may be the one that is active.
 python_where() {
     (
         IFS=:
         for folder in $PATH; do
+            case $folder in "$PWD"/.venv/*) continue ;; esac
             for name in python3.11 python3 python3.14 python3.13 python3.12 python3.10 python3.9 python; do
                 if [ -x "$folder/$name" ] && "$folder/$name" -c "
 import sys, ensurepip, venv

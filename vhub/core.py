@@ -25,7 +25,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.handshake import Member
+from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import (
     CAPTURE,
@@ -40,6 +40,7 @@ from foosim.protocol.messages import (
     Down,
     End,
     Epoch,
+    FailedForm,
     Failure,
     Farewell,
     Heartbeat,
@@ -69,6 +70,7 @@ from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, re
 from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import Watching
 from foosim.world.assembly.initial_state import added_to, first_chain
+from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 
 HubAction = Action | RecordClosing | RecordEpoch
@@ -161,6 +163,7 @@ class HubCore:
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
+        self._failed: FailedForm | None = None
         self._patience = Patience(now_ns)
         clients = self.clients
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
@@ -195,6 +198,8 @@ class HubCore:
             if reader is None:
                 raise Malformed(f"the vHub does not read the channel {channel.name}")
             reader(message, payload, now_ns)
+        except NotValidHere as error:
+            self.lost = self.lost or error.what
         except Refused as error:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
@@ -212,8 +217,19 @@ class HubCore:
         Return True there: the shell performs `actions` and steps again; `sent_ns` is the time when they had left.
         Return False when the inputs allow no more. `now_ns` is the time of the messages that were received last.
         """
+        try:
+            return self._step(now_ns, sent_ns)
+        except ComponentError as error:  # such as a body that cannot be made here
+            self.fail(error)
+            return False
+
+    def _step(self, now_ns: int, sent_ns: int) -> bool:
         while self.state is not None and self.epoch > 0 and not self.finished:
             world = self._world
+            if self._failed is not None:
+                if self.ended is not None:
+                    self._finish(now_ns)
+                return False
             if world is not None and world.step is _Step.WRITTEN:
                 self._release_closed(world, sent_ns)
                 return True
@@ -627,6 +643,11 @@ class HubCore:
         """End the run, since it has lost what it cannot do without: a client, the capture, space for the journal."""
         self.give_up(lost(name, why))
 
+    def fail(self, error: ComponentError) -> None:
+        """A form has raised: close no more ticks, and have the run end."""
+        _, self._failed = failed_form(error)
+        self.give_up(sendable(str(error))[: limits.TEXT_LENGTH_MAX])
+
     def give_up(self, reason: str) -> None:
         """Ask the supervisor to end the run; the first reason counts."""
         if not self.lost:
@@ -641,7 +662,10 @@ class HubCore:
     def heartbeat(self) -> Heartbeat:
         """Return the heartbeat of now."""
         tick = 0 if self.state is None else self.state.closed + 1
-        return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, self._report())
+        report = self._report()
+        return Heartbeat(
+            channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report, failed=self._failed
+        )
 
     def _report(self, *, is_last: bool = False) -> bytes:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}

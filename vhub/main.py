@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 from msgspec.structs import replace
@@ -61,6 +61,7 @@ from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, first_head
 from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
+from foosim.world.components.view import ComponentError
 
 SWITCH_S = 0.0001
 """The interpreter's switch interval. Python's default of 5 ms would delay ticks: at each call of the loop into journal
@@ -343,11 +344,21 @@ class HubShell:
 
     def _keep(self, action: RecordClosing | RecordEpoch) -> None:
         if self._capture is not None:
-            self._capture.keep(action.closing if isinstance(action, RecordClosing) else action.epoch)
+            self._write(self._capture.keep, action.closing if isinstance(action, RecordClosing) else action.epoch)
 
     def _on_log(self, log: Log) -> None:
         if self._capture is not None and not self._is_closing:
-            self._capture.log(log.level, log.text, self.core.statistics().closed + 1)
+            self._write(self._capture.log, log.level, log.text, self.core.statistics().closed + 1)
+
+    def _write(self, put: Callable[..., None], *arguments: Any) -> None:
+        """Hand something to the capture, which ends, and the run with it, where a body cannot be drawn."""
+        try:
+            put(*arguments)
+        except ComponentError as error:
+            assert self._capture is not None
+            self._capture.leave()
+            self._capture = None
+            self.core.fail(error)
 
     def _log_text(self, level: str, text: str) -> None:
         self._log.log(logging.getLevelNamesMapping()[level.upper()], text)

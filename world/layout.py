@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from typing import Final
+from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Finding, Location
@@ -102,7 +102,8 @@ class Declared:
 
     `names` are the entities that are always there; `carried` what entities carry, by name; `memory` what the rules of
     the world remember of each entity of a model; `addable` the models of which a running world can have more; `fields`
-    those of the state of entities whose model has no fixed ones, by name.
+    those of the state of entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose
+    settings ask for a variant of their model.
     """
 
     names: frozenset[str] = frozenset()
@@ -110,6 +111,11 @@ class Declared:
     memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     addable: tuple[str, ...] = ()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    variants: Mapping[str, Model] = field(default_factory=dict)
+
+    def kind_of(self, name: str, model: str) -> Model:
+        """Return what there is to know of an entity, by its name and that of its model."""
+        return self.variants.get(name) or _model(model)
 
     def fields_of(self, name: str, kind: Model) -> Mapping[str, int]:
         """Return the fields of the state of an entity of a model."""
@@ -131,19 +137,20 @@ class Layout:
         entities = []
         position = 0
         for index, name in enumerate(sorted(models)):
-            kind = _model(models[name])
+            kind = declared.kind_of(name, models[name])
             its = declared.carried.get(name, NOTHING)
             start = position
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
-            counts = {**fields, **declared.remembered(kind), **its.solver}
+            counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
             for slot, count in counts.items():
                 offsets[slot] = position
                 position += count
             split = position
             for slot, count in its.owner.items():
-                offsets[slot], counts[slot] = position, count
+                offsets[slot] = position
                 position += count
+            counts.update(its.owner)
             entities.append(Entity(index, name, kind, start, split, position, offsets, counts, fields))
         self.entities: tuple[Entity, ...] = tuple(entities)
         self.size = position
@@ -156,7 +163,7 @@ class Layout:
             [
                 entity.offsets[slot] + place
                 for entity in entities
-                for slot, count in entity.counts.items()
+                for slot, count in _kept(entity.counts).items()
                 if isinstance(count, References)
                 for place in range(count)
             ]
@@ -166,6 +173,8 @@ class Layout:
         """Free rigid bodies, in name order."""
         self.couples = any(entity.is_rigid and entity.kind.couples for entity in entities)
         """Whether it has rigid bodies whose islands need a solve of their own."""
+        self.resting = tuple([entity for entity in entities if "slow_ticks" in entity.offsets])
+        """Bodies that may come to rest, in name order."""
         self.shared: dict[int, tuple[WorldSpec, object]] = {}
         """What the forms of this layout share, by the identity of the world, which is kept with it."""
         self._digest = b""
@@ -176,7 +185,7 @@ class Layout:
 
     def would_be_free(self, name: str, model: str) -> bool:
         """Whether an entity of this name and model is, or would be, a rigid body that nothing holds."""
-        kind = _model(model)
+        kind = self.declared.kind_of(name, model)
         return kind.is_rigid and LINEAR_VELOCITY in self.declared.fields_of(name, kind)
 
     @staticmethod
@@ -234,11 +243,12 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     if of_world:
         models[WORLD] = WORLD
     models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
-    fields = _fields(spec, models)
+    variants = _variants(spec)
+    fields = _fields(spec, {name: variants.get(name) or _model(model) for name, model in models.items()})
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
-    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields)
+    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields, variants)
     for name, model in added:
         if not addable:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")
@@ -248,11 +258,17 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     return Layout(models, declared)
 
 
-def _fields(spec: WorldSpec, models: Mapping[str, str]) -> dict[str, Mapping[str, int]]:
+def _variants(spec: WorldSpec) -> dict[str, Model]:
+    """Return what entities are whose settings ask for a variant of their model."""
+    everybody = [*spec.objects.items(), *spec.robots.items()]
+    found = ((name, one.model, registry.model_of(one)) for name, one in everybody)
+    return {name: kind for name, model, kind in found if kind is not registry.find_model(model)}
+
+
+def _fields(spec: WorldSpec, kinds: Mapping[str, Model]) -> dict[str, Mapping[str, int]]:
     """Return the fields of the state of entities whose model has no fixed ones."""
     found: dict[str, Mapping[str, int]] = {}
-    for name, model in models.items():
-        kind = _model(model)
+    for name, kind in kinds.items():
         if kind.declared is None:
             try:
                 found[name] = kind.fields_of(spec.settings_of(name), spec)
@@ -308,9 +324,9 @@ def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]
     of_world: dict[str, int] = {}
     for label, settings in world_rules(spec).items():
         rule = find_rule(settings)
-        of_world |= {f"{label}.{slot}": count for slot, count in rule.slots.items()}
+        of_world |= _behind(label, rule.slots)
         for model, slots in rule.each.items():
-            each.setdefault(model, {}).update({f"{label}.{slot}": count for slot, count in slots.items()})
+            each.setdefault(model, {}).update(_behind(label, slots))
     return each, of_world
 
 
@@ -318,7 +334,7 @@ def of_motion(model: Model) -> dict[str, int]:
     """Return the slots in which the motion of a model remembers."""
     if not model.motion:
         return {}
-    return {f"{MOTION}.{slot}": count for slot, count in find_motion(model).slots.items()}
+    return _behind(MOTION, find_motion(model).slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,7 +353,7 @@ class Declaring:
 def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Declaring]:
     """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
     place: Location = ("robots", name)
-    model = _model(robot.model)
+    model = registry.model_of(robot)
     fields = model.fields_of(robot, spec)
     joints = fields.get("joint_positions", 0)
     yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
@@ -347,7 +363,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = {f"{label}.{slot}": count for slot, count in find_entity_rule(rule).slots.items()}
+        slots = _behind(label, find_entity_rule(rule).slots_on(fields))
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
         component = registry.find_component("sensor", sensor.kind)
@@ -399,15 +415,15 @@ def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
     for label, settings in world_rules(spec).items():
         place: Location = ("rules", label) if label in spec.rules else tuple(_kit_with(spec, label))
         for model, slots in find_rule(settings).each.items():
-            named = {f"{label}.{slot}": count for slot, count in slots.items()}
+            named = _behind(label, slots)
             of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
-    seen: set[tuple[str, tuple[tuple[str, int], ...]]] = set()
+    seen: set[tuple[int, tuple[tuple[str, int], ...]]] = set()
     for name, robot in spec.robots.items():
         parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
-        alike = robot.model, tuple([(label, id(settings)) for label, settings in parts])
+        alike = id(registry.model_of(robot)), tuple([(label, id(settings)) for label, settings in parts])
         if alike not in seen:  # many robots of a fleet are
             seen.add(alike)
-            remembered = [one for model, one in of_rules if model in (_model(robot.model).name, ROBOTS)]
+            remembered = [one for model, one in of_rules if model in (registry.model_of(robot).name, ROBOTS)]
             yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
     for kit in kits_named(spec):
         for name, model in kit.entities.items():
@@ -443,7 +459,18 @@ def _slots_of_modifiers(
 
 
 def _slots(name: str, component: Component, settings: ComponentSettings, carrier: Carrier) -> dict[str, int]:
-    return {f"{name}.{field}": size for field, size in component.slots_on(settings, carrier).items()}
+    return _behind(name, component.slots_on(settings, carrier))
+
+
+def _kept(slots: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return slots, whose counts stay the objects that they are: compiled, a count that is taken as an `int` becomes a
+    plain one, which refers to nothing."""
+    return slots
+
+
+def _behind(name: str, slots: Mapping[str, int]) -> dict[str, int]:
+    """Return the slots of a component by their names on an entity."""
+    return {f"{name}.{slot}": count for slot, count in _kept(slots).items()}
 
 
 def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:

@@ -155,11 +155,11 @@ class Following:
             self._watched.keep(frame)
         return world.drawing.moment(frame, jump=jump, paused=self._is_paused)
 
-    def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
-        """Return the message with the overlays of the newest frame."""
+    def overlays(self, wanted: Collection[str]) -> list[dict[str, Any]]:
+        """Return the messages with the overlays of the newest frame."""
         if self._world is None or self._frame is None:
-            return None
-        return self._world.drawing.overlay(self._frame, wanted)
+            return []
+        return self._world.drawing.overlays(self._frame, wanted)
 
     def listen(self, wanted: Wanted) -> None:
         """Set what browsers watch from now on: nothing else is received."""

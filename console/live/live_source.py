@@ -253,9 +253,8 @@ class LiveSource:
         now_s = time.monotonic()
         if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
             self._overlay_s = now_s
-            overlay = self._following.overlay(wanted.overlays)
-            if overlay is not None:
-                feed.tell(overlay)
+            for message in self._following.overlays(wanted.overlays):
+                feed.tell(message)
 
 
 class _Newest(Inbox):

@@ -185,7 +185,8 @@ class FileSource:
         if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
             self._overlay_ns = now_ns + OVERLAY_NS
             drawing = self.recording.worlds[look.world].drawing
-            feed.tell(drawing.overlay(look.frame, self._wanted.overlays))
+            for message in drawing.overlays(look.frame, self._wanted.overlays):
+                feed.tell(message)
 
     def _describe(self, feed: Feed) -> None:
         if self._world >= 0:

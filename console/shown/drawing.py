@@ -36,8 +36,10 @@ class Drawing:
         """Return the moment of a frame of this layout."""
         return Moment(frame.tick, self.poser.poses(frame.values), frame.values, jump, paused)
 
-    def overlay(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
-        """Return the message with these overlays."""
+    def overlays(self, frame: Frame, wanted: Collection[str]) -> list[dict[str, Any]]:
+        """Return the message with these overlays, and a note of each sensor that cannot be drawn from here on."""
         if self._overlays is None:
             self._overlays = Overlays(self.deployment, self.layout)
-        return self._overlays.content(frame, wanted)
+        content = self._overlays.content(frame, wanted)
+        notes = [{"type": "note", "level": "error", "text": text} for text in self._overlays.failures()]
+        return [content, *notes]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from foosim.deployment.schema import Deployment
-from foosim.world.components.fitted import sensors_of
+from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.view import ComponentError, called
 from foosim.world.forms import registry
+from foosim.world.forms.failures import WrongResult
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout
+from foosim.world.layout import Entity, Layout
 
 
 class Overlays:
@@ -19,14 +21,15 @@ class Overlays:
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._layout = layout
-        self._groups: dict[tuple[Any, int], list[Any]] = {}
+        self._groups: dict[tuple[Any, int], list[FittedSensor]] = {}
         """Sensors that send rays, by their class and the length of their readings."""
+        self._failures: list[str] = []
         for robot in layout.robots:
             kinds = {sensor.kind for sensor in deployment.robots[robot.name].sensors.values()}
             if any(hasattr(registry.find_component("sensor", kind).made, "rays") for kind in kinds):
-                for fitted in sensors_of(deployment, layout, robot):
+                for fitted in self._sensors_of(deployment, layout, robot):
                     if hasattr(fitted.sensor, "rays"):
-                        self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted.sensor)
+                        self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted)
 
     def content(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
         """Return the content of the message `overlay` but for its source and generation."""
@@ -36,6 +39,18 @@ class Overlays:
             "contacts": self._contacts(frame) if "contacts" in wanted else [],
             "rays": self._rays(frame) if "rays" in wanted else [],
         }
+
+    def failures(self) -> list[str]:
+        """Return which sensors have no rays from here on, and why: those that this was not said of yet."""
+        found, self._failures = self._failures, []
+        return found
+
+    def _sensors_of(self, deployment: Deployment, layout: Layout, robot: Entity) -> Sequence[FittedSensor]:
+        try:
+            return sensors_of(deployment, layout, robot)
+        except ComponentError as error:
+            self._failures.append(str(error))
+            return ()
 
     def _contacts(self, frame: Frame) -> list[tuple[float, ...]]:
         """Return where free bodies touched something in the tick, and the impulse (N s): what is rigid meets those."""
@@ -49,6 +64,38 @@ class Overlays:
     def _rays(self, frame: Frame) -> list[list[float]]:
         """Return both ends of each ray (m)."""
         found: list[list[float]] = []
-        for (kind, _), sensors in self._groups.items():
-            found += np.round(kind.rays(sensors, frame.numbers), 4).tolist()
+        for sensors in self._groups.values():
+            try:
+                found += _rays_of(sensors, frame)
+            except ComponentError:
+                found += self._rays_of_each(sensors, frame)
         return found
+
+    def _rays_of_each(self, sensors: list[FittedSensor], frame: Frame) -> list[list[float]]:
+        """Return the rays of those that have some; the others are asked no more."""
+        found: list[list[float]] = []
+        for fitted in [*sensors]:
+            try:
+                found += _rays_of([fitted], frame)
+            except ComponentError as error:
+                sensors.remove(fitted)
+                self._failures.append(str(error))
+        return found
+
+
+def _rays_of(sensors: Sequence[FittedSensor], frame: Frame) -> list[list[float]]:
+    """Return both ends of each ray (m). Raises ComponentError, of the first of several."""
+    if not sensors:
+        return []
+    first = sensors[0]
+    return called(f"rays of sensor {first.channel}", first.robot, frame.tick, _drawn, sensors, frame.numbers)
+
+
+def _drawn(sensors: Sequence[FittedSensor], numbers: list[float]) -> list[list[float]]:
+    rays = type(sensors[0].sensor).rays  # type: ignore[attr-defined]
+    given = rays([fitted.sensor for fitted in sensors], numbers)
+    is_fit = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim == 2 and given.shape[1] == 6
+    if not (is_fit and np.isfinite(given).all()):
+        raise WrongResult(rays, "an array of finite numbers of shape (rays, 6)", given)
+    ends: list[list[float]] = np.round(given, 4).tolist()
+    return ends

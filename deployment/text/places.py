@@ -8,12 +8,14 @@ member of a fleet; it is reported once, at its place.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
 from foosim.common.errors import describe
 from foosim.common.finding import Finding, Location, path_text
 from foosim.deployment.text.expand import ENTRIES
+from foosim.deployment.text.fleets import AXES, SPACING
 from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree
 
@@ -47,8 +49,11 @@ class Places:
             there = self._find(finding.other)
             if place.rank < there[0].rank and there[0].rank > SETS_RANK:  # it was set after the file
                 finding, (place, is_key, depth) = finding.other, there
-        location = finding.location
         written = (self._keys if is_key else self._values).get(place, ())
+        if is_key and written[2:-1] == (SPACING,):
+            axes = ", ".join(axis for axis in AXES if axis in finding.valid) or "none"
+            finding = replace(finding, location=written, what=f"unknown key (there are: {axes})", nearest=None)
+        location = finding.location
         if written[:1] and written[0] in _AS_WRITTEN and not (is_made and written[0] == TEMPLATES):
             location = (*written, *location[depth:])
         path = path_text(location if finding.at == "value" else location[:-1])

@@ -20,6 +20,7 @@ from foosim.vhub.line_of_sight.occlusion import PAIRS_KEPT, Sight
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
 from foosim.vhub.radio.propagation import LOSS_MAX_DB
 from foosim.vhub.radio.shadowing import CELLS_KEPT
+from foosim.world.clearance.solids import Standing
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 
@@ -54,7 +55,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers that ticks do not bound."""
-CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight)
+CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight, Standing)
 """Types that do not grow, or belong to one frame."""
 SIMPLE: Final = frozenset({bool, bytes, float, int, str, type(None)})
 """Types without contents."""

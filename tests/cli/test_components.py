@@ -102,7 +102,14 @@ TOLD: Final = {
     ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
     ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)", "can be added: ball"],
-    ("entity_rule", "battery"): ["needs a model with: charge, wheel_speeds, position", "writes: charge"],
+    ("entity_rule", "battery"): ["slots: charge", "slots that are the model's where it has them: charge"],
+    ("model", "differential_drive"): [
+        "moved by: differential_drive",
+        "with dynamics: rigid, moved by: an engine; slots: position[3], orientation[4], linear_velocity[3], "
+        "angular_velocity[3], contacts[3], partners[4], partner_impulses[4], slow_ticks, quarantined, "
+        "joint_positions[2], joint_velocities[2], joint_efforts[2], heading, wheel_speeds[2], wheel_travel[2], down, "
+        "refused",
+    ],
     ("sensor", "pose"): ["modifiers: a list: of modifiers, see components modifier (default [])"],
 }
 

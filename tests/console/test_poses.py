@@ -85,4 +85,7 @@ def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str])
     rover = [units["rover01", field] for field in ("heading", "wheel_speeds", "wheel_travel", "charge")]
     assert rover == ["rad", "m/s", "m", "J"] and shown["addable"] == []
     assert not any(body["pushable"] or body["removable"] for body in shown["bodies"])
-    assert shown["marks"] == {"empty": {"look": "lost", "text": "empty batteries", "cut": False}}
+    assert shown["marks"] == {
+        "empty": {"look": "lost", "text": "empty batteries", "cut": False},
+        "failed": {"look": "lost", "text": "forms that failed", "cut": False},
+    }

@@ -186,7 +186,7 @@ def test_the_pure_engine_says_that_it_has_no_meshes() -> None:
 AUDIT: Final = """
 import os, sys
 from pathlib import Path
-import foosim.world.mesh_files  # else imported with the first mesh
+import foosim.world.clearance.table_clearance, foosim.world.mesh_files  # else imported with the first mesh
 from foosim.deployment.assets import pin_assets
 folder, opened, text = Path(sys.argv[1]), [], sys.stdin.read()
 def watch(event, given):

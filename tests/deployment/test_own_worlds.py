@@ -156,7 +156,7 @@ def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
     assert problems("robots.camera={model: 'own_form:Own', sensors: {own: {kind: encoder, rate: 100 Hz}}}",
                     "players={}") == [
         "robots.camera.sensors.own.kind: sensor that an omni cannot carry, which has no joint_positions (valid on: "
-        "rod), 'encoder'"
+        "differential_drive with dynamics: rigid, rod), 'encoder'"
     ]  # fmt: skip
 
 

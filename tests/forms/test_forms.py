@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from typing import Final
 
@@ -22,18 +23,19 @@ from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import FOLDERS, FORMS
 from tests.forms.limits import Edge, edges
-from tests.forms.worlds import WORLDS
+from tests.forms.worlds import VARIANTS, WORLDS, World
 
-Key = tuple[str, str]
+Key = tuple[str, ...]
 TICKS: Final = 100
 NAME: Final = "world.yaml"
 OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque")]
 """What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has these."""
-EACH: Final = pytest.mark.parametrize("key", WORLDS, ids="-".join)
+ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
+EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
 
 
 @cache
-def own() -> list[Key]:
+def own() -> list[tuple[str, str]]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
     return sorted((form.form, form.name) for form in found if form.module == f"{FOLDERS[form.form]}.{form.name}")
 
@@ -67,13 +69,13 @@ def changed(text: str) -> set[str]:
 
 @EACH
 def test_it_obeys_the_laws(key: Key) -> None:
-    assert broken(WORLDS[key].text()) == []
+    assert broken(ALL[key].text()) == []
 
 
 @EACH
 def test_its_world_moves(key: Key) -> None:
     """A world in which nothing happens would prove nothing: robots go where they are told, sensors measure."""
-    moved = changed(WORLDS[key].text())
+    moved = changed(ALL[key].text())
     assert any(slot.endswith(("joint_positions", "wheel_travel", "angular_velocity")) for slot in moved)
     if key[0] == "sensor" or key[0] == "modifier":
         assert any(slot.endswith("own.samples") for slot in moved)
@@ -81,8 +83,8 @@ def test_its_world_moves(key: Key) -> None:
 
 @EACH
 def test_settings_beyond_their_limits_are_refused_at_their_place(key: Key) -> None:
-    world = WORLDS[key]
-    for edge in edges(registry.find(*key), world):
+    world = ALL[key]
+    for edge in edges(registry.find(*key[:2]), world):
         problem = problem_of(key, edge)
         place = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, (*world.place, *edge.place))))
         if not edge.is_within:
@@ -92,7 +94,7 @@ def test_settings_beyond_their_limits_are_refused_at_their_place(key: Key) -> No
 def problem_of(key: Key, edge: Edge) -> str:
     """Return why a deployment with the setting is refused; nothing where it is not."""
     try:
-        load_deployment(WORLDS[key].text((edge.place, edge.value)), NAME)
+        load_deployment(ALL[key].text((edge.place, edge.value)), NAME)
     except DeploymentError as error:
         return str(error)
     return ""
@@ -102,7 +104,7 @@ def problem_of(key: Key, edge: Edge) -> str:
 @pytest.mark.parametrize("seed", range(1, 4))
 @EACH
 def test_it_obeys_the_laws_for_long(key: Key, seed: int) -> None:
-    text = WORLDS[key].text().replace("seed: 1\n", f"seed: {seed}\n")
+    text = ALL[key].text().replace("seed: 1\n", f"seed: {seed}\n")
     assert list(broken_laws(text, NAME, 2_000, seed)) == []
     assert list(elsewhere(text, NAME, 2_000)) == []
 
@@ -111,9 +113,9 @@ def test_it_obeys_the_laws_for_long(key: Key, seed: int) -> None:
 @EACH
 def test_settings_at_their_limits_run_or_are_refused(key: Key) -> None:
     """On two nodes as on one."""
-    for edge in edges(registry.find(*key), WORLDS[key]):
+    for edge in edges(registry.find(*key[:2]), ALL[key]):
         if edge.is_within and not problem_of(key, edge):
-            text = WORLDS[key].text((edge.place, edge.value))
+            text = ALL[key].text((edge.place, edge.value))
             one, two = (rehearse(text, NAME, 200, nodes) for nodes in (1, 2))
             assert not one.json["failed"], (edge.label, one.json["reason"])
             assert one.digests == two.digests, edge.label

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
+from math import inf
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -23,6 +24,7 @@ Place = tuple[str | int, ...]
 RODS: Final = ("red.goal", "red.attack", "blue.goal", "blue.attack")
 ROVERS: Final = ("rover-1", "rover-2", "rover-3")
 SCENE: Final = ("field", "floor", "walls", "goal", "ramps")
+CHARGER: Final = {"tag": "vehicle", "radius": "1 m", "power": "2 W"}
 LINK: Final = {"id": "all", "from": "*", "to": "*", "delay": "2 ms", "loss": "10 %", "order": "fifo"}
 
 
@@ -34,12 +36,16 @@ class Driver:
         assert kind.value is not None
         self._value: type[Struct] = kind.value
         self._robots = parameters["robots"]
+        fields = PayloadCodec(kind.value, kind.name).fields
+        self._is_several = fields[-1].is_several
         bounds = parameters["bounds"]
-        found = [one for one in CommandEncoder(deployment).actuators(self._robots[0]) if one.limits]
-        limits = sorted(found[0].limits.items()) if found else []
-        least = [max(abs(low), abs(high)) for _, (low, high) in limits] * len(bounds)
-        self._bounds = [min(bound, most) for bound, most in zip(bounds, least, strict=False)] if limits else bounds
-        self._is_several = PayloadCodec(kind.value, kind.name).fields[-1].is_several
+        names = [fields[-1].name] * len(bounds) if self._is_several else [field.name for field in fields]
+        encoder = CommandEncoder(deployment)
+        self._bounds: dict[str, list[float]] = {}
+        for robot in self._robots:
+            limits = next((one.limits for one in encoder.actuators(robot) if one.limits), {})
+            most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
+            self._bounds[robot] = list(map(min, bounds, most))
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
@@ -50,7 +56,7 @@ class Driver:
         words = draw_words(draw_key(3, "driver", robot), tick)
         more = draw_words(draw_key(4, "driver", robot), tick)
         shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
-        numbers = [bound * share for bound, share in zip(self._bounds, shares, strict=False)]
+        numbers = [bound * share for bound, share in zip(self._bounds[robot], shares, strict=False)]
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 
 
@@ -165,6 +171,33 @@ def _solids() -> dict[str, Any]:
     }
 
 
+@cache
+def _drives() -> dict[str, Any]:
+    """Rigid robots on two wheels that push boxes, and one another."""
+    data: dict[str, Any] = json.loads(json.dumps(_solids()))
+    box = {"model": "box", "size": ["30 cm", "30 cm", "20 cm"], "mass": "3 kg", "surface": "frictionless"}
+    scan = {"kind": "laser_scanner", "rate": "10 Hz", "rays": 31, "range": "5 m", "at": {"x": "20 cm", "z": "15 cm"}}
+    rigid = {"model": "differential_drive", "dynamics": "rigid"}
+    robots: dict[str, Any] = {
+        "one": {**rigid, "at": {"x": "-50 cm"}, "bumper": "40 cm", "sensors": {"scan": scan}},
+        "three": {**rigid, "at": {"x": "50 cm", "y": "60 cm", "yaw": "-90 deg"}},
+        "two": {**rigid, "at": {"x": "50 cm", "yaw": "180 deg"}, "mass": "10 kg", "torque": "2 N m"},
+    }
+    robots["two"]["sensors"] = {
+        name: {"kind": name, "rate": "50 Hz"}
+        for name in ("contact", "imu", "joint_state", "odometry", "pose", "velocity")
+    }
+    return data | {
+        "surfaces": {"floor": {"friction": 0.7}},
+        "objects": {
+            "box": {**box, "at": {"y": "5 cm", "z": "10 cm"}},
+            "stack": {**box, "at": {"y": "5 cm", "z": "30 cm"}},
+        },
+        "robots": {name: {"sensors": {}, **robot} for name, robot in robots.items()},
+        "players": driver(tuple(robots), "v_w", (1.0, 2.0), "5 Hz"),
+    }
+
+
 def _pushed() -> World:
     """The same, with forces on the quadrotors."""
     data = json.loads(json.dumps(_solids()))
@@ -210,6 +243,7 @@ HALL: Final = World(_hall())
 EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude": "13.4 deg"}})
 YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
+DRIVES: Final = World(_drives())
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -290,7 +324,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
     ("rule", "football"): TABLE,
     ("rule", "zone"): World(YARD.data, ("rules", "corner")),
-    ("entity_rule", "battery"): HALL,
+    ("entity_rule", "battery"): YARD.with_(
+        ("robots", "base", "rules"),
+        {"own": {"kind": "battery", "capacity": "5 J", "idle": "1 W", "drag": "5 N", "chargers": [CHARGER]}},
+        ("robots", "base", "rules", "own"),
+    ),
     ("scene", "boxes"): World(YARD.data, ("scene",)),
     ("scene", "empty"): World(
         YARD.with_(("scene",), {"kind": "empty", "length": "9 m", "width": "9 m"}).data, ("scene",)
@@ -302,3 +340,8 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("engine", "bullet"): TABLE.with_(("engine",), "bullet", ()),
     ("engine", "pure"): TABLE,
 }
+
+VARIANTS: Final[Mapping[tuple[str, str, str], World]] = {
+    ("model", "differential_drive", "rigid"): World(DRIVES.data, ("robots", "one")),
+}
+"""Worlds of forms with their setting `dynamics`."""

@@ -26,8 +26,8 @@ from tests.solids import TICK_S, Solids, box, shape
 
 SEED: Final = 20
 KEY: Final = draw_key(SEED, "islands")
-PLACES_M: Final = (0.0, 1.6, 8.0, 12.0)
-"""Of the arms along x: the first two reach each other."""
+PLACES_M: Final = (0.0, 0.5, 8.0, 12.0)
+"""Of the arms along x: the first two hit each other."""
 JOINTS: Final = 7
 AXES: Final[tuple[Vector, ...]] = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 REACH_M: Final = 1.2
@@ -85,6 +85,8 @@ class Outcome:
     ticks: int = 0
     differing: list[int] = field(default_factory=list)
     contacts: float = 0.0
+    arms_met: int = 0
+    """Ticks in which an arm touched another one."""
     handovers: int = 0
     rebuilt: int = 0
     largest: int = 0
@@ -145,9 +147,16 @@ class Comparison:
                 outcome.differing.append(tick)
             self.world.numbers = whole
             outcome.contacts += sum(self.world.get(one.name, "contacts")[0] for one in self.world.entities)
+            outcome.arms_met += self._do_arms_touch()
             if outcome.differing and until_it_differs:
                 break
         return outcome
+
+    def _do_arms_touch(self) -> bool:
+        arms = [one for one in self.world.entities if one.name.startswith("arm")]
+        return any(
+            {int(met) for met in self.world.get(one.name, "partners")} & {arm.index for arm in arms} for one in arms
+        )
 
     def solve_whole(self, islands: Sequence[tuple[int, ...]], numbers: list[float]) -> None:
         for rows in islands:
@@ -190,6 +199,7 @@ def check(outcome: Outcome, contacts: float, handovers: int) -> None:
     print(f"seed {SEED}: {outcome}")
     assert outcome.contacts >= contacts and outcome.handovers >= handovers and outcome.rebuilt > 0
     assert outcome.largest >= 3, "arms and boxes share islands"
+    assert outcome.arms_met >= 100, "arms hit each other"
     assert outcome.differing == []
 
 
@@ -260,8 +270,22 @@ class InAnotherOrder(Comparison):
             self._solve(self.engine(self.whole, back), back, numbers)
 
 
+class HoldsAnothers(Comparison):
+    """Each engine of one side has a body of another island besides, where that is: solved, and not read."""
+
+    def solve_whole(self, islands: Sequence[tuple[int, ...]], numbers: list[float]) -> None:
+        before = numbers.copy()
+        for rows, others in zip(islands, [*islands[1:], islands[0]], strict=True):
+            held, solved = tuple(sorted({*rows, others[0]})), before.copy()
+            self._solve(self.engine(self.whole, held), held, solved)
+            for entity in (self.world.entities[row] for row in rows):
+                numbers[entity.start : entity.stop] = solved[entity.start : entity.stop]
+
+
 @pytest.mark.parametrize(
-    "kind", [of_engine(WithoutParking), InOneSolve, InAnotherOrder], ids=["no parking", "one solve", "order"]
+    "kind",
+    [of_engine(WithoutParking), InOneSolve, InAnotherOrder, HoldsAnothers],
+    ids=["no parking", "one solve", "order", "another's body"],
 )
 def test_a_rule_that_is_broken_is_seen(kind: type[Comparison]) -> None:
     outcome = compared(600, kind, until_it_differs=True)

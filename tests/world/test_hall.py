@@ -55,8 +55,7 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.actuators={drive: {kind: rod_position}}",
          "robots.rover01.actuators.drive.kind: actuator of a table in a world without one, 'rod_position'"),
         ("robots.base.sensors={cells: {kind: battery, rate: 1 Hz}}",
-         "robots.base.sensors.cells.kind: sensor that a station cannot carry, which has no charge (valid on: rover), "
-         "'battery'"),
+         "robots.base.sensors.cells.kind: on a robot without a battery: base has no rule battery, 'battery'"),
         ("robots.rover01.sensors.proximity.rays=0",
          "robots.rover01.sensors.proximity.rays: less than the least that is valid, 1, 0"),
         ("robots.rover01.sensors.proximity.rays=360",

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from hashlib import blake2b
+from itertools import permutations
 from math import pi
+from struct import pack
+from typing import Final
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.world.bodies import urdf, urdf_links
 from foosim.world.bodies.hull import convex_hull
 from foosim.world.bodies.inertia import (
     MassOf,
+    Principal,
     Tensor,
     about,
     check_mass,
@@ -19,10 +26,11 @@ from foosim.world.bodies.inertia import (
     combined,
     placed,
     principal_of,
+    quaternion_of,
     solid,
     turned,
 )
-from foosim.world.scene import ORIGIN, UPRIGHT, Box, Capsule, Cylinder, Hull, Sphere, Vector, from_rpy, turn
+from foosim.world.scene import ORIGIN, UPRIGHT, Box, Capsule, Cylinder, Hull, Sphere, Vector, from_rpy, rotate, turn
 
 
 def matrix(tensor: Tensor) -> NDArray[np.float64]:
@@ -138,3 +146,67 @@ def test_a_thin_plate_whose_numbers_were_rounded_is_a_body() -> None:
 def test_masses_that_no_robot_has_are_refused(mass: float) -> None:
     with pytest.raises(BadValue, match=r"kg, valid are 1e-06 to 1e\+06 kg"):
         check_mass(mass)
+
+
+# --- the same bits everywhere ----------------------------------------------------------------------------------------
+
+SEED: Final = 23
+BITS: Final = "4639fbedc9a0fbac"
+"""Digest of the inertias of `robot_of_boxes`, as computed by Jacobi rotations: on each machine, with each numpy."""
+
+
+def robot_of_boxes() -> bytes:
+    """Forty links whose inertias are drawn, neither diagonal nor about their origins, the first of them joined."""
+    words = iter([word for number in range(400) for word in draw_words(draw_key(SEED, "boxes"), number)])
+
+    def draw(low: float, high: float) -> str:
+        return repr(low + (high - low) * unit_interval(next(words)))
+
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links, joints = [f'<link name="base">{ball}</link>'], []
+    for number in range(40):
+        xyz = " ".join(draw(-0.2, 0.2) for _ in range(3))
+        moments = " ".join(f'i{axis * 2}="{draw(0.02, 0.03)}"' for axis in "xyz")
+        products = " ".join(f'i{axes}="{draw(-0.004, 0.004)}"' for axes in ("xy", "xz", "yz"))
+        mass = f'<origin xyz="{xyz}"/><mass value="{draw(0.5, 2.0)}"/><inertia {moments} {products}/>'
+        links.append(f'<link name="l{number}"><inertial>{mass}</inertial></link>')
+        joints.append(f'<joint name="j{number}" type="fixed"><parent link="base"/><child link="l{number}"/></joint>')
+    return f'<robot name="boxes">{"".join((*links, *joints))}</robot>'.encode()
+
+
+def bits_of_inertias() -> str:
+    """Digest of moments and axes of each link, and of all of them as one body."""
+    urdf._read.cache_clear()
+    robot = urdf.read_urdf("boxes.urdf", {"boxes.urdf": robot_of_boxes()})
+    whole = urdf.body_of(robot, "boxes", ORIGIN, UPRIGHT, fixed=False, surface="", speed_limit=1.0).links[0]
+    numbers = [number for link in (*robot.links, whole) for number in (*link.inertia, *link.principal)]
+    return blake2b(pack(f"<{len(numbers)}d", *numbers), digest_size=8).hexdigest()
+
+
+def by_lapack(tensor: Tensor) -> Principal:
+    """The same moments and axes as rotations give, in the same order and sense, but for the last bits."""
+    ours = principal_of(tensor)
+    values, vectors = np.linalg.eigh(matrix(tensor))
+    order = min(permutations(range(3)), key=lambda order: abs(values[list(order)] - ours.moments).sum())
+    axes = [rotate(ours.axes, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    columns = [vectors[:, number] for number in order]
+    columns = [np.copysign(1.0, (one * axis).sum()) * one for one, axis in zip(columns, axes, strict=True)]
+    x, y, z = (tuple(column.tolist()) for column in columns)
+    return Principal(tuple(values[list(order)].tolist()), quaternion_of((x, y, z)))
+
+
+def test_inertias_have_the_same_bits_everywhere() -> None:
+    assert bits_of_inertias() == BITS
+
+
+def test_lapack_in_the_inertia_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It gives the same inertias, to 14 digits: nothing but their bits tells."""
+    for tensor in drawn_tensors(50):
+        (moments, axes), ours = by_lapack(tensor), principal_of(tensor)
+        assert moments == pytest.approx(ours.moments, abs=1e-13 * max(ours.moments))
+        assert axes == pytest.approx(ours.axes, abs=1e-9)
+    monkeypatch.setattr(urdf_links, "principal_of", by_lapack)
+    assert bits_of_inertias() != BITS
+    monkeypatch.setattr(urdf_links, "principal_of", principal_of)
+    monkeypatch.setattr(urdf, "principal_of", by_lapack)
+    assert bits_of_inertias() != BITS

@@ -38,6 +38,11 @@ REFUSED: Final = {
     'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
     'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
     'model("own", SpecBase)': "its settings are a class derived from EntitySettings, not SpecBase",
+    'model("own", RobotSettings, variants=3)': "variants are a mapping of values of dynamics to what differs, not 3",
+    'model("own", RobotSettings, variants={"rigid": 3})': "variants are a mapping of values of dynamics to what "
+    "differs, not a mapping of 1",
+    'model("own", RobotSettings, variants={"rigid": {"is_rigid": True}})': "it has variants, and its settings have no "
+    "dynamics, which chooses one",
     'kit("own", Own)': "its settings are a class derived from SpecBase, not Own",
     'sensor("own", Settings, dict)': "its reading is a class derived from msgspec.Struct, not dict",
     'actuator("own", ActuatorSettings, 3)': "its command is a class derived from msgspec.Struct, not 3",
@@ -180,6 +185,20 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
 def test_a_model_has_the_fields_that_foosim_needs(site: Path, about: str, fields: list[str]) -> None:
     written(site, f"model('own', RobotSettings, {about})(Own)")
     assert [*find_model("own_form:Own").fields_of(None, None)] == fields
+
+
+def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
+    settings = ("class Moved(RobotSettings):", "    dynamics: str = 'none'", "")
+    about = "slots={'x': 1}, variants={'rigid': {'is_rigid': True, 'slots': {'y': 2}}}"
+    written(site, *settings, f"model('own', Moved, {about})(Own)")
+    model = find_model("own_form:Own")
+    asked: list[Any] = [
+        model.settings.model_validate({"model": "own_form:Own", "dynamics": its}) for its in ("none", "rigid")
+    ]
+    plain, rigid = (registry.model_of(its) for its in asked)
+    assert plain is model and (rigid.name, rigid.is_rigid) == ("own", True)
+    assert [*plain.fields_of(None, None)] == ["x", "down", "refused"]
+    assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "quarantined"]
 
 
 def test_foosims_own_models_keep_the_places_of_their_fields() -> None:

@@ -637,7 +637,7 @@ def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
     (problem,) = error.value.problems
     assert problem.endswith(
         "robots.camera.sensors.own.kind: sensor that a camera cannot carry, which has no joint_positions "
-        "(valid on: rod), 'own_tellers:Teller'"
+        "(valid on: differential_drive with dynamics: rigid, rod), 'own_tellers:Teller'"
     )
 
 

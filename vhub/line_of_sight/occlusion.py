@@ -14,7 +14,7 @@ from math import inf, sqrt
 from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.deployment.schema import Deployment
-from foosim.vhub.line_of_sight.pillars import Pillar, pillars_met_by
+from foosim.vhub.line_of_sight.pillars import Pillar, pillar, pillars_met_by
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
@@ -222,7 +222,7 @@ def _reach(body: Body) -> float | Pillar:
     (lx, ly, lz), (hx, hy, hz) = swept_box(body)
     if body.links[0].joint != "free":
         x, y = hx - lx, hy - ly
-        return Pillar(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
+        return pillar(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
     x, y, z = body.position
     x, y, z = max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))
     return sqrt(x * x + y * y + z * z)
@@ -330,7 +330,7 @@ class Sight:
             if isinstance(reach, float):
                 start = self._layout[name].offsets["position"]
                 x, y, z = self._numbers[start : start + 3]
-                pillars.append(Pillar(name, x, y, reach, z - reach, z + reach))
+                pillars.append(pillar(name, x, y, reach, z - reach, z + reach))
             else:
                 pillars.append(reach)
         return pillars

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from foosim.world.rays.boxes import MARGIN_M
 from foosim.world.scene import Vector
 
+Pillar: TypeAlias = tuple[str, float, float, float, float, float]
+"""The name of a body, and an upright cylinder around it: x, y, the square of its radius, its least and greatest z (m).
 
-class Pillar:
-    """An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name.
+A plain tuple, as every line of a frame is compared with each.
+"""
 
-    It is a little larger than what is given.
-    """
 
-    __slots__ = ("high_z", "low_z", "name", "reach", "x", "y")
-
-    def __init__(self, name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> None:
-        radius += MARGIN_M
-        self.name, self.x, self.y, self.reach = name, x, y, radius * radius
-        self.low_z, self.high_z = low_z - MARGIN_M, high_z + MARGIN_M
+def pillar(name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
+    """Return a pillar that is a little larger than what is given."""
+    radius += MARGIN_M
+    return name, x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M
 
 
 def pillars_met_by(pillars: list[Pillar], line: tuple[Vector, Vector]) -> list[str]:
@@ -27,8 +27,8 @@ def pillars_met_by(pillars: list[Pillar], line: tuple[Vector, Vector]) -> list[s
     square = way_x * way_x + way_y * way_y
     low_z, high_z = (az, bz) if az <= bz else (bz, az)
     met = []
-    for pillar in pillars:
-        aside = (pillar.x - ax) * way_y - (pillar.y - ay) * way_x
-        if aside * aside <= pillar.reach * square and pillar.high_z >= low_z and pillar.low_z <= high_z:
-            met.append(pillar.name)
+    for name, x, y, reach, bottom, top in pillars:
+        aside = (x - ax) * way_y - (y - ay) * way_x
+        if aside * aside <= reach * square and top >= low_z and bottom <= high_z:
+            met.append(name)
     return met

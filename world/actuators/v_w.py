@@ -11,6 +11,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
@@ -59,13 +60,13 @@ class MotionActuator:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
 
-    def command(self, view: View) -> tuple[tuple[float, float], ...]:
-        """Return (target speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
+    def command(self, view: View) -> Motors:
+        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
         linear, aside = view.numbers[self._at], view.numbers[self._at + 1] * self._half_track
         left, right = linear - aside, linear + aside
-        most, acceleration = self._wheels.speed, self._wheels.acceleration
+        most = self._wheels.speed
         fastest = max(abs(left), abs(right))
         if fastest > most:
             share = most / fastest
             left, right = left * share, right * share
-        return (left, acceleration), (right, acceleration)
+        return self._wheels.asked(left, right, view)

@@ -70,6 +70,10 @@ class WaypointActuator:
         x, y, z = view.read(self._position)
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
 
+    def unpowered(self) -> Motors:
+        """Return that there is no waypoint."""
+        return ()
+
     def command(self, view: View) -> Motors:
         """Return place (m) and heading (rad) to come to, each with the greatest speed there (m/s, rad/s), if any."""
         if view.numbers[self._given.at] == 0.0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
@@ -28,9 +29,8 @@ class DriveActuator:
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
         """Raises BadValue where the robot's model does not say what its wheels are."""
-        wheels = wheels_of(at.spec, at.layout, at.robot)
-        self._set_point = at.slot("set_point")
-        self._speed, self._acceleration = wheels.speed, wheels.acceleration
+        self._wheels = wheels_of(at.spec, at.layout, at.robot)
+        self._set_point, self._speed = at.slot("set_point"), self._wheels.speed
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest speed of each wheel (m/s); a command beyond is held within."""
@@ -50,7 +50,7 @@ class DriveActuator:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
 
-    def command(self, view: View) -> tuple[tuple[float, float], ...]:
-        """Return (target speed in m/s, greatest acceleration in m/s2) of the left and the right wheel."""
+    def command(self, view: View) -> Motors:
+        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
         left, right = view.read(self._set_point)
-        return (left, self._acceleration), (right, self._acceleration)
+        return self._wheels.asked(left, right, view)

@@ -30,9 +30,7 @@ class Rest:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.ticks = -(-REST_NS // spec.tick_ns)
-        self._slots = {
-            entity.index: entity.offsets["slow_ticks"] for entity in layout.entities if "slow_ticks" in entity.offsets
-        }
+        self._slots = {entity.index: entity.offsets["slow_ticks"] for entity in layout.resting}
 
     def may_rest(
         self, bodies: Sequence[Entity], movers: Sequence[Entity], numbers: Sequence[float], start: Sequence[float]
@@ -68,9 +66,9 @@ class Rest:
 def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
     """Begin to count anew for each body that an order or a rule of the world has changed."""
     old = before.numbers
-    for entity in layout.entities:
-        at = entity.offsets.get("slow_ticks")
-        if at is None or numbers[at] == 0.0 or entity.name not in before.layout:
+    for entity in layout.resting:
+        at = entity.offsets["slow_ticks"]
+        if numbers[at] == 0.0 or entity.name not in before.layout:
             continue
         was = before.layout[entity.name]
         for field in entity.fields:

@@ -49,7 +49,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def _has_rigid(spec: WorldSpec) -> bool:
-    return any(registry.find_model(one.model).is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
+    return any(registry.model_of(one).is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
 
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
@@ -64,8 +64,10 @@ def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
         for name, one in entities.items():
-            if hasattr(one, "surface"):
-                made.append(((section, name, "surface"), f"{one.model} {name}", [one.surface], felt.sides))
+            named = one.felt_surfaces if hasattr(one, "felt_surfaces") else {"surface": getattr(one, "surface", None)}
+            for key, surface in named.items():
+                if surface is not None:
+                    made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))
     for location, what, surfaces, known in made:
         for surface in dict.fromkeys(surfaces):
             if surface != FELT_BY_NOBODY and surface not in known:

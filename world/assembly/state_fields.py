@@ -18,7 +18,7 @@ def field_findings(spec: WorldSpec) -> Iterator[Finding]:
     Robots whose state is that of their model are checked with the file; of these, the files must have been given.
     """
     for name, robot in spec.robots.items():
-        model = registry.find_model(robot.model)
+        model = registry.model_of(robot)
         if model.declared is not None:
             continue
         place: Location = ("robots", name)

@@ -7,6 +7,7 @@ notice. Worlds of foosim's own forms are not tried: tests do that.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from math import isfinite
 from typing import Any, Final, TypeVar
 
@@ -115,7 +116,8 @@ class _Trial:
         """Make the rules of the world, and let them set their fields."""
         self._attempt(("rules",), "rules of the world", rules_of, self._spec, self._layout)
         if not self.found:
-            self._attempt(("rules",), "the start of the world", initial_numbers, self._spec, self._layout)
+            start = partial(initial_numbers, self._spec, self._layout, is_watched=True)
+            self._attempt(("rules",), "the start of the world", start)
 
     def try_components(self) -> None:
         """Make sensors and actuators, measure alone and together, ask for limits and motors."""

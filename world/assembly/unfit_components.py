@@ -4,6 +4,7 @@ is none."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 from foosim.common.finding import Finding
 from foosim.common.keyed_random import draw_key
@@ -13,15 +14,17 @@ from foosim.world.forms import registry
 from foosim.world.layout import build_layout
 from foosim.world.spec import WorldSpec
 
+SECTION_OF: Final = {"sensor": "sensors", "actuator": "actuators", "entity_rule": "rules"}
+
 
 def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
     """Yield what is wrong with components of a world whose single settings are right, each at its place."""
     having = [
         (name, form, channel, settings, made)
         for name, robot in spec.robots.items()
-        for form, components in (("sensor", robot.sensors), ("actuator", robot.actuators))
+        for form, components in (("sensor", robot.sensors), ("actuator", robot.actuators), ("entity_rule", robot.rules))
         for channel, settings in components.items()
-        if hasattr(made := registry.find_component(form, settings.kind).made, "check")
+        if hasattr(made := registry.find(form, settings.kind).made, "check")
     ]
     if not having:
         return
@@ -31,5 +34,5 @@ def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
         try:
             made.check(settings, Mounting(spec, layout, layout[name], channel, key, is_owners=form == "sensor"))
         except Misfit as error:
-            place = ("robots", name, f"{form}s", channel, *error.path)
+            place = ("robots", name, SECTION_OF[form], channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)

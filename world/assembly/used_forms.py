@@ -39,9 +39,9 @@ def _forms_of(spec: WorldSpec) -> Iterator[Form]:
     if spec.scene is not None:
         yield registry.find("scene", spec.scene.kind)
     for thing in spec.objects.values():
-        yield from _with_motion(registry.find_model(thing.model))
+        yield from _with_motion(registry.model_of(thing))
     for robot in spec.robots.values():
-        yield from _with_motion(registry.find_model(robot.model))
+        yield from _with_motion(registry.model_of(robot))
         for sensor in robot.sensors.values():
             yield from _with_modifiers("sensor", sensor)
         for actuator in robot.actuators.values():

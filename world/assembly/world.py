@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final
 
 from foosim.common.errors import Refused
@@ -21,7 +22,16 @@ from foosim.world.components.entities import (
     mounting_of,
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of, named_modifiers
-from foosim.world.components.view import Mounting, SolvingView, View, WritableView, called, called_of, component_error
+from foosim.world.components.view import (
+    ComponentError,
+    Mounting,
+    SolvingView,
+    View,
+    WritableView,
+    called,
+    called_of,
+    component_error,
+)
 from foosim.world.components.watching import Watched, places_of, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
@@ -34,6 +44,9 @@ from foosim.world.spec import WorldSpec
 
 NO_MOTORS: Final[Motors] = ()
 NO_TEXT: Final = "no text of"
+FAILED: Final = "failed"
+"""The kind of the mark of a rule whose marks cannot be told."""
+FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
 
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
@@ -65,6 +78,20 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     return rules
 
 
+def _watched_rules(spec: WorldSpec, layout: Layout, rules: Mapping[str, Rule]) -> dict[str, Any]:
+    """Return the rules of a world, each with what compares frames around it."""
+    watched: dict[str, Any] = {}
+    for label, settings in world_rules(spec).items():
+        writes = find_rule(settings).writes
+        places = [
+            place
+            for entity in layout.entities
+            for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
+        ]
+        watched[label] = Watched(rules[label], layout, places)
+    return watched
+
+
 def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies in the deployment's world. Raises ComponentError."""
     bodies: dict[str, Body] = {}
@@ -76,16 +103,30 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     return Scene(bodies, (*fixed_shapes(spec), *spec.scenery_shapes()))
 
 
-def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
-    """Return the numbers of a world at tick 0: each entity as its model places it, then what rules set."""
+def initial_numbers(
+    spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None, *, is_watched: bool = False
+) -> list[float]:
+    """Return the numbers of a world at tick 0: each entity as its model places it, then what its rules set, then
+    those of the world.
+
+    `models` are those of the layout where they are made already. `is_watched`: rules that write to them otherwise than
+    by their views are errors (`watching`). Raises ComponentError.
+    """
     numbers = [0.0] * layout.size
     for place in layout.references:
         numbers[place] = NO_ENTITY
     view = WritableView(0, numbers)
-    for index, model in models_of(spec, layout).items():
+    for index, model in (models_of(spec, layout) if models is None else models).items():
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
-    for label, rule in rules_of(spec, layout).items():
+    for robot in layout.robots:
+        if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
+            for label, own in _entity_rules_of(spec, layout, robot):
+                if hasattr(own, "place"):
+                    watched = _watched_entity_rule(spec, layout, robot, label, own) if is_watched else own
+                    called(f"rule {label}", robot.name, 0, watched.place, view)
+    rules = rules_of(spec, layout)
+    for label, rule in (_watched_rules(spec, layout, rules) if is_watched else rules).items():
         if hasattr(rule, "place"):
             called(f"rule {label}", WORLD, 0, rule.place, view)
     return numbers
@@ -153,7 +194,8 @@ def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     """Return the kinds of what rules mark, by name."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
-    return {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+    own = {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+    return {FAILED: FAILED_LOOK, **own}
 
 
 class WorldMarks:
@@ -161,22 +203,41 @@ class WorldMarks:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.layout = layout
-        self._rules: list[Any] = [rule for rule in rules_of(spec, layout).values() if hasattr(rule, "marks")]
-        self._entity_rules: list[tuple[str, Any]] = [
-            (robot.name, rule)
+        self._rules: dict[tuple[str, str], Any] = {
+            (WORLD, label): rule for label, rule in rules_of(spec, layout).items() if hasattr(rule, "marks")
+        }
+        self._rules |= {
+            (robot.name, label): rule
             for robot in layout.robots
             if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
-            for _, rule in _entity_rules_of(spec, layout, robot)
+            for label, rule in _entity_rules_of(spec, layout, robot)
             if hasattr(rule, "marks")
-        ]
+        }
+        """By entity and name: those of the world first."""
 
     def between(self, before: Frame, after: Frame) -> list[Marked]:
-        """Return what happened after one frame, up to a later one."""
-        found = [mark for rule in self._rules for mark in rule.marks(before, after)]
-        for robot, rule in self._entity_rules:
-            if robot in before.layout:
-                found += rule.marks(before, after)
+        """Return what happened after one frame, up to a later one.
+
+        A rule that raises, or gives something else than marks, is left out from then on, and a mark says so.
+        """
+        found: list[Marked] = []
+        for (entity, label), rule in [*self._rules.items()]:
+            if entity != WORLD and entity not in before.layout:
+                continue
+            try:
+                found += called(f"marks of rule {label}", entity, after.tick, _marks_of, rule, before, after)
+            except ComponentError as error:
+                del self._rules[entity, label]
+                found.append((after.tick, FAILED, str(error)))
         return found
+
+
+def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
+    found = [*rule.marks(before, after)]
+    for mark in found:
+        if not (isinstance(mark, tuple) and [*map(type, mark)] == [int, str, str]):
+            raise WrongResult(rule.marks, "a mark (tick, kind, text)", mark)
+    return found
 
 
 class World:
@@ -198,8 +259,19 @@ class World:
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
+        self._powers: dict[int, list[tuple[str, Any]]] = {}
+        """The rules that say whether an entity's drives have power, by its index."""
+        for index, its in self._entity_rules.items():
+            for label, rule in its:
+                if hasattr(rule, "has_power"):
+                    self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
+        self._derive: Mapping[int, Callable[[WritableView], None]] = {
+            entity.index: self.models[entity.index].derive  # type: ignore[attr-defined]
+            for entity in layout.entities
+            if entity.is_rigid and hasattr(self.models[entity.index], "derive")
+        }
 
     def _watch(self) -> None:
         """Put what compares frames around all forms."""
@@ -209,14 +281,7 @@ class World:
             index: Watched(model, layout, places_of(entities[index], *entities[index].offsets))
             for index, model in self.models.items()
         }
-        for label, settings in world_rules(spec).items():
-            writes = find_rule(settings).writes
-            places = [
-                place
-                for entity in entities
-                for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
-            ]
-            self._rules[label] = Watched(self._rules[label], layout, places)
+        self._rules = _watched_rules(spec, layout, self._rules)
         self.actuators = {
             index: tuple(watched_actuator(one, layout) for one in its) for index, its in self.actuators.items()
         }
@@ -227,13 +292,8 @@ class World:
             places = [place for entity in moved for place in places_of(entity, *writes, component="motion")]
             self._motions[name] = Watched(motion, layout, places)
         for index, its in self._entity_rules.items():
-            robot, rules = entities[index], spec.robots[entities[index].name].rules
             self._entity_rules[index] = tuple(
-                (
-                    label,
-                    Watched(rule, layout, places_of(robot, *find_entity_rule(rules[label]).writes, component=label)),
-                )
-                for label, rule in its
+                (label, _watched_entity_rule(spec, layout, entities[index], label, rule)) for label, rule in its
             )
 
     def forms(self) -> Iterator[tuple[object, str]]:
@@ -286,6 +346,9 @@ class World:
         found: list[Motors] = []
         for entity in entities:
             one = self._only.get(entity.index)
+            if entity.index in self._powers and not self._has_power(entity, view):
+                found.append(self._motors_without_power(entity, view))
+                continue
             if one is None:
                 found.append(self._motors_of_several(entity, view))
                 continue
@@ -305,17 +368,54 @@ class World:
             return NO_DRIVES
         motors = [FREE] * entity.counts.get("joint_positions", 0)
         wrench: Wrench | None = None
+        has_power = entity.index not in self._powers or self._has_power(entity, view)
         for one in fitted:
             try:
-                asked = one.actuator.command(view)
+                asked = one.actuator.command(view) if has_power else _without_power(one, view)
                 joints = getattr(one.actuator, "joints", None) or range(len(asked))
                 for joint, motor in zip(joints, asked, strict=True):
                     motors[joint] = Motor(*motor)
-                if hasattr(one.actuator, "wrench"):
+                if has_power and hasattr(one.actuator, "wrench"):
                     wrench = added(wrench, one.actuator.wrench(view))
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return Drives(tuple(motors), wrench)
+
+    def _has_power(self, entity: Entity, view: View) -> bool:
+        """Whether all rules of an entity that say so say that its drives have power."""
+        for label, rule in self._powers[entity.index]:
+            try:
+                answer = rule.has_power(view)
+                if answer is not True and answer is not False:
+                    raise WrongResult(rule.has_power, "True or False", answer)
+            except BaseException as error:
+                raise component_error(f"rule {label}", entity.name, view.tick, error) from error
+            if not answer:
+                return False
+        return True
+
+    def _motors_without_power(self, entity: Entity, view: View) -> Motors:
+        asked = NO_MOTORS
+        for one in self.actuators.get(entity.index, ()):
+            try:
+                asked += _without_power(one, view)
+            except BaseException as error:
+                raise one.failed(view.tick, error) from error
+        return asked
+
+    def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
+        """Let the models of these rigid bodies write what follows from their new state, where that is finite."""
+        if not self._derive:
+            return
+        view = WritableView(tick, numbers)
+        for entity in entities:
+            derive = self._derive.get(entity.index)
+            if derive is None or not isfinite(sum(numbers[entity.start : entity.split])):
+                continue
+            try:
+                derive(view)
+            except BaseException as error:
+                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
 
     def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
         """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""
@@ -393,6 +493,19 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
     return motions
 
 
+def _without_power(one: FittedActuator, view: View) -> Motors:
+    """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
+    unpowered = getattr(one.actuator, "unpowered", None)
+    asked: Motors = tuple((0.0, most) for _, most in one.actuator.command(view)) if unpowered is None else unpowered()
+    return asked
+
+
+def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: str, rule: EntityRule) -> Any:
+    """Return a rule of a robot with what compares frames around it."""
+    written = find_entity_rule(spec.robots[robot.name].rules[label]).written
+    return Watched(rule, layout, places_of(robot, *written, component=label))
+
+
 def _are_motors(asked: object, count: int | None) -> bool:
     """Whether that is what an actuator can ask of so many motors, or of any number."""
     return (
@@ -408,6 +521,6 @@ def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tu
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found = find_entity_rule(settings)
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
-        at = Mounting(spec, layout, robot, label, key, frozenset(found.writes))
+        at = Mounting(spec, layout, robot, label, key, frozenset(found.written))
         rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))
     return tuple(rules)

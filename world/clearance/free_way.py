@@ -87,29 +87,27 @@ class FreeWay:
         self._standing = Standing(standing, float(np.max(self._radius + self._way)))
         self._rigid_radius = np.array([one.radius for one in self._rigid])
 
-    def rows(self, entities: Sequence[Entity]) -> Places:
-        """Return which of those that move these are, for `near`."""
-        found = np.array([self._rows[entity.index] for entity in entities])
-        assert (self._way[found] > 0.0).all(), "the body of what moves says how fast it can be"
-        return found
+    def movers(self, entities: Sequence[Entity]) -> Movers:
+        """Return what these that move are to obstacles, for `near`."""
+        rows = np.array([self._rows[entity.index] for entity in entities])
+        way, radius = self._way[rows], self._radius[rows]
+        assert (way > 0.0).all(), "the body of what moves says how fast it can be"
+        return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius))
 
-    def near(self, rows: Places, view: SolvingView) -> Near:
+    def near(self, movers: Movers, view: SolvingView) -> Near:
         """Return what these may meet within the tick."""
         everybody = self._places.read(view.numbers)
-        places = everybody[rows]
-        return Near(
-            places,
-            (self._radius[rows], self._low[rows], self._high[rows]),
-            np.ceil(self._way[rows] / self._radius[rows]),
-            self._planes(rows, everybody),
-            self._solids(rows, places, view.numbers),
-        )
+        places = everybody[movers.rows]
+        planes, met = self._planes(movers, everybody), self._solids(movers, places, view.numbers)
+        return Near(places, movers, planes, met)
 
-    def _planes(self, rows: Places, everybody: Floats) -> _Planes:
+    def _planes(self, movers: Movers, everybody: Floats) -> _Planes:
         """Return the planes half-way to others that are near."""
-        who, other = pairs_near(everybody[rows], everybody, self._apart_m)
-        own = rows[who]
-        is_other = own != other
+        who, other = pairs_near(everybody[movers.rows], everybody, self._apart_m)
+        own = movers.rows[who]
+        is_other = (own != other).nonzero()[0]
+        if not len(is_other):
+            return _NO_PLANES
         who, own, other = who[is_other], own[is_other], other[is_other]
         here, there = everybody[own], everybody[other]
         dx, dy = there[:, 0] - here[:, 0], there[:, 1] - here[:, 1]
@@ -120,7 +118,9 @@ class FreeWay:
         above = np.maximum(over, under)
         reach = self._way[own] + self._way[other] + 2.0 * GAP_M
         is_upright = beside >= above
-        near = np.flatnonzero((beside < reach) & (above < reach) & ((way > 0.0) | ~is_upright))
+        near = ((beside < reach) & (above < reach) & ((way > 0.0) | ~is_upright)).nonzero()[0]
+        if not len(near):
+            return _NO_PLANES
         who, own, other, here = who[near], own[near], other[near], here[near]
         is_upright, way = is_upright[near], np.where(way[near] > 0.0, way[near], 1.0)
         nx, ny = np.where(is_upright, dx[near] / way, 0.0), np.where(is_upright, dy[near] / way, 0.0)
@@ -129,31 +129,33 @@ class FreeWay:
         room = np.where(is_upright, half, above[near] / 2.0 - GAP_M)
         return _Planes(who, nx, ny, nz, here[:, 0] * nx + here[:, 1] * ny + here[:, 2] * nz + room)
 
-    def _solids(self, rows: Places, places: Floats, numbers: Sequence[float]) -> _Met:
+    def _solids(self, movers: Movers, places: Floats, numbers: Sequence[float]) -> _Met:
         """Return the obstacles that are near, and who is in which of them already."""
         who, what = self._standing.near(places[:, 0], places[:, 1])
         found = self._standing.solids.at(what)
         if self._rigid:
-            moved, theirs = self._near_rigid(rows, places, numbers)
+            moved, theirs = self._near_rigid(movers, places, numbers)
             who, found = np.concatenate((who, moved)), joined((found, theirs))
+        if not len(who):
+            return _NOTHING_MET
         x, y, z = places[who].T
-        own = rows[who]
-        way, radius = self._way[own], self._radius[own] + found.radius
-        bottom, top = z + self._low[own], z + self._high[own]
+        way, radius = movers.way[who], movers.radius[who] + found.radius
+        bottom, top = z + movers.low[who], z + movers.high[who]
         depth = distance(*found.beside(x, y))
-        near = np.flatnonzero((depth < radius + way) & (found.low < top + way) & (found.high > bottom - way))
+        near = ((depth < radius + way) & (found.low < top + way) & (found.high > bottom - way)).nonzero()[0]
+        if not len(near):
+            return _NOTHING_MET
         who, found, depth, radius = who[near], found.at(near), depth[near], radius[near]
         over = np.minimum(found.high, top[near]) - np.maximum(found.low, bottom[near])
         return _Met(who, found, radius, depth, over, (depth < radius) & (over > 0.0))
 
-    def _near_rigid(self, rows: Places, places: Floats, numbers: Sequence[float]) -> tuple[Places, Solids]:
+    def _near_rigid(self, movers: Movers, places: Floats, numbers: Sequence[float]) -> tuple[Places, Solids]:
         """Return who may meet which shapes of rigid bodies, as these are placed now."""
         middles = np.array([_middle(one, numbers) for one in self._rigid])
         reach = self._apart_m + float(np.max(self._rigid_radius))
         who, other = pairs_near(places, middles, reach)
         dx, dy = middles[other, 0] - places[who, 0], middles[other, 1] - places[who, 1]
-        own = rows[who]
-        least = self._rigid_radius[other] + self._radius[own] + self._way[own]
+        least = self._rigid_radius[other] + movers.radius[who] + movers.way[who]
         near = np.flatnonzero(dx * dx + dy * dy <= least * least)
         who, other = who[near], other[near]
         rows_of: dict[int, list[tuple[float, ...]]] = {
@@ -164,6 +166,22 @@ class FreeWay:
             (mover, row) for mover, number in zip(who.tolist(), other.tolist(), strict=True) for row in rows_of[number]
         ]
         return np.array([mover for mover, _ in met], np.int64), solids(row for _, row in met)
+
+
+class Movers(NamedTuple):
+    """Bodies that one node moves: their rows among all that move, what they are to obstacles, how far they may go."""
+
+    rows: Places
+    radius: Floats
+    low: Floats
+    high: Floats
+    way: Floats
+    """At most in a tick (m)."""
+    pieces: Floats
+    """In so many pieces a way is looked at, so that none is longer than the radius."""
+
+
+_NOTHING: Final = np.zeros(0)
 
 
 class _Planes(NamedTuple):
@@ -182,6 +200,9 @@ class _Planes(NamedTuple):
         return found
 
 
+_NO_PLANES: Final = _Planes(np.zeros(0, np.int64), _NOTHING, _NOTHING, _NOTHING, _NOTHING)
+
+
 class _Met(NamedTuple):
     """Obstacles that are near: to whom, sum of radii, distance and common height at the start, and whether it is in."""
 
@@ -193,16 +214,17 @@ class _Met(NamedTuple):
     is_in: Flags
 
 
+_NOTHING_MET: Final = _Met(np.zeros(0, np.int64), solids([]), _NOTHING, _NOTHING, _NOTHING, np.zeros(0, np.bool_))
+
+
 class Near:
     """What some bodies may meet within one tick, whichever way they go."""
 
-    def __init__(
-        self, places: Floats, about: tuple[Floats, Floats, Floats], pieces: Floats, planes: _Planes, met: _Met
-    ) -> None:
+    def __init__(self, places: Floats, movers: Movers, planes: _Planes, met: _Met) -> None:
         self.places = places
         """Where they are at the start of the tick (m), of shape (n, 3)."""
-        _, self._low, self._high = about
-        self._pieces, self._planes, self._met = pieces, planes, met
+        self._low, self._high = movers.low, movers.high
+        self._pieces, self._planes, self._met = movers.pieces, planes, met
 
     def is_hit(self, start: Floats, ends: Floats) -> Flags:
         """Return who cannot be at these ends, coming from a start; both are places of shape (n, 3)."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import floor
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,24 +26,37 @@ CELLS_OF_ONE_MAX: Final = 4096
 CELLS_MAX: Final = 2**20
 """Cells lie this far from the origin at most, in either direction; what is farther out is in the last one."""
 STRIDE: Final = 2**22
+PLACES_FEW: Final = 64
+"""Of so many places at most cells are looked up one by one: it costs less than searching for all at once."""
+PAIRS_FEW: Final = 4096
+"""So many pairs at most are compared one and all: it costs less than sorting."""
 
 
-class Solids(NamedTuple):
+class Solids:
     """Footprints and heights (m): middle, unit vector along the first side, half of both sides, radius, band."""
 
-    x: Floats
-    y: Floats
-    along_x: Floats
-    along_y: Floats
-    half_along: Floats
-    half_across: Floats
-    radius: Floats
-    low: Floats
-    high: Floats
+    __slots__ = (
+        "along_x",
+        "along_y",
+        "columns",
+        "half_across",
+        "half_along",
+        "high",
+        "low",
+        "radius",
+        "x",
+        "y",
+    )
+
+    def __init__(self, columns: Floats) -> None:
+        """`columns` (9, n) are in that order."""
+        self.columns = columns
+        self.x, self.y, self.along_x, self.along_y, self.half_along, self.half_across = columns[:6]
+        self.radius, self.low, self.high = columns[6:]
 
     def at(self, chosen: Places | NDArray[np.bool_]) -> Solids:
         """Return those that are chosen."""
-        return Solids(*(column[chosen] for column in self))
+        return Solids(self.columns[:, chosen])
 
     def beside(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Return how far a place beside each is beyond its first and its second sides; negative between them."""
@@ -66,12 +79,12 @@ def solid(shape: Shape) -> tuple[float, ...]:
 
 def solids(rows: Iterable[tuple[float, ...]]) -> Solids:
     """Return rows as columns."""
-    return Solids(*np.array([*rows], float).reshape(-1, len(Solids._fields)).T.copy())
+    return Solids(np.array([*rows], float).reshape(-1, 9).T.copy())
 
 
 def joined(parts: Iterable[Solids]) -> Solids:
     """Return several one behind the other."""
-    return Solids(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return Solids(np.concatenate([one.columns for one in parts], axis=1))
 
 
 def distance(along: Floats, across: Floats) -> Floats:
@@ -92,9 +105,9 @@ def scenery_of(spec: WorldSpec) -> Iterator[Shape]:
 
 def cells_of(x: Floats, y: Floats, side: float) -> Places:
     """Return the numbers of the cells of a grid that places are in; the next cell in x has the next number."""
-    column = np.clip(np.floor(x / side), -CELLS_MAX, CELLS_MAX).astype(np.int64)
-    row = np.clip(np.floor(y / side), -CELLS_MAX, CELLS_MAX).astype(np.int64)
-    return row * STRIDE + column
+    column = np.minimum(np.maximum(np.floor(x / side), -CELLS_MAX), CELLS_MAX)
+    row = np.minimum(np.maximum(np.floor(y / side), -CELLS_MAX), CELLS_MAX)
+    return (row * STRIDE + column).astype(np.int64)
 
 
 def ranges(starts: Places, ends: Places) -> tuple[Places, Places]:
@@ -112,7 +125,7 @@ class Standing:
         self.solids = solids(rows)
         cells: dict[int, list[int]] = {}
         everywhere: list[int] = []
-        for number, row in enumerate(zip(*(column.tolist() for column in self.solids), strict=True)):
+        for number, row in enumerate(self.solids.columns.T.tolist()):
             x, y, along_x, along_y, half_along, half_across, radius, _, _ = row
             half_x = abs(along_x) * half_along + abs(along_y) * half_across + radius + reach_m
             half_y = abs(along_y) * half_along + abs(along_x) * half_across + radius + reach_m
@@ -125,7 +138,7 @@ class Standing:
             for line in lines:
                 for column in columns:
                     cells.setdefault(line * STRIDE + column, []).append(number)
-        self._everywhere = np.array(everywhere, np.int64)
+        self._everywhere, self._cells = np.array(everywhere, np.int64), cells
         keys = sorted(cells)
         self._keys = np.array(keys, np.int64)
         self._members = np.array([number for key in keys for number in cells[key]], np.int64)
@@ -134,24 +147,47 @@ class Standing:
     def near(self, x: Floats, y: Floats) -> tuple[Places, Places]:
         """Return pairs: the index of a place, and that of something that may be in its reach."""
         count = len(x)
-        who = np.repeat(np.arange(count), len(self._everywhere))
-        what = np.tile(self._everywhere, count)
-        if not len(self._keys):
+        who, what = self._near_few(x, y) if count <= PLACES_FEW else self._near_many(x, y)
+        if not len(self._everywhere):
             return who, what
+        everywhere = np.tile(self._everywhere, count)
+        return (
+            np.concatenate((np.repeat(np.arange(count), len(self._everywhere)), who)),
+            np.concatenate((everywhere, what)),
+        )
+
+    def _near_few(self, x: Floats, y: Floats) -> tuple[Places, Places]:
+        who: list[int] = []
+        what: list[int] = []
+        cells = self._cells
+        for index, cell in enumerate(cells_of(x, y, CELL_M).tolist()):
+            members = cells.get(cell)
+            if members is not None:
+                who += [index] * len(members)
+                what += members
+        return np.array(who, np.int64), np.array(what, np.int64)
+
+    def _near_many(self, x: Floats, y: Floats) -> tuple[Places, Places]:
+        if not len(self._keys):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
         cells = cells_of(x, y, CELL_M)
         at = np.minimum(np.searchsorted(self._keys, cells), len(self._keys) - 1)
         there = np.flatnonzero(self._keys[at] == cells)
         ends = self._ends[at[there]]
         starts = np.where(at[there] == 0, 0, self._ends[at[there] - 1])
         members, which = ranges(starts, ends)
-        return np.concatenate((who, there[which])), np.concatenate((what, self._members[members]))
+        return there[which], self._members[members]
 
 
 def pairs_near(own: Floats, others: Floats, reach_m: float) -> tuple[Places, Places]:
     """Return pairs of places of two kinds, shape (n, 2 or more), that are no farther apart in x and y than the reach.
 
-    Some that are farther apart are among them: all in neighbouring cells of a grid are.
+    Some that are farther apart are among them: of many, all in neighbouring cells of a grid are.
     """
+    if len(own) * len(others) <= PAIRS_FEW:
+        apart = np.abs(own[:, None, :2] - others[None, :, :2]) <= reach_m
+        who, other = (apart[:, :, 0] & apart[:, :, 1]).nonzero()
+        return who, other
     cells = cells_of(others[:, 0], others[:, 1], reach_m)
     order = np.argsort(cells, kind="stable")
     ordered, mine = cells[order], cells_of(own[:, 0], own[:, 1], reach_m)

@@ -22,7 +22,7 @@ PLACED_BY = ("at", "path")
 
 def start_findings(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the robots that start in scenery or in another robot. Meshes count once their files are there."""
-    names = [name for name, robot in spec.robots.items() if stands_upright(robot.model)]
+    names = [name for name, robot in spec.robots.items() if stands_upright(robot)]
     if not names:
         return
     layout = build_layout(spec)

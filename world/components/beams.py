@@ -10,12 +10,11 @@ import numpy as np
 
 from foosim.common.errors import BadValue
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.mounted import Mounted, MountedTogether
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, SensingView, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
-from foosim.world.rays.caster import Placement
 from foosim.world.rays.shapes import rotated
 from foosim.world.rays.solids import Meshes, solid_of
 from foosim.world.scene import Body, Link, Vector, shape_box
@@ -37,19 +36,20 @@ class BeamsTogether:
     """The beams of several sensors, which all have as many."""
 
     def __init__(self, several: Sequence[Beams]) -> None:
-        self._several = tuple(several)
+        self._around, self._mounts = several[0].around, MountedTogether([one.mount for one in several])
         self.count = len(several[0].directions)
         self._directions = np.array([one.directions for one in several]).transpose(2, 0, 1)
-        self._ranges = np.repeat(np.array([one.range_m for one in several]), self.count)
-        self._passed = np.repeat(np.array([one.entity.index for one in several], np.int64), self.count)
+        self._ranges = np.array([one.range_m for one in several])
+        self._passed = np.array([one.entity.index for one in several], np.int64)
 
     def distances(self, view: View) -> Floats:
         """Return how far it is from each mount to what its beams meet at the start of a tick (m): (sensors, beams).
 
         It is inf where that is nothing within a sensor's range.
         """
-        origins, ways = self.lines(view.start)
-        return self._cast(self._several[0].around.placement(view), origins, ways)
+        values = view.values if isinstance(view, SensingView) else None
+        placement = self._around.placement(view)
+        return placement.fans(*self.lines(view.start, values), self._ranges, self._passed)
 
     def ends(self, numbers: Sequence[float], nearest: Floats, farthest: Floats) -> Floats:
         """Return both ends (m) of each beam in a frame, to be drawn, of shape (beams of all, 6).
@@ -57,21 +57,15 @@ class BeamsTogether:
         They are where it is `nearest` from the mount, and where it meets something or is `farthest`: (sensors, beams).
         """
         origins, ways = self.lines(numbers)
-        placement = self._several[0].around.caster.at(numbers)
-        ranges = np.clip(self._cast(placement, origins, ways), nearest, farthest)
+        placement = self._around.caster.at(numbers)
+        ranges = np.clip(placement.fans(origins, ways, self._ranges, self._passed), nearest, farthest)
         first, last = (origins[:, :, None] + ways * way for way in (nearest, ranges))
         return np.concatenate((first, last)).reshape(6, -1).T
 
-    def lines(self, numbers: Sequence[float]) -> tuple[Floats, Floats]:
+    def lines(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
         """Return where mounts are (3, sensors) and the ways of beams (3, sensors, beams), in the world frame."""
-        poses = [one.mount.pose(numbers) for one in self._several]
-        turns = np.array([orientation for _, orientation in poses]).T
-        return np.array([place for place, _ in poses]).T, rotated(turns[:, :, None], self._directions)
-
-    def _cast(self, placement: Placement, origins: Floats, ways: Floats) -> Floats:
-        starts = np.repeat(origins.T, self.count, axis=0)
-        hits = placement.cast(starts, ways.reshape(3, -1).T, self._ranges, self._passed)
-        return hits.distances.reshape(-1, self.count)
+        places, turns = self._mounts.poses(numbers, values)
+        return places, rotated(turns[:, :, None], self._directions)
 
 
 def body_of(at: Mounting) -> Body:

@@ -45,7 +45,8 @@ class Model(Protocol):
     `check_place(position, velocity)` raises BadValue where a running world cannot have another one, and
     `place_at(view, position, velocity)` sets it there (m, m/s, world frame), for models that can be added;
     `out_of_bounds(numbers)` says what is wrong with a state that no run should come to, empty if nothing is;
-    `stir(view)` sets it in motion, for the fixed small run that tells engines apart.
+    `stir(view)` sets it in motion, for the fixed small run that tells engines apart;
+    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed, which is finite.
     """
 
     def body(self) -> Body | None:
@@ -86,7 +87,9 @@ class EntityRule(Protocol):
     """A rule of one entity. It is made from its settings and its mounting.
 
     A class may have `marks(before, after)` and `mark_kinds`, as a rule of the world may. It is asked about frames that
-    both have the entity.
+    both have the entity. It may have further methods: the static `check(settings, at)`, which raises Misfit where the
+    settings do not fit robot or world; `place(view)`, which writes what it has at tick 0; and `has_power(view)`: where
+    one of a robot's rules says False at a tick, its drives get none.
     """
 
     def apply(self, view: WritableView) -> None:

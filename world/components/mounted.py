@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.world.components.entities import mounting_of
@@ -11,7 +13,9 @@ from foosim.world.components.misfit import Misfit
 from foosim.world.components.view import Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
-from foosim.world.scene import Body, Quaternion, Vector, moved, multiply, rotate
+from foosim.world.rays.boxes import Floats
+from foosim.world.rays.shapes import multiplied, rotated
+from foosim.world.scene import Body, Quaternion, Vector, conjugate, moved, multiply, rotate
 
 OF_TWIST = ("linear_velocity", "angular_velocity")
 """Fields of a free body without which nobody knows how its places move."""
@@ -22,27 +26,71 @@ class Mounted:
 
     def __init__(self, at: Mounting, where: MountedAt) -> None:
         """Raises Misfit for a robot without a body, or a link that the robot does not have."""
-        self._entity = at.robot
+        self.entity = at.robot
         self._body = body_at(at)
         self.link = link_index(self._body, where.link)
-        self._position, self._orientation = where.position, where.orientation
+        self.position, self.orientation = where.position, where.orientation
+        link = self._body.links[self.link]
+        self.free_link = link if link.joint == "free" else None
+        """The link where that moves freely, by itself."""
 
     def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
         """Return the place (m) and the orientation of the mount, in the world frame, from the frame's numbers."""
-        _, position, orientation = forward_kinematics(self._body, self._entity, numbers)[self.link]
-        return moved(position, rotate(orientation, self._position), 1.0), multiply(orientation, self._orientation)
+        _, position, orientation = forward_kinematics(self._body, self.entity, numbers)[self.link]
+        return moved(position, rotate(orientation, self.position), 1.0), multiply(orientation, self.orientation)
 
     def twist(self, numbers: Sequence[float]) -> Twist:
         """Return the velocity of the mount (m/s) and how fast it turns (rad/s), both in the world frame."""
         place, _ = self.pose(numbers)
-        return twist(self._body, self._entity, numbers, self.link, place)
+        return twist(self._body, self.entity, numbers, self.link, place)
 
     def check_twist(self) -> None:
         """Raise Misfit where the robot's state does not say how fast its places move and turn."""
-        missing = [field for field in OF_TWIST if field not in self._entity.offsets]
+        missing = [field for field in OF_TWIST if field not in self.entity.offsets]
         if self._body.is_free and missing:
-            what = f"{self._entity.name} moves freely, and its state has no {', '.join(missing)}"
-            raise Misfit(("kind",), what, self._entity.model)
+            what = f"{self.entity.name} moves freely, and its state has no {', '.join(missing)}"
+            raise Misfit(("kind",), what, self.entity.model)
+
+
+class MountedTogether:
+    """Several places on robots. Those on free links are found at once, with the bits of each by itself."""
+
+    def __init__(self, several: Sequence[Mounted]) -> None:
+        self._several = tuple(several)
+        self._free = [place for place, one in enumerate(several) if one.free_link is not None]
+        self._jointed = [place for place, one in enumerate(several) if one.free_link is None]
+        free = [several[place] for place in self._free]
+        at = [one.entity.offsets for one in free]
+        fields = ("position", 3), ("orientation", 4)
+        self._places = np.array(
+            [offsets[name] + step for name, size in fields for step in range(size) for offsets in at], np.intp
+        ).reshape(7, -1)
+        links = [link for one in free if (link := one.free_link) is not None]
+        self._back = _columns([conjugate(link.principal) for link in links], 4)
+        self._centres = _columns([link.centre_of_mass for link in links], 3)
+        self._mounts = _columns([one.position for one in free], 3), _columns([one.orientation for one in free], 4)
+
+    def poses(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return places (3, n) (m) and orientations (4, n) of n mounts, in the world frame, from the frame's numbers.
+
+        `values` are the same as an array.
+        """
+        count = len(self._several)
+        places, orientations = np.empty((3, count)), np.empty((4, count))
+        if self._free:
+            state = (np.array(numbers) if values is None else values)[self._places]
+            turned = multiplied(state[3:], self._back)
+            place, orientation = self._mounts
+            middle = state[:3] - rotated(turned, self._centres)
+            places[:, self._free] = middle + rotated(turned, place)
+            orientations[:, self._free] = multiplied(turned, orientation)
+        for number in self._jointed:
+            places[:, number], orientations[:, number] = self._several[number].pose(numbers)
+        return places, orientations
+
+
+def _columns(rows: Sequence[Sequence[float]], size: int) -> Floats:
+    return np.array(rows).reshape(-1, size).T
 
 
 def body_at(at: Mounting) -> Body:

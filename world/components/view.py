@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from foosim.common.errors import Failed
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
@@ -24,7 +25,7 @@ if TYPE_CHECKING:  # numpy is for those who compute a tick
 Result = TypeVar("Result")
 
 
-class ComponentError(Exception):
+class ComponentError(Failed):
     """A form has raised, or returned what it must not: whichever node computes its tick, it would do so again.
 
     `component` is which one of `entity` it is, `cause` has its traceback.
@@ -287,7 +288,11 @@ class Modifier(Protocol):
 
 
 class Actuator(Protocol):
-    """What the tick of a node asks of an actuator. It is made from its settings and its mounting."""
+    """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
+
+    A class may have the method `unpowered()`, which returns what is asked of the motors of a robot without power. Where
+    there is none, that is a speed of 0 with the force or acceleration of `command`.
+    """
 
     def accept(self, command: Any, view: WritableView) -> bool:
         """Take a command, a value of the registered type, into the slots; False when it is refused."""

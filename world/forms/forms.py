@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -197,7 +197,7 @@ class Model(Form):
     that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and sends and
     receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a deployment.
     `units` are those of its fields' numbers, the last one standing for all behind it; fields that every model calls the
-    same need none.
+    same need none. `variants` are what it is instead where its setting `dynamics` has one of these values.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -212,6 +212,11 @@ class Model(Form):
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    variants: Mapping[str, Model] = field(default_factory=dict)
+
+    def variant(self, dynamics: object) -> Model:
+        """Return what entities of it are whose setting `dynamics` has this value."""
+        return self.variants.get(dynamics, self) if isinstance(dynamics, str) else self
 
     @property
     def is_solved(self) -> bool:
@@ -276,12 +281,22 @@ class EntityRule(Form):
     """What an entity does by itself, after it was solved, computed by the node that solves it.
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
-    that it changes.
+    that it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
+
+    def slots_on(self, fields: Collection[str]) -> dict[str, int]:
+        """Return its slots on an entity whose model has these fields."""
+        return {slot: size for slot, size in self.slots.items() if not (slot in self.shared and slot in fields)}
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The fields of an entity that it may change, where they are there."""
+        return (*self.writes, *self.shared)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

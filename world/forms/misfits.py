@@ -85,7 +85,7 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
         needs = (*needs, form.speaks)
     missing = [] if has is None else [field for field in needs if field not in has]
     if missing:
-        fitting = ", ".join(other.name for other in models_of(robots=True) if {*needs} <= {*(other.declared or ())})
+        fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing, has)}")
         yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
     if not isinstance(form, EntityRule):
@@ -95,6 +95,17 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
         yield f"{word} that writes {', '.join(written)}: {fields_of(model, written, has)}"
     if not model.is_solved:
         yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
+
+
+def _having(fields: Collection[str]) -> Iterator[str]:
+    """Yield the names of the models of robots whose state has these fields, and of their variants that alone do."""
+    for model in models_of(robots=True):
+        if {*fields} <= {*(model.declared or ())}:
+            yield model.name
+            continue
+        for dynamics, variant in model.variants.items():
+            if {*fields} <= {*(variant.declared or ())}:
+                yield f"{model.name} with dynamics: {dynamics}"
 
 
 def _speaks_by_model(sensor: Component) -> bool:

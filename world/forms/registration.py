@@ -58,6 +58,8 @@ def _problems(found: Form) -> Iterator[str]:
             yield from _slots(found.slots)
             yield from _names("needs", found.needs)
             yield from _names("writes", found.writes)
+            if isinstance(found, EntityRule):
+                yield from _names("shared", found.shared)
         case WorldRule():
             yield from _world_rule(found)
         case Kit():
@@ -114,6 +116,20 @@ def _model(found: Any) -> Iterator[str]:
     yield from _kinds("actuators", found.actuators)
     yield from _kinds("rules", found.rules)
     yield from _names("tags", found.tags)
+    yield from _variants(found)
+
+
+def _variants(found: Any) -> Iterator[str]:
+    variants = found.variants
+    if not isinstance(variants, Mapping) or not all(isinstance(one, Model) for one in variants.values()):
+        yield f"variants are a mapping of values of dynamics to what differs, not {_shown(variants)}"
+        return
+    if variants and "dynamics" not in found.settings.model_fields:
+        yield "it has variants, and its settings have no dynamics, which chooses one"
+    for value, variant in variants.items():
+        if variant.module != found.module:
+            yield f"its variant {show(value)} is of another module, {variant.module}"
+        yield from (f"its variant {show(value)}: {problem}" for problem in _model(variant))
 
 
 def _world_rule(found: Any) -> Iterator[str]:

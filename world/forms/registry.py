@@ -155,17 +155,27 @@ def modifier(
 def model(name: str, settings: type[EntitySettings], **about: Any) -> Callable[[Made], Made]:
     """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`.
 
-    The fields that foosim itself needs, and that it does not declare, come after those that it does.
+    The fields that foosim itself needs, and that it does not declare, come after those that it does. `variants` are
+    classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
+    `{"rigid": {"made": Rigid, "is_rigid": True, ...}}`.
     """
+    others: Any = about.pop("variants", {})
 
     def describe(made: Callable[..., Any]) -> Model:
         found = Model(form="model", name=name, made=made, settings=settings, **about)
-        declared: Any = found.slots
-        if not isinstance(declared, Mapping):
-            return found  # they follow from settings, or it is refused
-        return replace(found, slots={**declared, **{slot: 1 for slot in found.needed if slot not in declared}})
+        variants = others
+        if isinstance(others, Mapping) and all(isinstance(its, Mapping) for its in others.values()):
+            variants = {value: _with_needed(replace(found, **its)) for value, its in others.items()}
+        return replace(_with_needed(found), variants=variants)
 
     return _registering(describe)
+
+
+def _with_needed(found: Model) -> Model:
+    declared: Any = found.slots
+    if not isinstance(declared, Mapping):
+        return found  # they follow from settings, or it is refused
+    return replace(found, slots={**declared, **{slot: 1 for slot in found.needed if slot not in declared}})
 
 
 def motion(name: str, **about: Any) -> Callable[[Made], Made]:
@@ -264,6 +274,11 @@ def find_model(kind: str) -> Model:
     found = find("model", kind)
     assert isinstance(found, Model), found
     return found
+
+
+def model_of(settings: EntitySettings) -> Model:
+    """Return the model of entities with these settings: the variant of it that they ask for; raises like `find`."""
+    return find_model(settings.model).variant(getattr(settings, "dynamics", None))
 
 
 def names(form: str) -> list[str]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
 from foosim.common.plain_data import PlainData
-from foosim.world.clearance.table_clearance import clearance_findings
 from foosim.world.forms.registry import kit
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
@@ -60,7 +59,10 @@ class TableKit:
 
     def findings(self) -> Iterator[Finding]:
         """Yield the scenery that the table's bodies pass through."""
-        return clearance_findings(self._spec)
+        if self._spec.scenery:
+            from foosim.world.clearance.table_clearance import clearance_findings  # brings numpy
+
+            yield from clearance_findings(self._spec)
 
     @staticmethod
     def check(data: PlainData) -> Iterator[Finding]:

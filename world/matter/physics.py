@@ -82,17 +82,17 @@ class PhysicsSettings(SpecBase):
 
 
 DEFAULT: Final = "default"
-BASIC: Final = ("default", "floor", "walls")
+FRICTIONLESS: Final = "frictionless"
+"""The surface of what rolls or slides freely: of balls in casters."""
+BASIC: Final = ("default", "floor", "walls", FRICTIONLESS)
 """Surfaces that each world has; those of these names in a deployment replace them."""
 
 
 def physics_from(settings: PhysicsSettings | None, surfaces: Mapping[str, SurfaceSettings]) -> Physics:
     """Return what rigid bodies feel in a world without a kit that says it."""
     felt = PhysicsSettings.model_validate({}) if settings is None else settings
-    plain = SurfaceSettings.model_validate({})
-    sides = {
-        name: Side(one.restitution, one.friction, one.rolling_friction)
-        for name, one in {**dict.fromkeys(BASIC, plain), **surfaces}.items()
-    }
+    plain, smooth = SurfaceSettings.model_validate({}), SurfaceSettings.model_validate({"friction": 0})
+    known = {name: smooth if name == FRICTIONLESS else plain for name in BASIC} | dict(surfaces)
+    sides = {name: Side(one.restitution, one.friction, one.rolling_friction) for name, one in known.items()}
     nothing = Contact(0.0, 0.0)
     return Physics(felt.gravity, {}, nothing, felt.solver_iterations, felt.contact_erp, sides)

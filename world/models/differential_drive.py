@@ -1,68 +1,100 @@
-"""A round robot on two driven wheels, moved by kinematics."""
+"""A round robot on two driven wheels: moved by kinematics, or a rigid body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Final, Self
+from math import sqrt
+from typing import Final
 
-from pydantic import model_validator
-
-from foosim.common import units
-from foosim.common.errors import BadValue
-from foosim.common.spec_base import default
-from foosim.common.units import Quantity, custom_error
-from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import BODY
+from foosim.common.exact_math import atan2
+from foosim.world.components.view import Mounting, Slot, WritableView
+from foosim.world.forms.forms import BODY, JOINTS
 from foosim.world.forms.registry import model
 from foosim.world.moving.upright import Upright
-from foosim.world.moving.wheels import Wheels, slips_of
-from foosim.world.parameters.vehicles import (
-    Acceleration,
-    Slip,
-    Speed,
-    TurnRate,
-    Vehicle,
-    body_of,
-    is_in_reach,
-    set_down,
-    upright,
-)
+from foosim.world.moving.wheels import WheelMotors, Wheels, slips_of
+from foosim.world.parameters.differential import DifferentialDriveRobot, rigid_body
+from foosim.world.parameters.primitives import RIGID
+from foosim.world.parameters.vehicles import ROUNDING, body_of, is_in_reach, set_down, upright
 from foosim.world.scene import Body, Colour
 
 BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
-Track = Annotated[float, Quantity(units.LENGTH, "1 cm", "20 m")]
+GREEN: Final[Colour] = (0.15, 0.55, 0.35, 1.0)
+WHEELS: Final = {"heading": 1, "wheel_speeds": 2, "wheel_travel": 2}
+"""The heading of a robot, the speeds of its rims, and how far its wheels have turned."""
 
 
-class DifferentialDriveRobot(Vehicle):
-    """A round robot on two driven wheels, `track` apart. Its usual actuator is `motion`, of the kind `v_w`.
+class RigidDifferentialDrive:
+    """A round robot on two driven wheels, as a rigid body that stands on the floor.
 
-    `speed` and `acceleration` are those of the wheels' rims, and so of the robot straight on; it turns at most as fast
-    as `turn_rate`. On the ground each wheel rolls less far than it turns, by a share of its own between none and
-    `slip`. The sizes are those of usual research robots; they slip on clean floors by less than can be seen.
+    `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned at the rim, also where they slip.
     """
 
-    track: Track = default("40 cm")
-    speed: Speed = default("1 m/s")
-    acceleration: Acceleration = default("1 m/s2")
-    turn_rate: TurnRate = default("180 deg/s")
-    slip: Slip = default("0 %")
+    def __init__(self, settings: DifferentialDriveRobot, at: Mounting) -> None:
+        self._settings, self._at = settings, at
+        self._position, self._orientation = at.slot("position").at, at.slot("orientation").at
+        self._velocity, self._spin = at.slot("linear_velocity").at, at.slot("angular_velocity").at
+        self._joints, self._rates = at.slot("joint_positions").at, at.slot("joint_velocities").at
+        first = at.slot("heading")
+        self._derived = Slot(first.at, sum(WHEELS.values()), f"{at.robot.name} {', '.join(WHEELS)}", first.is_own)
+        """The fields of `WHEELS`, which follow one another."""
+        self._tick_s = at.spec.tick_ns / 1e9
+        self._radius, self._speed_max = settings.wheel_radius, settings.speed_limit
+        self._way_max, self._reach = settings.speed_limit * self._tick_s * ROUNDING, settings.reach
 
-    @model_validator(mode="after")
-    def _wheels_are_below_the_hull(self) -> Self:
-        if self.track > 2.0 * self.radius:
-            what = "the wheels would be outside of the robot: its track is more than twice its radius"
-            raise custom_error(BadValue(what))
-        return self
+    def body(self) -> Body:
+        """Return hull, wheels and casters."""
+        return rigid_body(self._settings, self._at.robot.name, GREEN)
+
+    def wheels(self) -> Wheels:
+        """Return its wheels and their motors; how far they slip follows from what they feel."""
+        its = self._settings
+        motors = WheelMotors(its.wheel_radius, its.torque, self._rates, self._tick_s)
+        return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, motors=motors)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, on its wheels, at rest."""
+        at, where = self._at, self._settings.at
+        set_down(at, where, view)
+        x, y, z = where.position
+        view.write(at.slot("position"), x, y, z + self._settings.centre_height)
+        view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
+
+    def derive(self, view: WritableView) -> None:
+        """Write the heading, which is where x of the hull is seen from above, and what the wheels do at their rims."""
+        numbers, at, radius = view.numbers, self._orientation, self._radius
+        x, y, z, w = numbers[at : at + 4]
+        heading = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        left, right = numbers[self._rates : self._rates + 2]
+        one, other = numbers[self._joints : self._joints + 2]
+        view.write(self._derived, heading, left * radius, right * radius, one * radius, other * radius)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is within its reach, and no part of it faster than its speed limit."""
+        at, velocity, spin, most = self._position, self._velocity, self._spin, self._speed_max
+        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
+        vx, vy, vz = numbers[velocity : velocity + 3]
+        a, b, c = numbers[spin : spin + 3]
+        speed = sqrt(vx * vx + vy * vy + vz * vz) + sqrt(a * a + b * b + c * c) * self._reach
+        rims = max(abs(rate) for rate in numbers[self._rates : self._rates + 2]) * self._radius
+        return dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max and speed <= most and rims <= most
 
 
 @model(
     "differential_drive",
     DifferentialDriveRobot,
-    slots={**BODY, "heading": 1, "wheel_speeds": 2, "wheel_travel": 2, "blocked": 1},
+    slots={**BODY, **WHEELS, "blocked": 1},
     motion="differential_drive",
     actuators={"motion": {"kind": "v_w"}},
     tags=("vehicle",),
     units={"heading": ("rad",), "wheel_speeds": ("m/s",), "wheel_travel": ("m",)},
+    variants={
+        "rigid": {
+            "made": RigidDifferentialDrive,
+            "slots": {**RIGID, **dict.fromkeys(JOINTS, 2), **WHEELS},
+            "is_rigid": True,
+            "motion": "",
+        }
+    },
 )
 class DifferentialDrive:
     """A round robot on two driven wheels.

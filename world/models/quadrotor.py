@@ -25,11 +25,7 @@ RED: Final[Colour] = (0.80, 0.20, 0.15, 1.0)
     tags=("flying",),
 )
 class Quadrotor:
-    """A frame with four discs, x ahead, z up: a rigid body.
-
-    Its mass is half in the middle, a solid box, and half in the four rotors, which count as points: I_x = I_y =
-    m_c (b^2 + h^2) / 12 + m_r a^2 / 2, I_z = m_c 2 b^2 / 12 + m_r a^2, with b the middle's side and a the arm.
-    """
+    """A frame with four discs, x ahead, z up: a rigid body."""
 
     def __init__(self, settings: QuadrotorRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at
@@ -40,18 +36,14 @@ class Quadrotor:
     def body(self) -> Body:
         """Return the middle and the discs of its rotors."""
         settings, name = self._settings, self._at.robot.name
-        side, height = 0.6 * settings.arm, settings.height
+        side, height = settings.side, settings.height
         middle = Shape(Box((side / 2, side / 2, height / 2)), settings.surface, GREY, radio=PLASTIC)
         disc = Cylinder(settings.rotor_radius, 0.2 * height)
         shapes = [middle]
         for x, y, _ in settings.rotor_places():
             colour = RED if x > 0.0 else GREY
             shapes.append(Shape(disc, settings.surface, colour, (x, y, 0.4 * height), radio=PLASTIC))
-        core = rotors = settings.mass / 2.0
-        arm = settings.arm * settings.arm
-        level = core * (side * side + height * height) / 12.0 + rotors * arm / 2.0
-        upright = core * side * side / 6.0 + rotors * arm
-        link = Link(name, "free", tuple(shapes), settings.mass, (level, level, upright))
+        link = Link(name, "free", tuple(shapes), settings.mass, settings.moments)
         return Body(name, "quadrotor", ORIGIN, (link,), speed_limit=settings.speed_limit)
 
     def place(self, view: WritableView) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from math import inf, sqrt
 from typing import Annotated, Final
 
@@ -107,8 +108,12 @@ class Urdf:
         tick_s = at.spec.tick_ns / 1e9
         self._bounds = tuple([_bounds(link) for link in joints])
         self._ways = tuple([_speed_max(link) * tick_s for link in joints])
-        self._arms = arms_of(self._body)
         self._reach_m = settings.speed_limit * tick_s
+
+    @cached_property
+    def _arms(self) -> tuple[float, ...]:
+        """Of each link (`arms_of`): where robots are only placed, none of them is wanted."""
+        return arms_of(self._body)
 
     def body(self) -> Body:
         """Return links and shapes as the file says."""

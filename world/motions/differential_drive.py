@@ -3,7 +3,7 @@
 A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
 From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an arc
 (`moving.arcs`), as far as nothing is in the way (`clearance.free_way`). It turns on the spot where all is blocked, with
-its wheels slipping. Of a robot with a `charge` the wheels stop where that is 0.
+its wheels slipping.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
-from foosim.world.moving.arcs import Floats, approached, upright_turn, way_along_arc, wrapped
+from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
 from foosim.world.moving.columns import Columns
 from foosim.world.moving.wheels import wheels_of
 
@@ -43,12 +43,10 @@ class _Batch:
     def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.rows = way.rows(entities)
+        self.movers = way.movers(entities)
         wheels = [wheels_of(at.spec, at.layout, entity) for entity in entities]
         self.track = np.array([its.track for its in wheels])
         self.rolls = np.array([[1.0 - its.slips[0], 1.0 - its.slips[1]] for its in wheels])
-        self.charges = [(row, its.offsets["charge"]) for row, its in enumerate(entities) if "charge" in its.offsets]
-        """Rows of those that have a charge, and its places."""
 
 
 @motion("differential_drive", needs=STATE, writes=STATE)
@@ -73,10 +71,7 @@ class DifferentialDrive:
         asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
         asked = asked.reshape(count, 2, 2)
         targets, rates = asked[:, :, 0], asked[:, :, 1]
-        for row, charge in batch.charges:
-            if not view.numbers[charge] > 0.0:
-                targets[row] = 0.0
-        near = self._way.near(batch.rows, view)
+        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
             speeds = approached(speeds, targets, rates * dt)
@@ -84,26 +79,26 @@ class DifferentialDrive:
             ground = speeds * batch.rolls
             ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / batch.track * dt
             ways = np.zeros((count, 3))
-            ways[:, 0], ways[:, 1] = way_along_arc(ahead * dt, np.zeros(count), turned, heading)
+            arcs = along_arcs(ahead * dt, 0.0, turned, heading)
+            ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
             place, shares, stops = near.free_way(place, ways)
             is_stopped |= stops
-            heading = wrapped(heading + turned)
-        _write(batch, view, place, heading, ahead * shares, turned / dt, (speeds, travel, is_stopped))
+        _write(batch, view, place, arcs, ahead * shares, turned / dt, (speeds, travel, is_stopped))
 
 
 def _write(
     batch: _Batch,
     view: SolvingView,
     place: Floats,
-    heading: Floats,
+    arcs: Arcs,
     ahead: Floats,
     turn_rate: Floats,
     rest: tuple[Floats, Floats, Floats],
 ) -> None:
     state = np.zeros((len(place), batch.state.width))
-    z, w = upright_turn(heading)
+    z, w = arcs.turn_z, arcs.turn_w
     state[:, 0:3], state[:, 5], state[:, 6] = place, z, w
     state[:, 7], state[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
-    state[:, 12], state[:, 13] = turn_rate, heading
+    state[:, 12], state[:, 13] = turn_rate, arcs.heading
     state[:, 14:16], state[:, 16:18], state[:, 18] = rest
     batch.state.write(view, state)

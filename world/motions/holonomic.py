@@ -18,7 +18,7 @@ from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
-from foosim.world.moving.arcs import approached, approached_together, upright_turn, way_along_arc, wrapped
+from foosim.world.moving.arcs import along_arcs, approached, approached_together
 from foosim.world.moving.columns import Columns
 
 STATE: Final = (
@@ -40,7 +40,7 @@ class _Batch:
     def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.rows = way.rows(entities)
+        self.movers = way.movers(entities)
 
 
 @motion("holonomic", needs=STATE, writes=STATE)
@@ -68,18 +68,18 @@ class HolonomicMotion:
         asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
         asked = asked.reshape(count, 3, 2)
         targets, rates = asked[:, :, 0], asked[:, :, 1]
-        near = self._way.near(batch.rows, view)
+        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
             velocity[:, 0:2] = approached_together(velocity[:, 0:2], targets[:, 0:2], rates[:, 0] * dt)
             velocity[:, 2] = approached(velocity[:, 2], targets[:, 2], rates[:, 2] * dt)
             turned = velocity[:, 2] * dt
             ways = np.zeros((count, 3))
-            ways[:, 0], ways[:, 1] = way_along_arc(velocity[:, 0] * dt, velocity[:, 1] * dt, turned, heading)
+            arcs = along_arcs(velocity[:, 0] * dt, velocity[:, 1] * dt, turned, heading)
+            ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
             place, shares, stops = near.free_way(place, ways)
             is_stopped |= stops
-            heading = wrapped(heading + turned)
-        z, w = upright_turn(heading)
+        z, w = arcs.turn_z, arcs.turn_w
         s, c = 2.0 * z * w, 1.0 - 2.0 * z * z
         ahead, left = velocity[:, 0] * shares, velocity[:, 1] * shares
         after = np.zeros((count, batch.state.width))

@@ -43,7 +43,7 @@ class _Batch:
     def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.rows = way.rows(entities)
+        self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.acceleration = np.array([its.acceleration for its in robots if isinstance(its, RotorcraftRobot)])
         assert len(self.acceleration) == len(robots), "the motion rotorcraft moves rotorcraft"
@@ -76,7 +76,7 @@ class RotorcraftMotion:
         has_goal = np.array([bool(its) for its in motors])
         goal, most = np.where(has_goal[:, None], asked[:, :3, 0], place), asked[:, :, 1]
         yaw = np.where(has_goal, asked[:, 3, 0], heading)
-        near = self._way.near(batch.rows, view)
+        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
             wanted = np.where(has_goal[:, None], self._wanted(goal - place, most), 0.0)

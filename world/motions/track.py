@@ -31,7 +31,7 @@ class _Batch:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
         self.clock = Columns([[at.slot(entity, "clock")] for entity in entities])
-        self.rows = way.rows(entities)
+        self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
         assert len(self.paths) == len(robots), "the motion track moves what has a path"
@@ -59,7 +59,7 @@ class Track:
             return np.array([path.at(path.after(clock, tick_s * share)) for path, clock, share in each])
 
         start, full = state[:, 0:3], poses(np.ones(len(entities)))
-        near = self._way.near(batch.rows, view)
+        near = self._way.near(batch.movers, view)
         moves = (full[:, 0:3] != start).any(axis=1)
         shares, is_stopped = near.free_share(start, lambda shares: poses(shares)[:, 0:3], moves)
         after = poses(shares) if is_stopped.any() else full

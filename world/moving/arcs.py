@@ -7,7 +7,7 @@ depend on who else is in the batch.
 from __future__ import annotations
 
 from math import pi
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,21 +37,30 @@ def approached_together(velocity: Floats, target: Floats, step: Floats) -> Float
     return nearer
 
 
-def way_along_arc(ahead: Floats, left: Floats, turned: Floats, heading: Floats) -> tuple[Floats, Floats]:
-    """Return the way in the world (x and y, m) of bodies whose velocity in their own frame stays as it is.
+class Arcs(NamedTuple):
+    """Ways (x and y, m) in the world along arcs, the headings after them (rad), and z and w of their quaternions."""
+
+    x: Floats
+    y: Floats
+    heading: Floats
+    turn_z: Floats
+    turn_w: Floats
+
+
+def along_arcs(ahead: Floats, left: Floats | float, turned: Floats, heading: Floats) -> Arcs:
+    """Return how bodies go on whose velocity in their own frame stays as it is.
 
     Each rolls `ahead` and `left` (m) while it turns by `turned` (rad) from `heading` on. It moves by the chord of its
     arc, the way times sin(turned / 2) / (turned / 2), in the direction half-way between (Siegwart, Nourbakhsh,
     Scaramuzza, *Introduction to Autonomous Mobile Robots*, section 3.2).
     """
-    half = turned / 2.0
-    sines, cosines = sincos(np.concatenate((half, heading + half)))
-    count = len(half)
+    half, after = turned / 2.0, wrapped(heading + turned)
+    sines, cosines = sincos(np.array((half, heading + half, 0.5 * after)))
     is_straight = half == 0.0
-    chord = np.where(is_straight, 1.0, sines[:count] / np.where(is_straight, 1.0, half))
-    s, c = sines[count:], cosines[count:]
+    chord = np.where(is_straight, 1.0, sines[0] / np.where(is_straight, 1.0, half))
+    s, c = sines[1], cosines[1]
     along, across = ahead * chord, left * chord
-    return along * c - across * s, along * s + across * c
+    return Arcs(along * c - across * s, along * s + across * c, after, sines[2], cosines[2])
 
 
 def wrapped(angle: Floats) -> Floats:

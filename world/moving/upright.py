@@ -12,6 +12,7 @@ from typing import Any
 
 from foosim.world.components.entities import mounting_of
 from foosim.world.forms import registry
+from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
 from foosim.world.spec import WorldSpec
@@ -31,9 +32,9 @@ def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
     return entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
 
 
-def stands_upright(kind: str) -> bool:
-    """Whether robots of a model move by kinematics and say what their cylinder is, and are no kit's."""
-    model = registry.find_model(kind)
+def stands_upright(settings: EntitySettings) -> bool:
+    """Whether robots with these settings move by kinematics and say what their cylinder is, and are no kit's."""
+    model = registry.model_of(settings)
     return (
         bool(model.motion) and not model.kit and hasattr(model.made, "upright") and "position" in (model.declared or ())
     )

@@ -7,9 +7,22 @@ from typing import Any
 
 from foosim.common.errors import BadValue
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.world.components.entities import Motors
+from foosim.world.components.view import View
 from foosim.world.layout import Entity, Layout
 from foosim.world.moving.upright import made_model
 from foosim.world.spec import WorldSpec
+
+
+@dataclass(frozen=True, slots=True)
+class WheelMotors:
+    """The motors of two wheels of this radius (m): their greatest torque (N m), the place of the wheels' rates in a
+    frame (rad/s, the left one first), and the tick (s)."""
+
+    radius: float
+    torque: float
+    speeds_at: int
+    tick_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +30,7 @@ class Wheels:
     """Two wheels, `track` apart (m): greatest speed (m/s) and acceleration (m/s2) of their rims.
 
     `turn_rate` (rad/s) is how fast they may turn their robot. On the ground the left and the right wheel roll less far
-    than they turn, by these shares.
+    than they turn, by these shares. Wheels of a rigid robot have `motors`.
     """
 
     track: float
@@ -25,6 +38,24 @@ class Wheels:
     acceleration: float
     turn_rate: float
     slips: tuple[float, float] = (0.0, 0.0)
+    motors: WheelMotors | None = None
+
+    def asked(self, left: float, right: float, view: View) -> Motors:
+        """Return what is asked of the motors of both wheels, so that their rims approach these speeds (m/s).
+
+        A motion is asked for the speeds themselves, with the greatest acceleration. A joint's motor is asked for the
+        speed that its wheel can have after the tick, with the greatest torque: where that is not enough, as in front of
+        a wall, the next tick goes on from the speed that there is.
+        """
+        motors = self.motors
+        if motors is None:
+            return (left, self.acceleration), (right, self.acceleration)
+        at, radius = motors.speeds_at, motors.radius
+        step = self.acceleration * motors.tick_s
+        now, other = view.numbers[at] * radius, view.numbers[at + 1] * radius
+        left = min(max(left, now - step), now + step)
+        right = min(max(right, other - step), other + step)
+        return (left / radius, motors.torque), (right / radius, motors.torque)
 
 
 def wheels_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Wheels:

@@ -39,6 +39,24 @@ class QuadrotorRobot(RobotSettings):
     surface: Name = DEFAULT
     speed_limit: SpeedLimit = default("30 m/s")
 
+    @property
+    def side(self) -> float:
+        """The length of the middle, a square seen from above (m)."""
+        return 0.6 * self.arm
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """The principal moments of inertia (kg m2), about x, y and z.
+
+        The mass is half in the middle, a solid box, and half in the four rotors, which count as points: I_x = I_y =
+        m_c (b^2 + h^2) / 12 + m_r a^2 / 2, I_z = m_c 2 b^2 / 12 + m_r a^2, with b the middle's side and a the arm.
+        """
+        side, height = self.side, self.height
+        core = rotors = self.mass / 2.0
+        arm = self.arm * self.arm
+        level = core * (side * side + height * height) / 12.0 + rotors * arm / 2.0
+        return level, level, core * side * side / 6.0 + rotors * arm
+
     def rotor_places(self) -> tuple[tuple[float, float, float], ...]:
         """Return x and y of each rotor (m) and its sense (1: counter-clockwise from above): front left, rear left, rear
         right, front right."""

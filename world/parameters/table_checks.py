@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
+from foosim.common import units
 from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.plain_data import PlainData, mm
@@ -17,6 +18,7 @@ def table_findings(data: PlainData) -> Iterator[Finding]:
     yield from _robots(data)
     yield from _lines(data)
     yield from _shapes(data)
+    yield from _drives(data)
 
 
 def _robots(data: PlainData) -> Iterator[Finding]:
@@ -75,6 +77,19 @@ def _shapes(data: PlainData) -> Iterator[Finding]:
         yield from data.too_big((TABLE, *small), (TABLE, *big), why)
     for side in ("depth", "width", "height"):
         yield from data.too_big((TABLE, "ball", "radius"), (TABLE, "goal", side), "the ball would not fit: ", 2)
+
+
+def _drives(data: PlainData) -> Iterator[Finding]:
+    """Position loops run once a tick: at twice its inverse an error changes its sign and stays, above it grows."""
+    tick_ns = data.quantity(units.TIME, "tick")
+    for axis in ("slide", "spin"):
+        location = (TABLE, "drive", axis, "gain")
+        gain = data.get(*location)
+        if not isinstance(gain, int | float) or tick_ns is None or tick_ns <= 0:
+            continue
+        most = 2e9 / float(tick_ns)
+        if gain >= most:
+            yield Finding(location, f"a gain that cannot be stable: valid is below 2 / tick, {most:g} 1/s", gain)
 
 
 def _millimetres(length: Fraction) -> str | None:

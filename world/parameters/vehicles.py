@@ -65,11 +65,16 @@ def body_of(vehicle: Vehicle, name: str, model: str, colour: Colour, speed_limit
     """Return a round hull, a mark ahead on it, and the antenna's mast; it has no mass, since no engine moves it."""
     radius, height = vehicle.radius, vehicle.height
     hull = Shape(Cylinder(radius, height), HULL, colour, (0.0, 0.0, height / 2), radio=METAL)
-    mark = Box((radius / 4, radius / 8, height / 16))
-    ahead = Shape(mark, HULL, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
-    shapes = (hull, ahead, *mast(height, vehicle.antenna_height, HULL))
+    shapes = (hull, mark_of(vehicle, HULL), *mast(height, vehicle.antenna_height, HULL))
     link = Link(name, "free", shapes, 0.0, ORIGIN)
     return Body(name, model, ORIGIN, (link,), (0.0, 0.0, vehicle.antenna_height), speed_limit)
+
+
+def mark_of(vehicle: Vehicle, surface: str) -> Shape:
+    """Return the mark on a hull that is ahead of its middle."""
+    radius, height = vehicle.radius, vehicle.height
+    mark = Box((radius / 4, radius / 8, height / 16))
+    return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
 
 
 def set_down(at: Mounting, where: At, view: WritableView) -> None:

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
-from foosim.world.rays.boxes import Floats
-from foosim.world.rays.casting import Bundles, Hits, cast
+from foosim.world.rays.boxes import MARGIN_M, Floats
+from foosim.world.rays.casting import Bundles, Hits, cast, distances
 from foosim.world.rays.clearing import clear_of
-from foosim.world.rays.shapes import NOTHING, Forms, Part, Placed, multiplied, rotated
+from foosim.world.rays.shapes import NOTHING, Forms, Part, Placed, Poses, multiplied, rotated
 from foosim.world.rays.solids import Meshes
+from foosim.world.rays.sorted_boxes import FEW, SortedBoxes
 from foosim.world.scene import ORIGIN, UPRIGHT, Body, Link, Pose, Scene, Vector, moved, multiply, rotate, shape_box
 
 Ignoring: TypeAlias = NDArray[np.int64] | int | None
 """The index of the entity that is passed, one for all or one for each; -1 or None for none."""
 NOBODY: Final = -2
 """The number of no thing, not even of that which is in place of none."""
-NO_BOXES: Final = (np.zeros((3, 0)), np.zeros((3, 0)))
 
 
 class Caster:
@@ -64,13 +64,16 @@ class Caster:
                 moving += _parts(body, entity, numbers, [("", ORIGIN, UPRIGHT)] * len(numbers))
                 frames += len(body.links)
         standing += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
-        self._moving = Forms(moving, meshes)
+        self._forms, self._moving = Forms([*standing, *moving], meshes), slice(len(standing), None)
         self._prepare_frames()
         still = np.array([ORIGIN]).T, np.array([UPRIGHT]).T
+        self._standing = Poses(self._forms, slice(len(standing)), *still).columns
         boxes = np.array([_box_of(part) for part in standing]).reshape(-1, 2, 3).transpose(1, 2, 0)
-        self._standing = Placed(Forms(standing, meshes), *still, (boxes[0], boxes[1]))
+        self._boxes = boxes[0] - MARGIN_M, boxes[1] + MARGIN_M
+        self._near = SortedBoxes(*self._boxes)
+        self._is_small = len(standing) + len(moving) <= FEW
         self._key: bytes | None = None
-        self._placed = self._standing
+        self._placement = Placement(Placed(self._forms, self._standing, [self._near]))
 
     def _prepare_frames(self) -> None:
         """Note where a frame has the poses of what moves."""
@@ -96,11 +99,11 @@ class Caster:
             state = (np.array(numbers) if values is None else values)[self._places]
             key = state.tobytes()
             if key != self._key:
-                self._placed, self._key = self._place(state, numbers), key
-            return Placement(self._standing, self._placed)
-        return Placement(self._standing, None)
+                self._placement, self._key = Placement(self._place(state, numbers)), key
+        return self._placement
 
     def _place(self, state: Floats, numbers: Sequence[float]) -> Placed:
+        """Return all shapes where they are in a frame, of whose numbers `state` are those of the poses."""
         free = len(self._free)
         positions = state[: 3 * free].reshape(-1, 3).T
         orientations = multiplied(state[3 * free : 7 * free].reshape(-1, 4).T, self._back)
@@ -109,14 +112,23 @@ class Caster:
         if poses:
             positions = np.concatenate((positions, np.array([position for _, position, _ in poses]).T), axis=1)
             orientations = np.concatenate((orientations, np.array([turned for _, _, turned in poses]).T), axis=1)
-        return Placed(self._moving, positions, orientations, NO_BOXES)
+        moving = Poses(self._forms, self._moving, positions, orientations)
+        return Placed(self._forms, np.concatenate((self._standing, moving.columns), axis=1), self._boxes_with(moving))
+
+    def _boxes_with(self, moving: Poses) -> list[SortedBoxes]:
+        """Return the boxes around all shapes: those around what stands are sorted once, where they are many."""
+        boxes = moving.boxes()
+        if not self._is_small:
+            return [self._near, SortedBoxes(*boxes)]
+        low, high = (np.concatenate(pair, axis=1) for pair in zip(self._boxes, boxes, strict=True))
+        return [SortedBoxes(low, high)]
 
 
 class Placement:
     """All things where they are in one frame."""
 
-    def __init__(self, standing: Placed, moving: Placed | None) -> None:
-        self._standing, self._moving = standing, moving
+    def __init__(self, placed: Placed) -> None:
+        self._placed = placed
 
     def cast(self, origins: Floats, directions: Floats, ranges: Floats | float, ignoring: Ignoring = None) -> Hits:
         """Return what rays meet first: distances (n,) and the numbers of things (n,), inf and -1 where that is nothing.
@@ -130,15 +142,15 @@ class Placement:
             np.ascontiguousarray(np.asarray(rows, np.float64).reshape(-1, 3).T) for rows in (origins, directions)
         )
         far = np.ascontiguousarray(np.broadcast_to(np.asarray(ranges, np.float64), count))
-        bundles = Bundles(starts, ways, far, _passed(ignoring, count))
-        first = cast(self._standing, bundles)
-        if self._moving is None:
-            return first
-        other = cast(self._moving, bundles)
-        is_nearer = other.distances < first.distances
-        return Hits(
-            np.where(is_nearer, other.distances, first.distances), np.where(is_nearer, other.things, first.things)
-        )
+        return cast(self._placed, Bundles.of_rays(starts, ways, far, _passed(ignoring, count)))
+
+    def fans(self, origins: Floats, ways: Floats, ranges: Floats, passing: NDArray[np.int64]) -> Floats:
+        """Return the distances (f, r) that `cast` gives of f fans of r rays that begin at one place.
+
+        `origins` (3, f) and unit `ways` (3, f, r) are in the world frame (m), `ranges` (f,) are how far the rays of a
+        fan go (m), `passing` (f,) the index of the entity that they pass.
+        """
+        return distances(self._placed, Bundles.of_fans(origins, ways, ranges, passing)).reshape(ways.shape[1:])
 
     def clearance(self, points: Floats, reach: Floats | float, ignoring: Ignoring = None) -> Floats:
         """Return how far points (n, 3) are from the nearest surface (m): negative inside, inf beyond `reach`.
@@ -149,9 +161,7 @@ class Placement:
         count = len(points)
         places = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3).T)
         far = np.ascontiguousarray(np.broadcast_to(np.asarray(reach, np.float64), count))
-        passed = _passed(ignoring, count)
-        found = clear_of(self._standing, places, far, passed)
-        return found if self._moving is None else np.minimum(found, clear_of(self._moving, places, far, passed))
+        return clear_of(self._placed, places, far, _passed(ignoring, count))
 
 
 def _passed(ignoring: Ignoring, count: int) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.kernels import box_spans, capsule_spans, cylinder_spans, sphere_spans
 from foosim.world.rays.shapes import NOTHING, Placed
-from foosim.world.rays.solids import BOX, CAPSULE, CYLINDER, SPHERE, TOUCH_M
+from foosim.world.rays.solids import BOX, CYLINDER, SPHERE, TOUCH_M
 from foosim.world.rays.triangles import Triangles
 
 Indices = NDArray[np.intp]
@@ -33,24 +33,77 @@ class Hits(NamedTuple):
     things: NDArray[np.int64]
 
 
-class Bundles:
-    """Rays as bundles: origins and unit directions (3, n), ranges (n,), numbers of the things that they pass (n,)."""
+class Bundles(NamedTuple):
+    """n rays in b bundles: those of a bundle begin at one place, go as far, pass the same thing and are in a row."""
 
-    def __init__(self, origins: Floats, ways: Floats, ranges: Floats, passing: NDArray[np.int64]) -> None:
-        self.origins, self.ways, self.ranges, self.passing = origins, ways, ranges, passing
+    origins: Floats
+    """Of bundles (3, b)."""
+    ranges: Floats
+    """How far rays go (b,) (m)."""
+    passing: NDArray[np.int64]
+    """The numbers of the things that they pass (b,)."""
+    starts: Indices
+    """The first ray of each bundle (b,)."""
+    lengths: Indices
+    """How many rays each has (b,)."""
+    ways: Floats
+    """Unit directions of rays (3, n)."""
+
+    @classmethod
+    def of_rays(cls, origins: Floats, ways: Floats, ranges: Floats, passing: NDArray[np.int64]) -> Bundles:
+        """Return rays as bundles: origins and unit directions (3, n), ranges and numbers of things (n,)."""
         count = len(ranges)
         changed = np.ones(count, np.bool_)
-        changed[1:] = (origins[:, 1:] != origins[:, :-1]).any(axis=0) | (passing[1:] != passing[:-1])
+        changed[1:] = (origins[:, 1:] != origins[:, :-1]).any(axis=0)
+        changed[1:] |= (passing[1:] != passing[:-1]) | (ranges[1:] != ranges[:-1])
         runs = np.flatnonzero(changed)
-        lengths = np.diff(np.append(runs, count))
-        pieces = -(-lengths // BUNDLE)
-        within = np.arange(int(pieces.sum())) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-        self.starts = np.repeat(runs, pieces) + within * BUNDLE
-        self.lengths = np.minimum(np.repeat(lengths, pieces) - within * BUNDLE, BUNDLE)
-        ends = origins + ways * ranges
-        low, high = np.minimum(origins, ends), np.maximum(origins, ends)
-        self.low = np.minimum.reduceat(low, self.starts, axis=1) if count else low
-        self.high = np.maximum.reduceat(high, self.starts, axis=1) if count else high
+        starts, lengths = _in_pieces(runs, np.diff(np.append(runs, count)))
+        return cls(origins[:, starts], ranges[starts], passing[starts], starts, lengths, ways)
+
+    @classmethod
+    def of_fans(cls, origins: Floats, ways: Floats, ranges: Floats, passing: NDArray[np.int64]) -> Bundles:
+        """Return f fans of r rays as bundles: origins (3, f), unit directions (3, f, r), ranges and things (f,)."""
+        fans, rays = ways.shape[1:]
+        starts, lengths = _in_pieces(np.arange(fans) * rays, np.full(fans, rays))
+        fan = starts // rays
+        return cls(origins[:, fan], ranges[fan], passing[fan], starts, lengths, ways.reshape(3, -1))
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Return the least and the greatest coordinates of each bundle (3, b)."""
+        if not len(self.starts):
+            return self.origins, self.origins
+        low, high = (extreme.reduceat(self.ways, self.starts, axis=1) for extreme in (np.minimum, np.maximum))
+        return self.origins + np.minimum(low, 0.0) * self.ranges, self.origins + np.maximum(high, 0.0) * self.ranges
+
+
+def _in_pieces(begins: Indices, lengths: Indices) -> tuple[Indices, Indices]:
+    """Return where pieces of at most BUNDLE begin, and how long they are, of runs of rays."""
+    if not len(lengths) or int(lengths.max()) <= BUNDLE:
+        return begins, lengths
+    pieces = -(-lengths // BUNDLE)
+    within = np.arange(int(pieces.sum())) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return (
+        np.repeat(begins, pieces) + within * BUNDLE,
+        np.minimum(np.repeat(lengths, pieces) - within * BUNDLE, BUNDLE),
+    )
+
+
+class Pairs(NamedTuple):
+    """n pairs of a ray and a shape that come near each other."""
+
+    rays: Indices
+    shapes: Indices
+    starts: Floats
+    """Where the rays begin, in the frames of the shapes (3, n)."""
+    ranges: Floats
+
+
+def distances(placed: Placed, bundles: Bundles) -> Floats:
+    """Return how far away it is what rays meet first (n,) (m); inf where that is nothing."""
+    least = np.full(bundles.ways.shape[1], np.inf)
+    for pairs in _near(placed, bundles):
+        np.minimum.at(least, pairs.rays, _entries(placed, bundles, pairs))
+    return least
 
 
 def cast(placed: Placed, bundles: Bundles) -> Hits:
@@ -59,100 +112,84 @@ def cast(placed: Placed, bundles: Bundles) -> Hits:
     A ray that begins inside of something meets it at once. One that touches something, or is in it for no more than
     TOUCH_M, does not meet it.
     """
-    count = len(bundles.ranges)
+    count = bundles.ways.shape[1]
     hits = Hits(np.full(count, np.inf), np.full(count, NOTHING, np.int64))
-    asked, shapes = placed.near.met(bundles.low, bundles.high)
-    kept = placed.things[shapes] != bundles.passing[bundles.starts[asked]]
-    asked, shapes = asked[kept], shapes[kept]
-    for near, those in _near(placed, bundles, asked, shapes):
-        entries = _entries(placed, bundles, near, those)
-        is_met = entries < np.inf
-        rays, chosen, enters = near[is_met], those[is_met], entries[is_met]
-        if not len(rays):
-            continue
-        firsts = np.flatnonzero(np.append(True, rays[1:] != rays[:-1]))
-        least = np.minimum.reduceat(enters, firsts)
-        hits.distances[rays[firsts]] = least
-        nearest = np.flatnonzero(enters == np.repeat(least, np.diff(np.append(firsts, len(rays)))))[::-1]
-        hits.things[rays[nearest]] = placed.things[chosen[nearest]]  # the last one that is written is the first shape
+    for pairs in _near(placed, bundles):
+        entries, before = _entries(placed, bundles, pairs), hits.distances[pairs.rays]
+        np.minimum.at(hits.distances, pairs.rays, entries)
+        nearest = np.flatnonzero((entries < before) & (entries == hits.distances[pairs.rays]))[::-1]
+        # Shapes of a ray are in their order: what is written last is the first of them.
+        hits.things[pairs.rays[nearest]] = placed.things[pairs.shapes[nearest]]
     return hits
 
 
-def _near(placed: Placed, bundles: Bundles, asked: Indices, shapes: Indices) -> Iterator[tuple[Indices, Indices]]:
-    """Yield pairs of rays and shapes that they come near to: those of a ray together, in the order of shapes."""
-    counts = np.bincount(asked, minlength=len(bundles.starts))
-    begins = np.cumsum(counts) - counts
-    for length in np.unique(bundles.lengths[counts > 0]).tolist():
-        members = np.flatnonzero((bundles.lengths == length) & (counts > 0))
-        members = members[np.argsort(-counts[members], kind="stable")]
-        begin = 0
-        while begin < len(members):
-            widest = int(counts[members[begin]])
-            some = members[begin : begin + max(1, PAIRS_AT_ONCE // (widest * length))]
-            begin += len(some)
-            places = begins[some][:, None] + np.arange(widest)
-            is_there = np.arange(widest) < counts[some][:, None]
-            candidates = np.where(is_there, shapes[np.where(is_there, places, 0)], NOTHING)
-            rays = bundles.starts[some][:, None] + np.arange(length)
-            bundle, ray, place = np.nonzero(_passes(placed, bundles, rays, candidates))
-            yield rays[bundle, ray], candidates[bundle, place]
+def _near(placed: Placed, bundles: Bundles) -> Iterator[Pairs]:
+    """Yield rays and shapes that they come near to: those of a ray in the order of shapes."""
+    bundle, shapes = placed.met(*bundles.box())
+    kept = placed.things[shapes] != bundles.passing[bundle]
+    if not kept.all():
+        bundle, shapes = bundle[kept], shapes[kept]
+    if not len(bundle):
+        return
+    lengths = bundles.lengths[bundle]
+    shortest, longest = int(lengths.min()), int(lengths.max())
+    for length in [longest] if shortest == longest else np.unique(lengths).tolist():
+        members = slice(None) if shortest == longest else np.flatnonzero(lengths == length)
+        its, those = bundle[members], shapes[members]
+        at_once = max(1, PAIRS_AT_ONCE // length)
+        for begin in range(0, len(its), at_once):
+            part = slice(begin, begin + at_once)
+            yield _passing_near(placed, bundles, its[part], those[part], length)
 
 
-def _passes(placed: Placed, bundles: Bundles, rays: Indices, candidates: Indices) -> NDArray[np.bool_]:
-    """Return which rays (b, r) of bundles meet the spheres around shapes (b, c), or nearly so: shape (b, r, c)."""
-    x, y, z = placed.middles[:, candidates] - bundles.origins[:, rays[:, :1]]
-    radii = placed.radii[candidates]
-    beyond = (x * x + y * y + z * z - radii * radii)[:, None, :]
+def _passing_near(placed: Placed, bundles: Bundles, bundle: Indices, shapes: Indices, length: int) -> Pairs:
+    """Return which rays of bundles, of this length, meet the spheres around shapes, or nearly so."""
+    origins = bundles.origins[:, bundle]
+    x, y, z = placed.middles[:, shapes] - origins
+    radii, first, ranges = placed.radii[shapes], bundles.starts[bundle], bundles.ranges[bundle]
+    beyond = x * x + y * y + z * z - radii * radii
+    rays = first[:, None] + np.arange(length)
     dx, dy, dz = bundles.ways[:, rays]
-    along = dx[:, :, None] * x[:, None, :]
-    along += dy[:, :, None] * y[:, None, :]
-    along += dz[:, :, None] * z[:, None, :]
-    passes: NDArray[np.bool_] = along >= -radii[:, None, :]
-    passes &= along <= radii[:, None, :] + bundles.ranges[rays][:, :, None]
+    along = dx * x[:, None]
+    along += dy * y[:, None]
+    along += dz * z[:, None]
+    passes: NDArray[np.bool_] = along >= -radii[:, None]
+    passes &= along <= (radii + ranges)[:, None]
     along *= along
-    passes &= along >= beyond
-    return passes
+    passes &= along >= beyond[:, None]
+    pair, ray = passes.nonzero()
+    local = placed.local(shapes, origins - placed.positions[:, shapes])
+    return Pairs(first[pair] + ray, shapes[pair], local[:, pair], ranges[pair])
 
 
-def _entries(placed: Placed, bundles: Bundles, rays: Indices, chosen: Indices) -> Floats:
+def _entries(placed: Placed, bundles: Bundles, pairs: Pairs) -> Floats:
     """Return where rays enter shapes, pair by pair (m); inf where they do not."""
-    forms = placed.forms
-    kinds = forms.forms[chosen]
-    entries = np.full(len(rays), np.inf)
+    forms, count = placed.forms, len(pairs.rays)
+    kinds = forms.forms[pairs.shapes]
+    ways = placed.local(pairs.shapes, bundles.ways[:, pairs.rays])
+    half = forms.half[:, pairs.shapes]
+    entries = np.full(count, np.inf)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for form in (BOX, CYLINDER, SPHERE, CAPSULE):
-            if form not in forms.present:
-                continue
+        for form in forms.primitives:
             some = np.flatnonzero(kinds == form)
             if not len(some):
                 continue
-            starts, ways, shape = _from_shapes(placed, bundles, rays[some], chosen[some], is_turned=form != SPHERE)
-            half = forms.half[:, shape]
+            chosen = slice(None) if len(some) == count else some
+            starts, directions, size = pairs.starts[:, chosen], ways[:, chosen], half[:, chosen]
             if form == BOX:
-                enter, leave = box_spans(starts, ways, half)
+                enter, leave = box_spans(starts, directions, size)
             elif form == SPHERE:
-                enter, leave = sphere_spans(starts, ways, half[0])
+                enter, leave = sphere_spans(starts, directions, size[0])
             elif form == CYLINDER:
-                enter, leave = cylinder_spans(starts, ways, half[0], half[2])
+                enter, leave = cylinder_spans(starts, directions, size[0], size[2])
             else:
-                enter, leave = capsule_spans(starts, ways, half[0], half[2])
-            entries[some] = _within(enter, leave, bundles.ranges[rays[some]])
+                enter, leave = capsule_spans(starts, directions, size[0], size[2])
+            entries[chosen] = _within(enter, leave, pairs.ranges[chosen])
     for triangles, having in forms.meshes:
-        some = np.flatnonzero(having[chosen])
+        some = np.flatnonzero(having[pairs.shapes])
         if len(some):
-            starts, ways, _ = _from_shapes(placed, bundles, rays[some], chosen[some], is_turned=True)
-            entries[some] = _into_mesh(triangles, starts, ways, bundles.ranges[rays[some]])
+            entries[some] = _into_mesh(triangles, pairs.starts[:, some], ways[:, some], pairs.ranges[some])
     return entries
-
-
-def _from_shapes(
-    placed: Placed, bundles: Bundles, rays: Indices, shapes: Indices, *, is_turned: bool
-) -> tuple[Floats, Floats, Indices]:
-    """Return starts and ways of rays in the frames of shapes, and the shapes; a sphere need not be turned to."""
-    starts, ways = bundles.origins[:, rays] - placed.positions[:, shapes], bundles.ways[:, rays]
-    if is_turned:
-        starts, ways = placed.local(shapes, starts), placed.local(shapes, ways)
-    return starts, ways, shapes
 
 
 def _within(enter: Floats, leave: Floats, ranges: Floats) -> Floats:

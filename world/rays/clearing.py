@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from foosim.world.rays.boxes import MARGIN_M, Floats
 from foosim.world.rays.distances import to_boxes, to_capsules, to_cylinders, to_spheres, to_triangles
 from foosim.world.rays.shapes import Placed
-from foosim.world.rays.solids import BOX, CYLINDER, MESH, SPHERE
+from foosim.world.rays.solids import BOX, CYLINDER, SPHERE
 
 
 def clear_of(placed: Placed, places: Floats, reach: Floats, passing: NDArray[np.int64]) -> Floats:
@@ -18,14 +18,14 @@ def clear_of(placed: Placed, places: Floats, reach: Floats, passing: NDArray[np.
     count.
     """
     found = np.full(places.shape[1], np.inf)
-    asked, shapes = placed.near.met(places - reach - MARGIN_M, places + reach + MARGIN_M)
+    asked, shapes = placed.met(places - reach - MARGIN_M, places + reach + MARGIN_M)
     kept = placed.things[shapes] != passing[asked]
     asked, shapes = asked[kept], shapes[kept]
     forms = placed.forms
     kinds = forms.forms[shapes]
     local = places[:, asked] - placed.positions[:, shapes]
     distances = np.full(len(asked), np.inf)
-    for form in sorted(forms.present - {MESH}):
+    for form in forms.primitives:
         some = np.flatnonzero(kinds == form)
         if len(some):
             turned = local[:, some] if form == SPHERE else placed.local(shapes[some], local[:, some])

@@ -42,21 +42,24 @@ def cylinder_spans(starts: Floats, ways: Floats, radii: Floats, half_lengths: Fl
     (x, y, z), (dx, dy, dz) = starts, ways
     across = dx * dx + dy * dy
     upright = across == 0.0
-    divisor = np.where(upright, 1.0, across)
+    is_some_upright = bool(upright.any())
+    divisor = np.where(upright, 1.0, across) if is_some_upright else across
     middle = -(x * dx + y * dy) / divisor
-    nearest_x, nearest_y = x + middle * dx, y + middle * dy
-    rest = radii * radii - (nearest_x * nearest_x + nearest_y * nearest_y)
+    x, y = x + middle * dx, y + middle * dy
+    rest = radii * radii - (x * x + y * y)
     half = np.sqrt(np.maximum(rest, 0.0) / divisor)
     inside = rest > 0.0
-    enter = np.where(upright, -np.inf, middle - half)
-    leave = np.where(upright, np.inf, middle + half)
-    one, other = (-half_lengths - z) / dz, (half_lengths - z) / dz
+    enter, leave = middle - half, middle + half
+    if is_some_upright:
+        enter, leave = np.where(upright, -np.inf, enter), np.where(upright, np.inf, leave)
     level = dz == 0.0
-    between = (-half_lengths < z) & (z < half_lengths)
-    near = np.where(level, -np.inf, np.minimum(one, other))
-    far = np.where(level, np.inf, np.maximum(one, other))
-    enter, leave = np.maximum(enter, near), np.minimum(leave, far)
-    return _or_missed(inside & (~level | between) & (enter < leave), enter, leave)
+    if level.any():
+        inside &= ~level | ((-half_lengths < z) & (z < half_lengths))
+    if not level.all():
+        one, other = (-half_lengths - z) / dz, (half_lengths - z) / dz
+        enter = np.maximum(enter, np.where(level, -np.inf, np.minimum(one, other)))
+        leave = np.minimum(leave, np.where(level, np.inf, np.maximum(one, other)))
+    return _or_missed(inside & (enter < leave), enter, leave)
 
 
 def capsule_spans(starts: Floats, ways: Floats, radii: Floats, half_lengths: Floats) -> Spans:

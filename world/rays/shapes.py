@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foosim.world.matter.mesh import Mesh
 from foosim.world.rays.boxes import MARGIN_M, Floats
-from foosim.world.rays.solids import CAPSULE, CYLINDER, SPHERE, Meshes, form_of
-from foosim.world.rays.sorted_boxes import SortedBoxes
+from foosim.world.rays.solids import CAPSULE, CYLINDER, MESH, SPHERE, Meshes, form_of
+from foosim.world.rays.sorted_boxes import Boxes, Indices, SortedBoxes, met_among
 from foosim.world.rays.triangles import Triangles
 from foosim.world.scene import ORIGIN, Hull, Quaternion, Shape, Vector, moved, multiply, rotate
 
@@ -52,7 +52,8 @@ class Forms:
                 mesh = having.setdefault(id(triangles), (triangles, np.zeros(count, np.bool_)))
                 mesh[1][number] = True
         self.meshes = list(having.values())
-        self.present = frozenset(self.forms.tolist())
+        self.primitives = sorted({*self.forms.tolist()} - {MESH})
+        """The forms that there are, meshes aside."""
 
 
 def _ball_around(shape: Shape, form: int, half: Vector) -> tuple[Vector, float]:
@@ -72,38 +73,50 @@ def _ball_around(shape: Shape, form: int, half: Vector) -> tuple[Vector, float]:
     return middle, sqrt(x * x + y * y + z * z)
 
 
+class Poses:
+    """Where some shapes in a row are in the world; columns are those of the shapes."""
+
+    def __init__(self, forms: Forms, part: slice, positions: Floats, orientations: Floats) -> None:
+        """`positions` (3, k) and `orientations` (4, k) are those of the frames of these shapes, by number."""
+        frames = forms.frames[part]
+        position, orientation = positions[:, frames], orientations[:, frames]
+        places = position + rotated(orientation, forms.positions[:, part])
+        turns = multiplied(orientation, forms.orientations[:, part])
+        self.middles, self.radii = places + rotated(turns, forms.middles[:, part]), forms.radii[part] + MARGIN_M
+        self.columns = np.concatenate((places, self.middles, _rows(turns)))
+        """Places and middles of the spheres around shapes; the rows that turn vectors into their frames (15, m)."""
+
+    def boxes(self) -> Boxes:
+        """Return boxes around the spheres around the shapes."""
+        return self.middles - self.radii, self.middles + self.radii
+
+
 class Placed:
-    """Shapes where they are in the world. What is behind the last of them is none: it is nowhere near anything."""
+    """Shapes where they are in the world."""
 
-    def __init__(self, forms: Forms, positions: Floats, orientations: Floats, boxes: tuple[Floats, Floats]) -> None:
-        """`positions` (3, k) and `orientations` (4, k) are those of frames, by number.
+    def __init__(self, forms: Forms, columns: Floats, near: Sequence[SortedBoxes]) -> None:
+        """`columns` are those of `Poses`, of all shapes; `near` are the boxes around them, with a margin, in a row."""
+        self.forms, self.things = forms, forms.things
+        self.positions, self.middles = columns[:3], columns[3:6]
+        self.radii = forms.radii + MARGIN_M
+        """Of the spheres around shapes, with a margin."""
+        self._back, self._near = columns[6:], near
 
-        `boxes` are around shapes; where there are none they are made from the spheres around them.
-        """
-        self.forms = forms
-        position, orientation = positions[:, forms.frames], orientations[:, forms.frames]
-        self.positions = position + rotated(orientation, forms.positions)
-        turns = multiplied(orientation, forms.orientations)
-        self.back = _rows(turns)
-        """Turns vectors of the world into those of the shape's frame: three rows, one after the other (9, m)."""
-        middles = self.positions + rotated(turns, forms.middles)
-        low, high = boxes if boxes[0].shape[1] else (middles - forms.radii, middles + forms.radii)
-        self.near = SortedBoxes(low - MARGIN_M, high + MARGIN_M)
-        self.middles = np.concatenate((middles, np.full((3, 1), np.nan)), axis=1)
-        self.radii = np.append(forms.radii + MARGIN_M, 0.0)
-        self.things = np.append(forms.things, NOTHING)
+    def met(self, low: Floats, high: Floats) -> tuple[Indices, Indices]:
+        """Return which of some boxes (3, n) come near which shapes: pairs in the order of the former, then shapes."""
+        return met_among(self._near, low, high)
 
-    def local(self, chosen: NDArray[np.intp], vectors: Floats) -> Floats:
+    def local(self, chosen: Indices, vectors: Floats) -> Floats:
         """Return vectors of the world (3, n) in the frames of the chosen shapes."""
-        rows, (x, y, z) = self.back[:, chosen], vectors
-        return np.stack([rows[one] * x + rows[one + 1] * y + rows[one + 2] * z for one in (0, 3, 6)])
+        rows, (x, y, z) = self._back[:, chosen], vectors
+        return np.array([rows[one] * x + rows[one + 1] * y + rows[one + 2] * z for one in (0, 3, 6)])
 
 
 def rotated(orientations: Floats, vectors: Floats) -> Floats:
     """Return `scene.rotate` of many: quaternions (4, n), vectors (3, n)."""
     (qx, qy, qz, qw), (x, y, z) = orientations, vectors
     tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
-    return np.stack(
+    return np.array(
         (x + qw * tx + (qy * tz - qz * ty), y + qw * ty + (qz * tx - qx * tz), z + qw * tz + (qx * ty - qy * tx))
     )
 
@@ -111,7 +124,7 @@ def rotated(orientations: Floats, vectors: Floats) -> Floats:
 def multiplied(ones: Floats, others: Floats) -> Floats:
     """Return `scene.multiply` of many: quaternions (4, n)."""
     (ax, ay, az, aw), (bx, by, bz, bw) = ones, others
-    return np.stack(
+    return np.array(
         (
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
@@ -130,4 +143,4 @@ def _rows(turns: Floats) -> Floats:
     first = (xx, 2.0 * (xy + wz), 2.0 * (xz - wy))
     second = (2.0 * (xy - wz), yy, 2.0 * (yz + wx))
     third = (2.0 * (xz + wy), 2.0 * (yz - wx), zz)
-    return np.stack((*first, *second, *third))
+    return np.array((*first, *second, *third))

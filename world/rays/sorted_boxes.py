@@ -6,14 +6,17 @@ each class those whose beginning is no more than its greatest size before a ques
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.world.rays.boxes import Floats
 
-Indices = NDArray[np.intp]
+Indices: TypeAlias = NDArray[np.intp]
+Boxes: TypeAlias = tuple[Floats, Floats]
+"""Their least and greatest coordinates (3, m)."""
 FEW: Final = 256
 """So many boxes at most are compared one and all: it costs less than sorting."""
 GROWTH_BITS: Final = 2
@@ -36,8 +39,8 @@ class SortedBoxes:
     def __init__(self, low: Floats, high: Floats) -> None:
         self._low, self._high = low, high
         self._classes: list[_Class] = []
-        count = low.shape[1]
-        if count <= FEW:
+        self.count = low.shape[1]
+        if self.count <= FEW:
             return
         middles = low + high
         self._axis = int(np.argmax(middles.max(axis=1) - middles.min(axis=1)))
@@ -50,11 +53,9 @@ class SortedBoxes:
     def met(self, low: Floats, high: Floats) -> tuple[Indices, Indices]:
         """Return which of some boxes (3, n) overlap which of these: pairs in the order of the former, then these."""
         if not self._classes:
-            is_met = np.ones((low.shape[1], self._low.shape[1]), np.bool_)
-            for axis in range(3):
-                is_met &= self._low[axis] <= high[axis][:, None]
-                is_met &= self._high[axis] >= low[axis][:, None]
-            asked, found = np.nonzero(is_met)
+            overlap = self._low[:, None, :] <= high[:, :, None]
+            overlap &= self._high[:, None, :] >= low[:, :, None]
+            asked, found = (overlap[0] & overlap[1] & overlap[2]).nonzero()
             return asked, found
         pairs = [self._met_of(one, low, high) for one in self._classes]
         asked, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -73,3 +74,17 @@ class SortedBoxes:
             kept = (self._low[number][found] <= high[number][asked]) & (self._high[number][found] >= low[number][asked])
             asked, found = asked[kept], found[kept]
         return asked, found
+
+
+def met_among(several: Sequence[SortedBoxes], low: Floats, high: Floats) -> tuple[Indices, Indices]:
+    """Return what `SortedBoxes.met` does, of several one after the other, whose numbers go on."""
+    if len(several) == 1:
+        return several[0].met(low, high)
+    before, pairs = 0, []
+    for one in several:
+        asked, found = one.met(low, high)
+        pairs.append((asked, found + before))
+        before += one.count
+    asked, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    order = np.argsort(asked, kind="stable")
+    return asked[order], found[order]

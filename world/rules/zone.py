@@ -52,15 +52,19 @@ class ZoneSettings(RuleSettings):
         return self
 
 
-@rule("zone", ZoneSettings, slots={"count": 1, "all_in": 1})
+@rule("zone", ZoneSettings, slots={"count": 1, "all_in": 1, "since": 1})
 class Zone:
-    """How many are in a zone (`count`), and whether all of them are, which are at least one (`all_in`)."""
+    """How many are in a zone (`count`), and whether all of them are, which are at least one (`all_in`).
+
+    `since` is the tick from which on all were in it, for the last time.
+    """
 
     mark_kinds: Final = {FULL: MarkKind("score", "zones with all in them")}
 
     def __init__(self, settings: ZoneSettings, at: RuleMounting) -> None:
         self._name = at.name
-        self._count, self._all_in = at.slot("count"), at.slot("all_in")
+        self._count, self._all_in, self._since = at.slot("count"), at.slot("all_in"), at.slot("since")
+        self._tick_s = at.spec.tick_ns / 1e9
         self._around = Surroundings(at.spec, at.layout)
         self._entities = self._around.tagged(settings.tag)
         self._x, self._y, _ = settings.at.position
@@ -72,7 +76,10 @@ class Zone:
         """Count."""
         inside = sum(self._has(place[0], place[1]) for place in self._places(view))
         view.write(self._count, float(inside))
-        view.write(self._all_in, float(0 < inside == len(self._entities)))
+        is_all = 0 < inside == len(self._entities)
+        if is_all and view.numbers[self._all_in.at] == 0.0:
+            view.write(self._since, float(view.tick))
+        view.write(self._all_in, float(is_all))
 
     def _places(self, view: View) -> Iterator[tuple[float, float, float]]:
         for entity in self._entities:
@@ -89,16 +96,20 @@ class Zone:
         return abs(along) <= self._half[0] and abs(across) <= self._half[1]
 
     def status(self, view: View) -> dict[str, Any]:
-        """Return how many are in the zone and how many there are, and whether that is all."""
-        (count,), (all_in,) = view.read(self._count), view.read(self._all_in)
-        found = {"in": int(count), "of": len(self._entities), "all_in": bool(all_in)}
+        """Return how many are in the zone and how many there are, whether all are, and since when (s, or None)."""
+        (count,), (all_in,), (since,) = view.read(self._count), view.read(self._all_in), view.read(self._since)
+        since_s = round(since * self._tick_s, 9) if all_in else None
+        found = {"in": int(count), "of": len(self._entities), "all_in": bool(all_in), "since_s": since_s}
         return {f"zone {self._name}": found}
 
     @staticmethod
     def text(status: dict[str, Any]) -> str:
-        """Return `goal: 2 of 3 in the zone`, for all zones of a world."""
+        """Return `2 of 3 in the zone goal`, with the time since when it is all of them, for all zones of a world."""
         zones = {key.partition(" ")[2]: its for key, its in status.items() if key.startswith("zone ")}
-        return ", ".join(f"{its['in']} of {its['of']} in the zone {name}" for name, its in zones.items())
+        return ", ".join(
+            f"{its['in']} of {its['of']} in the zone {name}" + (f" since {its['since_s']:g} s" if its["all_in"] else "")
+            for name, its in zones.items()
+        )
 
     def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
         """Yield that all are in it from then on."""

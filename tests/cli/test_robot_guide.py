@@ -1,0 +1,95 @@
+"""The guide to one's own robot, as a reader follows it: its files in an empty folder, its commands in their order."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+ROOT: Final = Path(__file__).parents[2]
+PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
+DIFFERS: Final = 1
+"""Exit code of `foosim-replay diff`: on two nodes others took part."""
+
+
+def files() -> dict[str, str]:
+    """The files that the guide has, by name."""
+    named = dict(re.findall(r"^```(?:yaml|python)\n# ([\w.]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
+    (urdf,) = re.findall(r"^```xml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return {"turret.urdf": urdf, **named}
+
+
+def commands() -> list[list[str]]:
+    """The lines that are typed, in their order."""
+    blocks = re.findall(r"^```sh\n(.*?)^```$|^    ((?:foosim-|python )[^\n]*)$", PAGE, re.MULTILINE | re.DOTALL)
+    lines = [line for sh, one in blocks for line in (sh or one).splitlines()]
+    return [shlex.split(line) for line in lines if not line.startswith("export ")]
+
+
+def run(words: list[str], folder: Path) -> tuple[int, str]:
+    """Run a command as it is installed here; return its exit code and all that it printed."""
+    program = sys.executable if words[0] == "python" else str(Path(sys.executable).parent / words[0])
+    environment = {**os.environ, "PYTHONPATH": ".", "XDG_STATE_HOME": str(folder / "state")}
+    done = subprocess.run(
+        [program, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What each command printed."""
+    folder = tmp_path_factory.mktemp("robot")
+    for name, text in files().items():
+        (folder / name).write_text(text)
+    found = {}
+    for words in commands():
+        code, text = run(words, folder)
+        line = " ".join(words)
+        assert code == (DIFFERS if words[:2] == ["foosim-replay", "diff"] else 0), f"{line}:\n{text}"
+        found[line] = text
+    assert {"live.mcap", "turret.mcap", "two.mcap", "commands.csv", "turret.html"} <= {p.name for p in folder.iterdir()}
+    return found
+
+
+def test_the_guide_goes_from_the_file_to_the_capture(printed: dict[str, str]) -> None:
+    assert [" ".join(line.split()[:2]) for line in printed] == [
+        "foosim-supervisor inspect",
+        "foosim-supervisor validate",
+        "foosim-supervisor up",
+        "foosim-rehearse turret.yaml",
+        "foosim-replay info",
+        "foosim-replay verify",
+        "foosim-replay export",
+        "foosim-replay report",
+        "python look.py",
+        "foosim-rehearse turret.yaml",
+        "foosim-replay diff",
+    ]
+    assert sorted(files()) == ["look.py", "lookout.py", "turret.urdf", "turret.yaml"]
+
+
+def test_the_head_finds_the_crate_and_stops(printed: dict[str, str]) -> None:
+    numbers = [float(number) for number in re.findall(r"-?[0-9]+\.[0-9]+", printed["python look.py"])]
+    least, most, last = numbers
+    assert least == 0.0 and 0.79 < last <= most < 0.95, "the crate begins at 0.79 rad"
+
+
+def test_one_and_two_nodes_compute_the_same_world(printed: dict[str, str]) -> None:
+    digests = {
+        digest
+        for line, text in printed.items()
+        for digest in re.findall(r"digest of all ticks ([0-9a-f]{64})", text)
+        if line.startswith(("foosim-rehearse", "foosim-replay"))
+    }
+    assert len(digests) == 1
+    (said,) = [text for line, text in printed.items() if line.startswith("foosim-replay diff")]
+    assert all(
+        re.search(rf"^  /{topic}: \d+ rows, equal$", said, re.MULTILINE) for topic in ("frame", "tick", "packets")
+    )

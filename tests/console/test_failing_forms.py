@@ -1,0 +1,174 @@
+"""Forms that raise in what is only shown: they are named, with their place, and all else is drawn."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.timeline import Mark, WorldEvents
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.assembly.world import FAILED, mark_kinds
+from foosim.world.frame import Frame
+from tests.console.memory import TABLE
+
+FORMS: Final = """
+import sys
+import numpy as np
+from msgspec import Struct
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import entity_rule, rule, sensor
+from foosim.world.forms.settings import *
+
+acts = {}
+
+
+def act(name, good):
+    if acts.get(name) == "raise":
+        raise ValueError("no more")
+    return acts[name]() if name in acts else good
+
+
+class Reading(Struct, frozen=True):
+    x: Metres
+
+
+@sensor("shown_beam", SensorSettings, Reading)
+class Beam:
+    def __init__(self, settings, at):
+        self.robot = at.robot.name
+
+    def sample(self, view):
+        return Reading(1.0)
+
+    @staticmethod
+    def rays(sensors, numbers):
+        return np.array([act(one.robot, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]) for one in sensors])
+
+
+@rule("shown_rule", RuleSettings)
+class Marks:
+    def __init__(self, settings, at):
+        pass
+
+    def apply(self, view):
+        pass
+
+    def marks(self, before, after):
+        yield act("rule", (after.tick, "tells", "all is well"))
+
+
+@entity_rule("shown_wears", EntityRuleSettings)
+class Wears:
+    def __init__(self, settings, at):
+        self.robot = at.robot.name
+
+    def apply(self, view):
+        pass
+
+    def marks(self, before, after):
+        yield act(f"wears of {self.robot}", (after.tick, "wears", f"{self.robot} wears"))
+"""
+SETS: Final = (
+    "engine=pure",
+    "players={}",
+    *(f"robots.{robot}.sensors.beam={{kind: 'shown_forms:Beam', rate: 50 Hz}}" for robot in ("red.goal", "blue.goal")),
+    *(f"robots.{robot}.rules={{wears: {{kind: 'shown_forms:Wears'}}}}" for robot in ("red.goal", "blue.goal")),
+    "rules={told: {kind: 'shown_forms:Marks'}}",
+)
+RAY: Final = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.fixture
+def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    (tmp_path / "shown_forms.py").write_text(FORMS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    invalidate_caches()
+    module = import_module("shown_forms")
+    yield module
+    sys.modules.pop("shown_forms")
+
+
+def line_of(text: str) -> str:
+    """The place of the line of the module that has this text."""
+    number = next(n for n, line in enumerate(FORMS.splitlines(), 1) if text in line)
+    return f"(shown_forms.py:{number})"
+
+
+def deployment() -> Any:
+    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
+
+
+ACT: Final = line_of("raise ValueError")
+Act = str | Callable[[], Any]
+"""What a form does: it raises, or gives what this gives."""
+
+
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        ("raise", f"ValueError: no more {ACT}"),
+        (lambda: sys.exit(0), "SystemExit: 0"),
+        (lambda: [0.0] * 5, "rays gives array([[0., 0., 0., 0., 0.]]), where an array of finite numbers of shape "),
+        (lambda: [float("nan")] * 6, "rays gives array([[nan, nan, nan, nan, nan, nan]]), where an array of finite "),
+    ],
+)
+def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act, said: str) -> None:
+    forms.acts["red.goal"] = act
+    frame = initial_frame(deployment())
+    drawing = Drawing(deployment(), frame.layout)
+    content, note = drawing.overlays(frame, {"rays", "contacts"})
+    assert content["rays"] == [RAY]
+    assert note["type"] == "note" and note["level"] == "error"
+    assert note["text"].startswith(f"rays of sensor beam of red.goal failed at tick 0: {said}")
+    assert ".py:" in note["text"]
+    (content,) = drawing.overlays(frame, {"rays"})
+    assert content["rays"] == [RAY]
+
+
+def test_rays_of_none_that_fails_are_all_drawn(forms: Any) -> None:
+    frame = initial_frame(deployment())
+    (content,) = Drawing(deployment(), frame.layout).overlays(frame, {"rays"})
+    assert content["rays"] == [RAY, RAY]
+
+
+def marks(tick: int, events: WorldEvents, frame: Frame) -> list[Mark]:
+    return events.take(Frame(tick, frame.layout, np.array(frame.values)))
+
+
+@pytest.mark.parametrize("name", ["rule", "wears of red.goal"])
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        ("raise", f"ValueError: no more {ACT}"),
+        (lambda: 3, "marks gives 3, where a mark (tick, kind, text) is needed {}"),
+        (lambda: (1.5, "tells", "x"), "marks gives (1.5, 'tells', 'x'), where a mark (tick, kind, text) is needed {}"),
+    ],
+)
+def test_marks_that_fail_are_a_mark_and_the_others_told(forms: Any, name: str, act: Act, said: str) -> None:
+    found = deployment()
+    frame, events = initial_frame(found), WorldEvents(found)
+    every = [
+        Mark(2, "tells", "all is well"),
+        Mark(2, "wears", "blue.goal wears"),
+        Mark(2, "wears", "red.goal wears"),
+    ]
+    assert marks(1, events, frame) == [] and sorted(marks(2, events, frame), key=str) == every
+    forms.acts[name] = act
+    told = marks(3, events, frame)
+    (failed,) = [mark for mark in told if mark.kind == FAILED]
+    place = line_of("def marks(" if name == "rule" else "def __init__(self, settings, at):")
+    if name != "rule":
+        lines = [n for n, line in enumerate(FORMS.splitlines(), 1) if "def marks(" in line]
+        place = f"(shown_forms.py:{lines[1]})"
+    called = "rule told of the world" if name == "rule" else "rule wears of red.goal"
+    assert failed == Mark(3, FAILED, f"marks of {called} failed at tick 3: {said.format(place)}")
+    assert len(told) == 3 and FAILED in mark_kinds(found)
+    assert len(marks(4, events, frame)) == 2

@@ -1,0 +1,105 @@
+"""Bodies that cannot be, in whole deployments: each is refused with its place, its value and what is valid.
+
+`test_urdf.py` has the files that are no robots one by one, `test_overlaps.py` what starts in something.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.common.errors import Refused
+from foosim.deployment.assets import pin_assets
+from foosim.world.bodies.inertia import MASS_MAX_KG
+from tests.kinematic_yard import yard_text
+
+ARM: Final = (Path(__file__).parents[2] / "deploy" / "models" / "arm.urdf").read_text()
+JOINTS: Final = {"joints": {"kind": "joint_position", "gain": "20 Hz"}}
+LOOP: Final = '<joint name="back" type="fixed"><parent link="grip"/><child link="base"/></joint></robot>'
+MESH: Final = '<link name="grip"><collision><geometry><mesh filename="gripper.stl"/></geometry></collision></link>'
+
+
+def said(arm: str = ARM, *, folder: Path, objects: Any = None, **robot: Any) -> str:
+    """What is said of a world with an arm whose file this is; nothing if it is good."""
+    (folder / "arm.urdf").write_text(arm)
+    robots = {"arm": {"model": "urdf", "file": "arm.urdf", "fixed": True, "actuators": JOINTS, **robot}}
+    try:
+        pin_assets(yard_text(robots, engine="bullet", objects=objects or {}), "yard.yaml", folder)
+    except Refused as error:
+        return str(error)
+    return ""
+
+
+def line_of(what: str) -> int:
+    return ARM[: ARM.index(what)].count("\n") + 1
+
+
+FIRST_JOINT: Final = ARM[ARM.index("<joint") :].partition(">")[0] + ">"
+FIRST_MASS: Final = ARM[ARM.index("<mass") :].partition("/>")[0] + "/>"
+FIRST_INERTIA: Final = ARM[ARM.index("<inertia ") :].partition("/>")[0] + "/>"
+
+FILES: Final[dict[str, tuple[str, str, str]]] = {
+    "a loop": ("</robot>", LOOP, "a loop: "),
+    "a mimic joint": (FIRST_JOINT, f'{FIRST_JOINT}<mimic joint="other"/>', "a mimic joint: "),
+    "a mass of a mountain": (FIRST_MASS, '<mass value="1e8"/>', "a mass of 1e+08 kg, valid are 1e-06 to 1e+06 kg"),
+    "no mass": (FIRST_MASS, '<mass value="-3"/>', "a mass of -3 kg, valid are 1e-06 to 1e+06 kg"),
+    "an inertia that no body has": (
+        FIRST_INERTIA,
+        '<inertia ixx="1" iyy="1" izz="5"/>',
+        "principal moments of 1, 1 and 5 kg m2: no body has one above the sum of both others, 2",
+    ),
+    "an inertia of a planet": (FIRST_INERTIA, '<inertia ixx="1e9" iyy="1e9" izz="1e9"/>', "principal moments of 1e+09"),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_files(case: str, tmp_path: Path) -> None:
+    """Each names the file and the line: of a loop that of its first joint."""
+    old, new, what = FILES[case]
+    line = line_of(FIRST_JOINT if case == "a loop" else old)
+    assert said(ARM.replace(old, new, 1), folder=tmp_path).startswith(f"arm.urdf:{line}: {what}")
+
+
+def test_a_mesh_that_is_missing(tmp_path: Path) -> None:
+    text = ARM.replace('<link name="grip"/>', MESH)
+    assert text != ARM
+    line, what = line_of('<link name="grip"/>'), "a mesh that cannot be read: gripper.stl: No such file or directory"
+    assert said(text, folder=tmp_path) == f"arm.urdf:{line}: {what}"
+    assert said(folder=tmp_path) == "", "the arm itself is good"
+
+
+@pytest.mark.parametrize(
+    ("robot", "what"),
+    [
+        (
+            {"actuators": {"joints": {"kind": "joint_position", "gain": "101 Hz"}}},
+            "robots.arm.actuators.joints: a gain that overshoots: "
+            "at most the inverse of a tick, 100 Hz, is stable, 101.0",
+        ),
+        ({"sensors": {"scan": {"kind": "laser_scanner", "rate": "10 Hz", "rays": 1082, "range": "9 m"}}},
+         "robots.arm.sensors.scan.rays: more than the most that is valid, 1081, 1082"),
+        ({"speed_limit": "2 km/s"}, "robots.arm.speed_limit: "),
+    ],
+)  # fmt: skip
+def test_settings(robot: dict[str, Any], what: str, tmp_path: Path) -> None:
+    found = said(folder=tmp_path, **robot)
+    place, _, rest = found.partition(": ")
+    assert rest.startswith(what), found
+    assert place.startswith("yard.yaml:") and found.count("\n") == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        ({"mass": "2000000 kg"}, f"objects.a.mass: out of range 1 mg to {MASS_MAX_KG:.0f} kg, '2000000 kg'"),
+        ({"mass": "0 kg"}, "objects.a.mass: out of range 1 mg to"),
+        ({"size": ["1 m", "0 m", "1 m"]}, "objects.a.size[1]: out of range 0.1 mm to 1000 m, '0 m'"),
+        ({"size": ["1 m", "1 m"]}, "objects.a.size: "),
+    ],
+)
+def test_objects(settings: dict[str, Any], what: str, tmp_path: Path) -> None:
+    box = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"x": "3 m", "z": "10 cm"}, **settings}
+    found = said(folder=tmp_path, objects={"a": box})
+    assert found.partition(": ")[2].startswith(what), found

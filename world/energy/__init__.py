@@ -1,0 +1,1 @@
+"""Energy of robots: batteries and what charges them."""
