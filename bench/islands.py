@@ -161,7 +161,7 @@ def text_of(objects: dict[str, Any], robots: dict[str, Any] | None = None) -> st
         "assets": "models",
         "scene": {"kind": "empty", "length": "1 km", "width": "1 km"},
         "objects": objects,
-        "robots": robots or {"post": {"model": "quadrotor", "at": {"x": "-100 m", "z": "2 cm"}}},
+        "robots": robots or {"post": {"model": "quadrotor", "at": {"x": "-100 m", "z": "10 cm"}}},
         "nodes": {NODE: {"robots": ["*"]}},
         "network": {"links": [{"id": "all", "from": "*", "to": "*"}]},
     }
@@ -276,7 +276,8 @@ def various(kinds: int) -> str:
     objects = {}
     for number in range(kinds):
         (box,) = boxes(1, x=2.0 * number).values()
-        objects[f"box{number}"] = {**box, "size": [f"{20 + number} cm"] * 3}
+        at = {**box["at"], "z": f"{10 + number / 2} cm"}
+        objects[f"box{number}"] = {**box, "size": [f"{20 + number} cm"] * 3, "at": at}
     return text_of(objects)
 
 

@@ -66,7 +66,11 @@ def children(parent: int | None = None) -> dict[int, list[str]]:
     """Return the command lines of a process's children by process id; None is this process."""
     found: dict[int, list[str]] = {}
     for task in (PROC / ("self" if parent is None else str(parent)) / "task").iterdir():
-        for pid in map(int, (task / "children").read_text().split()):
+        try:
+            started = (task / "children").read_text().split()
+        except FileNotFoundError:  # a thread that has ended meanwhile
+            continue
+        for pid in map(int, started):
             try:
                 found[pid] = (PROC / str(pid) / "cmdline").read_bytes().decode().split("\0")
             except (FileNotFoundError, ProcessLookupError):
