@@ -21,6 +21,7 @@ from bench import (
     echo,
     fleet,
     hub,
+    islands,
     lateness,
     machine,
     noise,
@@ -91,6 +92,12 @@ BENCHES: Final = (
         "robots that move by kinematics, with their poses, in one process",
         with_default(fleet.fleet),
         fleet.lines,
+    ),
+    Bench(
+        "islands",
+        "rigid bodies island by island: boxes, an arm, robots, and the memory of their engines",
+        with_default(islands.islands),
+        islands.lines,
     ),
     Bench(
         "rigid-fleet",

@@ -20,22 +20,38 @@ BLOCKS: Final = 20
 TICKS_OF_A_BLOCK: Final = 50
 
 
+class BareTable:
+    """The table in Bullet, ready to be ticked from the same state again and again."""
+
+    def __init__(self) -> None:
+        text = apply_sets(TABLE.read_text(), TABLE.name, ["tick=2 ms", "substeps=4"])
+        deployment = load_deployment(text, TABLE.name)
+        frame = initial_frame(deployment)
+        self._substeps = deployment.substeps
+        self._engine = BulletEngine(deployment, frame.layout)
+        self._entities = [*frame.layout.of("ball"), *frame.layout.of("rod")]
+        self._numbers = frame.values.tolist()
+
+    def run(self, ticks: int) -> None:
+        """Compute some ticks."""
+        engine, entities, numbers = self._engine, self._entities, self._numbers
+        for _ in range(ticks):
+            engine.load(entities, numbers)
+            engine.step(self._substeps)
+            engine.read(entities, numbers)
+
+    def close(self) -> None:
+        self._engine.close()
+
+
 def bare_tick_us() -> float:
     """Return b in us: the median of some blocks of ticks, on the wall."""
-    deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["tick=2 ms", "substeps=4"]), TABLE.name)
-    frame = initial_frame(deployment)
-    engine = BulletEngine(deployment, frame.layout)
-    entities = [*frame.layout.of("ball"), *frame.layout.of("rod")]
-    numbers = frame.values.tolist()
-    blocks = []
+    table, blocks = BareTable(), []
     try:
         for _ in range(BLOCKS):
             begun_ns = time.perf_counter_ns()
-            for _ in range(TICKS_OF_A_BLOCK):
-                engine.load(entities, numbers)
-                engine.step(deployment.substeps)
-                engine.read(entities, numbers)
+            table.run(TICKS_OF_A_BLOCK)
             blocks.append((time.perf_counter_ns() - begun_ns) / 1e3 / TICKS_OF_A_BLOCK)
     finally:
-        engine.close()
+        table.close()
     return median(blocks)

@@ -66,7 +66,11 @@ def children(parent: int | None = None) -> dict[int, list[str]]:
     """Return the command lines of a process's children by process id; None is this process."""
     found: dict[int, list[str]] = {}
     for task in (PROC / ("self" if parent is None else str(parent)) / "task").iterdir():
-        for pid in map(int, (task / "children").read_text().split()):
+        try:
+            started = (task / "children").read_text().split()
+        except FileNotFoundError:  # a thread that has ended meanwhile
+            continue
+        for pid in map(int, started):
             try:
                 found[pid] = (PROC / str(pid) / "cmdline").read_bytes().decode().split("\0")
             except (FileNotFoundError, ProcessLookupError):
@@ -82,6 +86,15 @@ def use_of(pid: int) -> Use | None:
     except (FileNotFoundError, ProcessLookupError):
         return None
     return Use((int(fields[11]) + int(fields[12])) / TICKS_PER_S, pages * PAGE_BYTES / 1e6)
+
+
+def pss_mb(pid: int) -> float:
+    """Return the memory of a process; what it shares with others counts in part."""
+    try:
+        lines = (PROC / str(pid) / "smaps_rollup").read_text().splitlines()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) * 1024 / 1e6
 
 
 def free_ports() -> int:

@@ -21,7 +21,7 @@ from statistics import median
 from typing import Any, Final
 
 from bench.bare_tick import bare_tick_us
-from bench.machine import PROC, children, free_ports, use_of
+from bench.machine import children, free_ports, pss_mb, use_of
 from bench.runs import ROOT, BenchError
 
 LOOK_S: Final = 0.5
@@ -110,15 +110,6 @@ def processes_below(parent: int) -> list[int]:
     except FileNotFoundError:
         return []
     return [parent, *(pid for child in started for pid in processes_below(child))]
-
-
-def pss_mb(pid: int) -> float:
-    """Return the memory of a process; what it shares with others counts in part."""
-    try:
-        lines = (PROC / str(pid) / "smaps_rollup").read_text().splitlines()
-    except (FileNotFoundError, ProcessLookupError):
-        return 0.0
-    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) * 1024 / 1e6
 
 
 def commands_of(checkout: Path) -> Path:

@@ -39,6 +39,7 @@ class NodeShell:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self._orphan = Orphan()
         self._solver = Solver(self.core)
+        self._solver.on_miss = self._name_miss
         self._is_present = self._is_stopped = False
         self._shell = RoleShell(process, name, self.core, self._deadline_ns, credentials)
         self.role: Final = self._shell.role
@@ -103,6 +104,10 @@ class NodeShell:
         else:
             self._slow.append(text)
 
+    def _name_miss(self, text: str) -> None:
+        """Log that an engine was built within a tick, and tell the supervisor, which names it if the tick is late."""
+        self.core.actions += [Log("info", text), self.core.slow_form(text)]
+
     def _work(self, now_ns: int) -> bool:
         """Solve the current tick, if there is one to be solved."""
         work = self.core.work
@@ -114,13 +119,14 @@ class NodeShell:
         return True
 
     def _build(self) -> None:
-        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout."""
+        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout, or
+        for islands that may come."""
         if self.core.work is not None:
             return
         if self.core.frame is None:
             self._solver.build_wanted()
-        else:
-            self._solver.build_some()
+        elif not self._solver.build_some():
+            self._solver.build_ahead()
 
     def _deadline_ns(self, now_ns: int) -> int:
         return now_ns if self._solver.is_building else self.core.deadline_ns()

@@ -65,6 +65,10 @@ class Stepper:
         self.substeps = deployment.substeps
         self.rest = Rest(deployment, layout)
         self._by_island = layout.couples
+        self._divided: tuple[
+            tuple[tuple[Entity, ...], ...], list[tuple[tuple[Entity, ...], tuple[Entity, ...], bool]]
+        ] = (), []
+        """The islands of the last tick, and what is solved of them."""
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._islands: tuple[tuple[Entity, ...], ...] | None = None
         self._bodies: list[Entity] = []
@@ -195,7 +199,8 @@ class Stepper:
             self._bodies = [entity for island in work.islands for entity in island]
             self._quarantined = [entity.offsets["quarantined"] for entity in self._bodies]
         bodies = self._bodies
-        if any(map(numbers.__getitem__, self._quarantined)):
+        is_partial = any(map(numbers.__getitem__, self._quarantined))
+        if is_partial:
             for entity in bodies:
                 if numbers[entity.offsets["quarantined"]] != 0.0:
                     _clear_results(entity, numbers)
@@ -205,15 +210,17 @@ class Stepper:
         world, before = self.world, numbers.copy()
         start = work.start or before
         rigid = bodies if self._all_rigid else [entity for entity in bodies if entity.index in self._rigid]
+        changed = bodies
         if rigid and self._by_island:
-            self._solve_islands(cast("IslandEngine", engine), work, start)
+            awake = self._solve_islands(cast("IslandEngine", engine), work, start, is_partial=is_partial)
+            changed = [*awake, *[entity for entity in bodies if entity.index not in self._rigid]]
         elif rigid:
             self._solve_together(cast("Engine", engine), rigid, work, start)
         world.derive(rigid, numbers, work.tick)
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
-        if not (isfinite(sum(numbers)) and world.plausible(bodies, numbers, before, work.tick)):
+        if not (isfinite(sum(numbers)) and world.plausible(changed, numbers, before, work.tick)):
             self._quarantine(work, before)
 
     def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:
@@ -231,28 +238,43 @@ class Stepper:
             raise
         engine.read(bodies, numbers)
 
-    def _solve_islands(self, engine: IslandEngine, work: Work, start: Sequence[float]) -> None:
-        """Solve the rigid bodies of one island after the other; those at rest are left as they are."""
-        numbers, world = work.numbers, self.world
+    def _solve_islands(
+        self, engine: IslandEngine, work: Work, start: Sequence[float], *, is_partial: bool
+    ) -> list[Entity]:
+        """Solve the rigid bodies of one island after the other; those at rest are left as they are.
+
+        `is_partial` says that some are in quarantine. Returns those that were solved.
+        """
+        numbers, world, rest = work.numbers, self.world, self.rest
         view = View(work.tick, numbers, start=start)
-        movers = work.movers or ((),) * len(work.islands)
-        for members, in_the_way in zip(work.islands, movers, strict=True):
-            bodies = tuple(
-                [
-                    entity
-                    for entity in members
-                    if entity.index in self._rigid and numbers[entity.offsets["quarantined"]] == 0.0
-                ]
-            )
-            if not bodies:
-                continue
-            may_rest = self.rest.may_rest(bodies, in_the_way, numbers, start)
-            drives = world.drives(bodies, view)
+        solved: list[Entity] = []
+        if self._divided[0] is not work.islands:
+            self._divided = work.islands, self._rigid_islands(work)
+        for members, in_the_way, is_driven in self._divided[1]:
+            bodies = members
+            if is_partial and any(numbers[entity.offsets["quarantined"]] != 0.0 for entity in members):
+                bodies = tuple([entity for entity in members if numbers[entity.offsets["quarantined"]] == 0.0])
+                if not bodies:
+                    continue
+            may_rest = rest.may_rest(bodies, in_the_way, numbers, start)
+            drives = world.drives(bodies, view) if is_driven or not may_rest else ()
             if may_rest and not any(asked.is_moving for asked in drives):
-                self.rest.keep(bodies, numbers)
+                rest.keep(bodies, numbers)
                 continue
             engine.solve(Island(bodies, in_the_way, drives), numbers, start)
-            self.rest.count(bodies, drives, numbers)
+            rest.count(bodies, drives, numbers)
+            solved += bodies
+        return solved
+
+    def _rigid_islands(self, work: Work) -> list[tuple[tuple[Entity, ...], tuple[Entity, ...], bool]]:
+        """Return the rigid bodies of each island that has any, the movers in its way, and whether one has actuators."""
+        found = []
+        movers = work.movers or ((),) * len(work.islands)
+        for members, in_the_way in zip(work.islands, movers, strict=True):
+            bodies = tuple([entity for entity in members if entity.index in self._rigid])
+            if bodies:
+                found.append((bodies, in_the_way, any(entity.index in self.world.actuators for entity in bodies)))
+        return found
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
         """An island with a result that cannot be keeps its edited state; the bad entities are marked.

@@ -346,7 +346,8 @@ class SupervisorCore:
             self.on_commit(frame)
         late = self.progress.committed(frame.tick, pacer.last_lag_ns, due_ns, now_ns)
         if moved_ns:
-            state.log("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.progress.late}")
+            waited = f"{self.progress.late}{self.progress.late_why}"
+            state.log("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {waited}")
         elif late:
             state.log("info", late)
 

@@ -15,10 +15,12 @@ with without_lines(b"pybullet build time:"):
 
 __all__ = [
     "JOINT_TYPES",
+    "MESH_PIECE",
     "REST",
     "connect_spares",
     "give_client",
     "make_dynamics",
+    "make_scenery",
     "make_shape",
     "make_surface",
     "p",
@@ -28,6 +30,8 @@ __all__ = [
 
 SPARES_MAX: Final = 10
 """Clients without bodies that are kept; each takes 28 MiB."""
+MESH_PIECE: Final = 4096
+"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 REST: Final[Vector] = (0.0, 0.0, 0.0)
 SPEED_MAX: Final = 1000.0
 """Bullet clamps each coordinate's velocity of a multibody at 100 by default: a sphere of 1 cm rolls at 1 m/s."""
@@ -142,6 +146,24 @@ def _make_triangles(client: int, shape: Shape, *, placed: bool) -> int:
     )
     assert made >= 0, shape
     return made
+
+
+def make_scenery(client: int, shape: Shape, groups: tuple[int, int], side: Side, *, rigid: bool = True) -> int:
+    """Make what stands, in a collision group and meeting others: `groups`.
+
+    It is a rigid static: a tilted static *multibody* has its quaternion renormalised at every step.
+    """
+    body: int = p.createMultiBody(
+        baseMass=0.0,
+        baseCollisionShapeIndex=make_shape(client, (shape,), placed=False),
+        basePosition=shape.position,
+        baseOrientation=shape.orientation,
+        useMaximalCoordinates=rigid,
+        physicsClientId=client,
+    )
+    p.setCollisionFilterGroupMask(body, -1, *groups, physicsClientId=client)
+    make_surface(client, body, -1, side)
+    return body
 
 
 def make_dynamics(client: int, body: int, link: int, mass: float, inertia: Vector) -> None:

@@ -17,9 +17,11 @@ from typing import Any, Final
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
+    MESH_PIECE,
     REST,
     give_client,
     make_dynamics,
+    make_scenery,
     make_shape,
     make_surface,
     p,
@@ -37,8 +39,6 @@ FREE_GROUP: Final = 1
 JOINTED_GROUP: Final = 2
 SCENERY_GROUP: Final = 4
 
-MESH_PIECE: Final = 4096
-"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 PARKING_Z_M: Final = 100.0
 PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the scenery: no pair of theirs can touch."""
@@ -143,18 +143,8 @@ class BulletEngine:
         return sorted(names)
 
     def _make_scenery(self, shape: Shape, rigid: bool = True) -> int:
-        """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
-        body: int = p.createMultiBody(
-            baseMass=0.0,
-            baseCollisionShapeIndex=make_shape(self._client, (shape,), placed=False),
-            basePosition=shape.position,
-            baseOrientation=shape.orientation,
-            useMaximalCoordinates=rigid,
-            physicsClientId=self._client,
-        )
-        p.setCollisionFilterGroupMask(body, -1, SCENERY_GROUP, FREE_GROUP, physicsClientId=self._client)
-        self._make_surface(body, -1, shape.surface)
-        return body
+        side = self._physics.sides[shape.surface]
+        return make_scenery(self._client, shape, (SCENERY_GROUP, FREE_GROUP), side, rigid=rigid)
 
     def _make_free(self, body: Body, rigid: bool = False) -> int:
         """Make a free body as a multibody: a rigid body's world inertia tensor is not reloaded with its pose."""

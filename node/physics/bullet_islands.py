@@ -14,27 +14,31 @@ the start of the tick, so that others are pushed by it. (Nothing is pushed by a 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import fsum, sqrt
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
+    MESH_PIECE,
     give_client,
     make_dynamics,
+    make_scenery,
     make_shape,
     make_surface,
     p,
     settings_of,
     start_client,
 )
-from foosim.node.physics.interface import Island
+from foosim.node.physics.interface import ISLAND_ENGINES_MAX, Island
 from foosim.world.assembly.sections import physics_of
-from foosim.world.assembly.volumes import is_felt
-from foosim.world.assembly.world import build_scene
+from foosim.world.assembly.volumes import Volumes, is_felt
+from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.components.drives import Motor
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
@@ -61,14 +65,19 @@ from foosim.world.scene import (
 BODIES: Final = 1
 SCENERY: Final = 2
 """Collision groups: bodies meet everything, what stands meets bodies alone."""
-ENGINES_MAX: Final = 8
-"""Engines that a node keeps: those that were used last."""
-MESH_PIECE: Final = 4096
-"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
+SINGLE_MAX: Final = ISLAND_ENGINES_MAX // 2
+"""Engines of single bodies that stay while others come and go."""
 PARKING_Z_M: Final = 1000.0
 PARKING_GAP_M: Final = 10.0
 """Between parked bodies, beyond what they reach."""
-NO_CONTACT: Final = (0.0, 0.0, -1.0)
+RESIDUAL: Final = 1e-12
+"""The solver stops when an iteration changes no speed by more than 1 um/s or 1 urad/s: this is the square of it."""
+EVERYWHERE: Final[tuple[int, ...]] = (-1, -1, -2, -2)
+"""The contacts of any two bodies and links."""
+DONE: Final = "done"
+NO_CONTACT: Final[tuple[float, ...]] = (0.0, 0.0, -1.0)
+NOBODY: Final[tuple[float, ...]] = (NO_ENTITY,) * PARTNERS_MAX
+NO_IMPULSES: Final[tuple[float, ...]] = (0.0,) * PARTNERS_MAX
 
 Composition = tuple[tuple[int, ...], tuple[int, ...]]
 """The kinds of an island's bodies, in name order, and those of the movers in their way."""
@@ -79,7 +88,7 @@ class _Made:
     """A body in an engine: its id, its joints that move, and where it is parked.
 
     `joints` are indices of Bullet; `is_free` says that the base moves; `end` is the link that a tie holds, if any can;
-    `shaped` are the links that have a shape, -1 being the base.
+    `shaped` are the links that have a shape, -1 being the base, and the groups that each meets.
     """
 
     id: int
@@ -88,8 +97,34 @@ class _Made:
     zeros: tuple[float, ...]
     is_free: bool
     end: int | None
-    shaped: tuple[int, ...]
+    shaped: tuple[tuple[int, int], ...]
     parking: Vector
+
+
+class _Touch:
+    """The contacts of two bodies within a tick: their normal forces (N), and a bit for each substep with one."""
+
+    __slots__ = ("forces", "substeps")
+
+    def __init__(self) -> None:
+        self.forces: list[float] = []
+        self.substeps = 0
+
+
+class _Slots:
+    """Where the numbers of an entity are in a frame; -1 for those that it does not have."""
+
+    def __init__(self, entity: Entity) -> None:
+        self.position, self.orientation = _at(entity, "position"), _at(entity, "orientation")
+        self.velocity, self.spin = _at(entity, "linear_velocity"), _at(entity, "angular_velocity")
+        self.joint_positions, self.joint_velocities = _at(entity, "joint_positions"), _at(entity, "joint_velocities")
+        self.joint_efforts = _at(entity, "joint_efforts")
+        self.contacts = _at(entity, "contacts")
+        self.partners, self.partner_impulses = _at(entity, "partners"), _at(entity, "partner_impulses")
+
+
+def _at(entity: Entity, field: str) -> int:
+    return entity.offsets.get(field, -1)
 
 
 class BulletIslands:
@@ -116,31 +151,85 @@ class BulletIslands:
         self._unnamed = list(known)
         self._engines: dict[Composition, CompositionEngine] = {}
         """The one that was used last at the end."""
-        self.missed = 0
-        """How many engines were built in the middle of a tick."""
+        self._used: set[Composition] = set()
+        """Those that were used, or expected, since the last look ahead."""
+        self._expected: list[Composition] = []
+        self._begun: tuple[Composition, CompositionEngine] | None = None
+        """The engine that is built between ticks, and of what."""
+        self.missed = ""
 
     @classmethod
     def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletIslands]:
-        """Make one with the engines of single bodies, an engine at a time."""
+        """Make one with the engines of the islands at the start and of single bodies, a body at a time."""
         made = cls(deployment, layout)
-        for composition in made.compositions_alone():
+        yield
+        entities = layout.entities
+        islands = Volumes(deployment, layout).islands(initial_numbers(deployment, layout))
+        first = [
+            made._composition(
+                [entities[index] for index in island.entities], [entities[index] for index in island.movers]
+            )
+            for island in islands
+            if entities[island.entities[0]].is_rigid
+        ]
+        alone: list[Composition] = [((kind,), ()) for kind, body in enumerate(made._unnamed) if not _is_mover(body)]
+        made._expected = list(dict.fromkeys([*first, *alone]))[:ISLAND_ENGINES_MAX]
+        while made.build_some():
             yield
-            made.build(composition)
         return made
 
-    def compositions_alone(self) -> list[Composition]:
-        """Return the compositions of single bodies, in the order of their kinds: those that are needed first."""
-        alone: list[Composition] = [((kind,), ()) for kind, body in enumerate(self._unnamed) if not _is_mover(body)]
-        return alone[:ENGINES_MAX]
+    def _composition(self, bodies: Iterable[Entity], movers: Iterable[Entity]) -> Composition:
+        kinds = self._kinds
+        return tuple([kinds[entity.index] for entity in bodies]), tuple([kinds[entity.index] for entity in movers])
 
-    def build(self, composition: Composition) -> CompositionEngine:
-        """Build and keep the engine of a composition; the one that was not used for longest goes."""
-        while len(self._engines) >= ENGINES_MAX:
-            self._engines.pop(next(iter(self._engines))).close()
+    def expect(self, islands: Sequence[tuple[tuple[Entity, ...], tuple[Entity, ...]]]) -> None:
+        """Have the engines of islands built by `build_some`, as far as no other one that is in use has to go."""
+        coming = list(dict.fromkeys([self._composition(*island) for island in islands]))
+        in_use = self._used.intersection(self._engines).union(self._kept())
+        ready = [composition for composition in coming if composition in self._engines]
+        wanted = [composition for composition in coming if composition not in self._engines]
+        self._expected = wanted[: max(0, ISLAND_ENGINES_MAX - len(in_use.union(ready)) - (self._begun is not None))]
+        self._used = set()
+        for composition in ready:
+            self._engines[composition] = self._engines.pop(composition)
+
+    def _kept(self) -> list[Composition]:
+        """Return the single bodies whose engines stay: islands end in these. That is half of all engines at most."""
+        alone = [composition for composition in self._engines if len(composition[0]) == 1 and not composition[1]]
+        return alone[-SINGLE_MAX:]
+
+    def build_some(self) -> bool:
+        """Build a body of an engine that is expected; False when there is none."""
+        if self._begun is None:
+            while self._expected and self._expected[0] in self._engines:
+                del self._expected[0]
+            if not self._expected:
+                return False
+            composition = self._expected.pop(0)
+            self._begun = composition, self._begin(composition)
+        composition, engine = self._begun
+        if not engine.build_some():
+            self._engines[composition], self._begun = engine, None
+        return True
+
+    def _begin(self, composition: Composition) -> CompositionEngine:
+        """Return the engine of a composition, of which nothing is built. One not used for long goes for it."""
+        while len(self._engines) + (self._begun is not None) >= ISLAND_ENGINES_MAX:
+            kept = self._kept()
+            self._engines.pop(next(known for known in self._engines if known not in kept)).close()
         bodies = [self._unnamed[kind] for kind in composition[0]]
         movers = [self._unnamed[kind] for kind in composition[1]]
-        engine = CompositionEngine(self._physics, self._dt, self._substeps, self._scenery, bodies, movers)
-        self._engines[composition] = engine
+        physics, step_s, substeps = self._physics, self._dt, self._substeps
+        return CompositionEngine(physics, step_s, substeps, self._scenery, bodies, movers, at_once=False)
+
+    def _build_now(self, composition: Composition) -> CompositionEngine:
+        """Return an engine that was not expected, or is not complete."""
+        if self._begun is not None and self._begun[0] == composition:
+            engine, self._begun = self._begun[1], None
+        else:
+            engine = self._begin(composition)
+        while engine.build_some():
+            continue
         return engine
 
     def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
@@ -148,26 +237,23 @@ class BulletIslands:
 
         `start` are the numbers of the tick's start, at which movers are.
         """
-        kinds = self._kinds
-        composition = (
-            tuple([kinds[entity.index] for entity in island.bodies]),
-            tuple([kinds[entity.index] for entity in island.movers]),
-        )
+        composition = self._composition(island.bodies, island.movers)
         engine = self._engines.pop(composition, None)
         if engine is None:
-            engine = self.build(composition)
-            self.missed += 1
-        else:
-            self._engines[composition] = engine
+            engine = self._build_now(composition)
+            self.missed = ", ".join([entity.name for entity in (*island.bodies, *island.movers)])
+        self._engines[composition] = engine
+        self._used.add(composition)
         engine.load(island, [self._bodies[entity.index] for entity in (*island.bodies, *island.movers)], numbers, start)
         engine.step(island)
         engine.read(island, numbers)
 
     def close(self) -> None:
         """Free all engines."""
-        for engine in self._engines.values():
+        for engine in (*self._engines.values(), *([] if self._begun is None else [self._begun[1]])):
             engine.close()
         self._engines.clear()
+        self._begun = None
 
 
 def _without_names(body: Body, *, is_mover: bool) -> Body:
@@ -214,6 +300,21 @@ def _of_one(link: Link) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
     return (others, tuple(hulls)) if others else (tuple(hulls[:1]), tuple(hulls[1:]))
 
 
+def _shaped(base: Link | None, links: Sequence[Link]) -> tuple[tuple[int, int], ...]:
+    """Return the links that have a shape, by Bullet's indices, and the groups that each meets.
+
+    Links of a body on a fixed base that no joint moves meet no scenery: nothing can happen between the two.
+    """
+    found = [(-1, BODIES | SCENERY)] if base is not None and base.shapes else []
+    standing: set[int] = set()
+    for index, link in enumerate(links):
+        if base is None and link.joint == "fixed" and (link.parent < 0 or link.parent in standing):
+            standing.add(index)
+        if link.shapes:
+            found.append((index, BODIES if index in standing else BODIES | SCENERY))
+    return tuple(found)
+
+
 def _reach(body: Body) -> float:
     """Return how far a body reaches from its base over all its joints' positions (m)."""
     low, high = swept_box(body)
@@ -246,6 +347,7 @@ def _inertia_about(link: Link, axis: Vector, centre: Vector, joint: str) -> floa
     return about_centre + link.mass * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)  # tests break its rules
 class CompositionEngine:
     """A physics client with scenery and the bodies of one composition, all of them parked between two loads."""
 
@@ -257,49 +359,60 @@ class CompositionEngine:
         scenery: Sequence[Shape],
         bodies: Sequence[Body],
         movers: Sequence[Body],
+        *,
+        at_once: bool = True,
     ) -> None:
+        """Without `at_once` nothing is built but by `build_some`."""
         self._physics, self._dt, self._substeps = physics, substep_s, substeps
-        self._client = start_client(self._settings(), physics.gravity)
+        self._client = -1
         self._silent: set[int] = set()
-        for shape in scenery:
-            self._make_scenery(shape)
         self._made: list[_Made] = []
-        at = PARKING_Z_M
-        for body in (*bodies, *movers):
-            reach = _reach(body)
-            at += reach
-            self._made.append(self._make(body, (0.0, 0.0, at)))
-            at += reach + PARKING_GAP_M
-        self._tie()
         self._count = len(bodies)
-        self._place = {made.id: place for place, made in enumerate(self._made)}
+        self._place: dict[int, int] = {}
         """Of the bodies by their ids: the place in the island, movers behind."""
-        self._touching: set[int] = set()
-        self._impulses: dict[int, dict[int, list[float]]] = {}
-        self._logs: dict[int, tuple[float, float, float]] = {}
-        for made in self._made:
-            self._park(made)
+        self._known_slots: dict[int, _Slots] = {}
+        """By the index of the entity."""
+        self._slots: list[_Slots] = []
+        """Of the bodies of the island that was loaded last."""
+        self._touches: dict[tuple[int, int], _Touch] = {}
+        """Of the tick, by the ids of both bodies."""
+        self._steps: Iterator[None] | None = self._build(tuple(scenery), (*bodies, *movers))
+        while at_once and self.build_some():
+            continue
 
     def _settings(self) -> dict[str, Any]:
-        return settings_of(self._physics, self._dt)
+        """Return the parameters of the world. A solve has one island, so that it may stop on what is left of that."""
+        return {**settings_of(self._physics, self._dt), "solverResidualThreshold": RESIDUAL}
 
     # --- building ----------------------------------------------------------------------------------------------------
 
-    def _make_scenery(self, shape: Shape) -> None:
-        """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
-        side = self._physics.sides[shape.surface]
-        body: int = p.createMultiBody(
-            baseMass=0.0,
-            baseCollisionShapeIndex=make_shape(self._client, (shape,), placed=False),
-            basePosition=shape.position,
-            baseOrientation=shape.orientation,
-            useMaximalCoordinates=True,
-            physicsClientId=self._client,
-        )
-        p.setCollisionFilterGroupMask(body, -1, SCENERY, BODIES, physicsClientId=self._client)
-        make_surface(self._client, body, -1, side)
-        if side.silent:
-            self._silent.add(body)
+    def build_some(self) -> bool:
+        """Build a body, or a piece of scenery; False when all is built, at the last step at the latest."""
+        if self._steps is not None and next(self._steps, DONE) is DONE:
+            self._steps = None
+        return self._steps is not None
+
+    def _build(self, scenery: Sequence[Shape], bodies: Sequence[Body]) -> Iterator[None]:
+        self._client = start_client(self._settings(), self._physics.gravity)
+        for shape in scenery:
+            yield
+            side = self._physics.sides[shape.surface]
+            made = make_scenery(self._client, shape, (SCENERY, BODIES), side)
+            if side.silent:
+                self._silent.add(made)
+        at = PARKING_Z_M
+        for body in bodies:
+            yield
+            reach = _reach(body)
+            at += reach
+            self._add(self._make(body, (0.0, 0.0, at)))
+            at += reach + PARKING_GAP_M
+        self._tie()
+
+    def _add(self, made: _Made) -> None:
+        self._place[made.id] = len(self._made)
+        self._made.append(made)
+        self._park(made)
 
     def _make(self, body: Body, parking: Vector) -> _Made:
         """Make a body as a multibody: a rigid body's world inertia tensor is not reloaded with its pose."""
@@ -327,6 +440,9 @@ class CompositionEngine:
             self._finish(made, -1, base, None)
         for index, link in enumerate(links):
             self._finish(made, index, link, links[link.parent] if link.parent >= 0 else base)
+        shaped = _shaped(base, links)
+        for index, mask in shaped:
+            p.setCollisionFilterGroupMask(made, index, BODIES, mask, client)
         p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
         joints = tuple([index for index, link in enumerate(links) if link.joint in MOVING])
         zeros = (0.0,) * len(joints)
@@ -335,10 +451,7 @@ class CompositionEngine:
                 made, joints, p.VELOCITY_CONTROL, targetVelocities=zeros, forces=zeros, physicsClientId=client
             )
         end = -1 if mass > 0.0 else (joints[0] if joints else None)
-        shaped = [index for index, link in enumerate(links) if link.shapes]
-        if base is not None and base.shapes:
-            shaped.insert(0, -1)
-        return _Made(made, body, joints, zeros, base is not None, end, tuple(shaped), parking)
+        return _Made(made, body, joints, zeros, base is not None, end, shaped, parking)
 
     def _tie(self) -> None:
         """Tie all that moves into one of Bullet's islands, by gears without a force, which have no row in a solve.
@@ -361,7 +474,6 @@ class CompositionEngine:
     def _finish(self, made: int, index: int, link: Link, parent: Link | None) -> None:
         """Set what a link that was made weighs, and what others feel of it."""
         client = self._client
-        p.setCollisionFilterGroupMask(made, index, BODIES, BODIES | SCENERY, physicsClientId=client)
         if link.mass > 0.0:
             make_dynamics(client, made, index, link.mass, link.inertia)
         if link.shapes:
@@ -386,40 +498,42 @@ class CompositionEngine:
         of contacts, which is solved in its order. To set a filter makes another box for a link in the broad phase, and
         ends its pairs at once.
         """
-        client = self._client
+        client, renew = self._client, p.setCollisionFilterGroupMask
         for made in self._made:
             self._park(made)
         for made in self._made:
-            for index in made.shaped:
-                p.setCollisionFilterGroupMask(made.id, index, BODIES, BODIES | SCENERY, physicsClientId=client)
-        p.performCollisionDetection(physicsClientId=client)
+            for index, mask in made.shaped:
+                renew(made.id, index, BODIES, mask, client)
+        p.performCollisionDetection(client)
 
     def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
         """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
         self._wipe()
-        client, reset = self._client, p.resetJointState
-        last = self._substeps - 1.0
-        self._touching = set()
-        for place, (entity, made, body) in enumerate(
-            zip(island.bodies, self._made, bodies[: self._count], strict=False)
-        ):
-            offsets = entity.offsets
+        client, place = self._client, p.resetBasePositionAndOrientation
+        self._slots = [self._slots_of(entity) for entity in island.bodies]
+        for index, slots in enumerate(self._slots):
+            made = self._made[index]
             if made.joints:  # before the base: a link's box in the broad phase is that of the last long way
-                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
-                for number, joint in enumerate(made.joints):
-                    reset(made.id, joint, numbers[at + number], numbers[speed + number], client)
+                at, speed, count = slots.joint_positions, slots.joint_velocities, len(made.joints)
+                positions = [(value,) for value in numbers[at : at + count]]
+                speeds = [(value,) for value in numbers[speed : speed + count]]
+                p.resetJointStatesMultiDof(made.id, made.joints, positions, speeds, client)
             if made.is_free:
-                at, turned = offsets["position"], offsets["orientation"]
-                speed, spin = offsets["linear_velocity"], offsets["angular_velocity"]
-                p.resetBasePositionAndOrientation(made.id, numbers[at : at + 3], numbers[turned : turned + 4], client)
+                at, turned, speed, spin = slots.position, slots.orientation, slots.velocity, slots.spin
+                place(made.id, numbers[at : at + 3], numbers[turned : turned + 4], client)
                 p.resetBaseVelocity(made.id, numbers[speed : speed + 3], numbers[spin : spin + 3], client)
             else:
-                p.resetBasePositionAndOrientation(made.id, body.position, body.orientation, client)
-            if numbers[offsets["contacts"] + 2] == last:
-                self._touching.add(place)
-        for entity, made, body in zip(island.movers, self._made[self._count :], bodies[self._count :], strict=True):
-            self._load_mover(entity, made, body, start)
+                place(made.id, bodies[index].position, bodies[index].orientation, client)
+        for number, mover in enumerate(island.movers, self._count):
+            self._load_mover(mover, self._made[number], bodies[number], start)
         self._command(island)
+
+    def _slots_of(self, entity: Entity) -> _Slots:
+        """Return where the numbers of an entity are; all entities that an engine meets are of one layout."""
+        slots = self._known_slots.get(entity.index)
+        if slots is None:
+            slots = self._known_slots[entity.index] = _Slots(entity)
+        return slots
 
     def _load_mover(self, entity: Entity, made: _Made, body: Body, start: Sequence[float]) -> None:
         at, turned = entity.offsets["position"], entity.offsets["orientation"]
@@ -429,19 +543,13 @@ class CompositionEngine:
 
     def _command(self, island: Island) -> None:
         """Set the motors of joints: speeds, and the greatest forces with which they are reached."""
+        client, mode, drive = self._client, p.VELOCITY_CONTROL, p.setJointMotorControlArray
         for made, drives in zip(self._made, island.drives, strict=False):
             if made.joints:
                 motors = drives.motors
                 speeds = [motor.speed for motor in motors] if motors else made.zeros
                 forces = [motor.force for motor in motors] if motors else made.zeros
-                p.setJointMotorControlArray(
-                    made.id,
-                    made.joints,
-                    p.VELOCITY_CONTROL,
-                    targetVelocities=speeds,
-                    forces=forces,
-                    physicsClientId=self._client,
-                )
+                drive(made.id, made.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
 
     def _push(self, island: Island) -> None:
         """Apply the forces on bases, which Bullet forgets after each substep."""
@@ -452,73 +560,94 @@ class CompositionEngine:
                 p.applyExternalTorque(made.id, -1, torque, p.LINK_FRAME, physicsClientId=self._client)
 
     def step(self, island: Island) -> None:
-        """Advance by the substeps of a tick and log the contacts."""
-        self._impulses, self._logs = {}, {}
+        """Advance by the substeps of a tick and note what touches."""
+        touches: dict[tuple[int, int], _Touch] = {}
+        self._touches = touches
         pushed = any(drives.wrench is not None for drives in island.drives)
+        client, step, contacts = self._client, p.stepSimulation, p.getContactPoints
         for substep in range(self._substeps):
             if pushed:
                 self._push(island)
-            p.stepSimulation(self._client)
-            self._log_contacts(substep)
-
-    def _log_contacts(self, substep: int) -> None:
-        """Count touches that begin, add up impulses by partner, note the last substep.
-
-        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
-        """
-        touched: set[int] = set()
-        places, dt, silent = self._place, self._dt, self._silent
-        for point in p.getContactPoints(physicsClientId=self._client):
-            force = point[9]
-            if force <= 0.0 or point[1] in silent or point[2] in silent:
-                continue
-            one, other = places.get(point[1], -1), places.get(point[2], -1)
-            for place, partner in ((one, other), (other, one)):
-                if 0 <= place < self._count:
-                    touched.add(place)
-                    self._impulses.setdefault(place, {}).setdefault(partner, []).append(force * dt)
-        for place in touched:
-            count, _, _ = self._logs.get(place, NO_CONTACT)
-            self._logs[place] = (count + (place not in self._touching), 0.0, float(substep))
-        self._touching = touched
+            step(client)
+            for point in contacts(*EVERYWHERE, client):
+                force = point[9]
+                if force > 0.0:
+                    pair = point[1:3]
+                    touch = touches.get(pair)
+                    if touch is None:
+                        touches[pair] = touch = _Touch()
+                    touch.forces.append(force)
+                    touch.substeps |= 1 << substep
 
     def read(self, island: Island, numbers: list[float]) -> None:
         """Write the state of the island's bodies, and what they touched, into the numbers."""
-        client = self._client
-        everybody = (*island.bodies, *island.movers)
-        for place, (entity, made) in enumerate(zip(island.bodies, self._made, strict=False)):
-            offsets = entity.offsets
+        client, met = self._client, self._met()
+        for place, slots in enumerate(self._slots):
+            made = self._made[place]
             if made.is_free:
-                position, orientation = p.getBasePositionAndOrientation(made.id, client)
-                velocity, spin = p.getBaseVelocity(made.id, client)
-                at, turned = offsets["position"], offsets["orientation"]
-                numbers[at : at + 3], numbers[turned : turned + 4] = position, orientation
-                at, turned = offsets["linear_velocity"], offsets["angular_velocity"]
-                numbers[at : at + 3], numbers[turned : turned + 3] = velocity, spin
+                at, turned, speed, spin = slots.position, slots.orientation, slots.velocity, slots.spin
+                numbers[at : at + 3], numbers[turned : turned + 4] = p.getBasePositionAndOrientation(made.id, client)
+                numbers[speed : speed + 3], numbers[spin : spin + 3] = p.getBaseVelocity(made.id, client)
             if made.joints:
-                self._read_joints(made, entity, numbers, island.drives[place].motors)
-            self._read_log(place, entity, everybody, numbers)
+                self._read_joints(made, slots, numbers, island.drives[place].motors)
+            self._read_log(place, slots, island, met.get(place, ()), numbers)
 
-    def _read_joints(self, made: _Made, entity: Entity, numbers: list[float], motors: Sequence[Motor]) -> None:
+    def _read_joints(self, made: _Made, slots: _Slots, numbers: list[float], motors: Sequence[Motor]) -> None:
         states = p.getJointStates(made.id, made.joints, self._client)
-        offsets = entity.offsets
-        at, speed, effort = offsets["joint_positions"], offsets["joint_velocities"], offsets["joint_efforts"]
+        at, speed, effort = slots.joint_positions, slots.joint_velocities, slots.joint_efforts
         for number, (position, velocity, _, applied) in enumerate(states):
             numbers[at + number], numbers[speed + number] = position, velocity
             # Without a force Bullet keeps what a motor applied last.
             numbers[effort + number] = applied if motors and motors[number].force > 0.0 else 0.0
 
-    def _read_log(self, place: int, entity: Entity, everybody: Sequence[Entity], numbers: list[float]) -> None:
-        at = entity.offsets["contacts"]
-        count, _, last = self._logs.get(place, NO_CONTACT)
-        by_partner = {partner: fsum(parts) for partner, parts in self._impulses.get(place, {}).items()}
-        numbers[at : at + 3] = count, fsum(by_partner.values()), last
-        if "partners" not in entity.offsets:
+    def _met(self) -> dict[int, list[tuple[int, _Touch]]]:
+        """Return what each body touched in the tick, by its place: the partner's place, -1 for scenery, and how."""
+        found: dict[int, list[tuple[int, _Touch]]] = {}
+        silent, places, count = self._silent, self._place, self._count
+        for (one_id, other_id), touch in self._touches.items():
+            if one_id in silent or other_id in silent:
+                continue
+            one, other = places.get(one_id, -1), places.get(other_id, -1)
+            if 0 <= one < count:
+                found.setdefault(one, []).append((other, touch))
+            if 0 <= other < count:
+                found.setdefault(other, []).append((one, touch))
+        return found
+
+    def _read_log(
+        self, place: int, slots: _Slots, island: Island, met: Sequence[tuple[int, _Touch]], numbers: list[float]
+    ) -> None:
+        """Write what a body touched: how many touches began, the impulse (N s), and the last substep with a contact.
+
+        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
+        """
+        at, dt = slots.contacts, self._dt
+        by_partner: dict[int, float] = {}
+        if not met:
+            numbers[at : at + 3] = NO_CONTACT
+        else:
+            substeps = 0
+            parts: dict[int, list[float]] = {}
+            for partner, touch in met:
+                substeps |= touch.substeps
+                parts.setdefault(partner, []).extend([force * dt for force in touch.forces])
+            by_partner = {partner: fsum(impulses) for partner, impulses in parts.items()}
+            before = substeps << 1 | (numbers[at + 2] == self._substeps - 1.0)
+            began = (substeps & ~before).bit_count()
+            numbers[at : at + 3] = float(began), fsum(by_partner.values()), substeps.bit_length() - 1.0
+        if slots.partners >= 0:
+            self._read_partners(slots, island, by_partner, numbers)
+
+    def _read_partners(self, slots: _Slots, island: Island, by_partner: dict[int, float], numbers: list[float]) -> None:
+        """Write the partners with the greatest impulses, by their indices."""
+        met = sorted([(-impulse, partner) for partner, impulse in by_partner.items() if partner >= 0])[:PARTNERS_MAX]
+        at, impulses = slots.partners, slots.partner_impulses
+        if not met:
+            numbers[at : at + PARTNERS_MAX], numbers[impulses : impulses + PARTNERS_MAX] = NOBODY, NO_IMPULSES
             return
-        met = sorted((-impulse, partner) for partner, impulse in by_partner.items() if partner >= 0)[:PARTNERS_MAX]
-        found = sorted((float(everybody[partner].index), -impulse) for impulse, partner in met)
+        everybody = (*island.bodies, *island.movers)
+        found = sorted([(float(everybody[partner].index), -impulse) for impulse, partner in met])
         missing = PARTNERS_MAX - len(found)
-        at, impulses = entity.offsets["partners"], entity.offsets["partner_impulses"]
         numbers[at : at + PARTNERS_MAX] = [index for index, _ in found] + [NO_ENTITY] * missing
         numbers[impulses : impulses + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing
 

@@ -1,8 +1,10 @@
-"""A mesh from outside meets the physics engine in a throw-away process first, and only then in one that matters.
+"""Meshes and convex hulls from outside meet the physics engine in a throw-away process first, and only then in one that
+matters.
 
-What Python can check is checked before (`world.mesh_files`); what is left is that Bullet may crash, hang or use up the
-memory. The throw-away process has 1 GiB of address space, 5 s of processor time a mesh, and can open nothing: it builds
-the world with that mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it ends in any
+What Python can check is checked before (`world.mesh_files`, `world.bodies`); what is left is that Bullet may crash,
+hang or use up the memory. The throw-away process has 1 GiB of address space, 5 s of processor time for each, and can
+open nothing. It builds the world with one mesh alone, lets a free body fall on it and start inside of it, 100 ticks in
+all; and with one body that has hulls, which goes on by itself and with another body inside of it. If it ends in any
 other way than well, the run does not begin, and the message says which file did it.
 """
 
@@ -23,6 +25,7 @@ from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine, Island, IslandEngine
 from foosim.node.physics.making import kind_of
 from foosim.protocol.codec import decode_any, encode
+from foosim.world.assembly.hulls import with_hulls
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.components.drives import NO_DRIVES
 from foosim.world.layout import Entity, build_layout
@@ -40,9 +43,12 @@ COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
 
 
 def check_models(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
-    """Try the meshes of a deployment, whose text is given, with its engine. Raises AssetError for one that fails."""
-    meshes = {thing: spec.file for thing, spec in deployment.scenery.items() if isinstance(spec, SceneryMesh)}
-    if not meshes or not build_layout(deployment).free:  # motions meet the box around a mesh, which is checked
+    """Try the meshes and hulls of a deployment, whose text is given, with its engine. Its files must have been read.
+
+    Raises AssetError for one that fails.
+    """
+    tries = {label: f"{file}: {label}" for label, (file, _) in _tries(deployment, name).items()}
+    if not tries:
         return
     one_thread = {"OPENBLAS_NUM_THREADS": "1"}  # of which each takes address space
     try:
@@ -60,10 +66,24 @@ def check_models(deployment: Deployment, name: str, text: str, command: Sequence
         code, lines = -signal.SIGALRM, (late.stdout or b"").decode(errors="replace").splitlines()
     if code == 0 and lines and lines[-1] == DONE:
         return
-    tried = [line for line in lines if line in meshes]
-    said = [line for line in lines if line not in meshes and line != DONE]
-    where = f"{meshes[tried[-1]]}: scenery.{tried[-1]}" if tried else f"{name}: its scenery"
+    tried = [line for line in lines if line in tries]
+    said = [line for line in lines if line not in tries and line != DONE]
+    where = tries[tried[-1]] if tried else f"{name}: its shapes"
     raise AssetError(f"{where} failed its trial with the engine {deployment.engine}: {_reason(code, said)}")
+
+
+def _tries(deployment: Deployment, name: str) -> dict[str, tuple[str, SceneryMesh | Entity]]:
+    """Return what is to be tried by its place in the deployment: the file that it is from, and a mesh or a body."""
+    layout = build_layout(deployment)
+    found: dict[str, tuple[str, SceneryMesh | Entity]] = {}
+    if layout.free:  # motions meet the box around a mesh, which is checked
+        for thing, spec in sorted(deployment.scenery.items()):
+            if isinstance(spec, SceneryMesh):
+                found[f"scenery.{thing}"] = spec.file, spec
+    for entity in with_hulls(deployment, layout):
+        section, things = ("robots", deployment.robots) if entity.is_robot else ("objects", deployment.objects)
+        found[f"{section}.{entity.name}"] = getattr(things.get(entity.name), "file", name), entity
+    return found
 
 
 def _reason(code: int, said: Sequence[str]) -> str:
@@ -83,22 +103,26 @@ def main() -> None:
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 1)  # where Bullet prints
     name, text, files = decode_any(tuple[str, str, dict[str, bytes]], sys.stdin.buffer.read())
-    deployment = load_deployment(text, name)
-    kind_of(deployment).make(deployment.model_copy(update={"scenery": {}}), build_layout(deployment)).close()
+    deployment = load_deployment(text, name).with_assets(files)
+    bare = deployment.model_copy(update={"scenery": {}})
+    kind_of(deployment).make(bare, build_layout(deployment)).close()  # imports what it needs
+    tries = _tries(deployment, name)
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 0)
     _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)
-    for thing, spec in sorted(deployment.scenery.items()):
-        if isinstance(spec, SceneryMesh):
-            os.write(report, f"{thing}\n".encode())
-            alone = deployment.model_copy(update={"scenery": {thing: spec}}).with_assets(files)
-            used = resource.getrusage(resource.RUSAGE_SELF)
-            _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + CPU_S)
-            try:
-                _try(alone)
-            except (AssertionError, MemoryError, ArithmeticError) as error:
-                os.write(report, f"{type(error).__name__} {' '.join(str(error).split())[:200]}\n".encode())
-                raise
+    for label, (_, tried) in tries.items():
+        os.write(report, f"{label}\n".encode())
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + CPU_S)
+        try:
+            if isinstance(tried, SceneryMesh):
+                thing = label.removeprefix("scenery.")
+                _try(deployment.model_copy(update={"scenery": {thing: tried}}).with_assets(files))
+            else:
+                _try_body(bare, tried)
+        except (AssertionError, MemoryError, ArithmeticError) as error:
+            os.write(report, f"{type(error).__name__} {' '.join(str(error).split())[:200]}\n".encode())
+            raise
     os.write(report, f"{DONE}\n".encode())
 
 
@@ -134,17 +158,38 @@ def _inside(shape: Shape, mesh: Mesh) -> Vector:
     return position
 
 
+def _try_body(deployment: Deployment, entity: Entity) -> None:
+    """Step a body with hulls from where it starts: by itself, then with another free body in the middle of it."""
+    layout = build_layout(deployment)
+    engine = kind_of(deployment).make(deployment, layout)
+    numbers = initial_numbers(deployment, layout)
+    _step(deployment, engine, (entity,), numbers)
+    others = [other for other in layout.free if other.is_rigid and other.name != entity.name]
+    if others:
+        at = entity.offsets.get("position")
+        body = build_scene(deployment, layout).bodies[entity.name]
+        middle = body.position if at is None else tuple(numbers[at : at + 3])
+        there = others[0].offsets["position"]
+        numbers[there : there + 3] = middle
+        _step(deployment, engine, tuple(sorted((entity, others[0]), key=lambda one: one.index)), numbers)
+    engine.close()
+
+
 def _drop(deployment: Deployment, engine: AnyEngine, body: Entity, numbers: list[float], start: Vector) -> None:
     """Let a free body, which is at rest in a world's numbers, start from somewhere else."""
     at = body.offsets["position"]
     numbers[at : at + 3] = start
+    _step(deployment, engine, (body,), numbers)
+
+
+def _step(deployment: Deployment, engine: AnyEngine, bodies: tuple[Entity, ...], numbers: list[float]) -> None:
     for _ in range(TICKS // 2):
         if isinstance(engine, IslandEngine):
-            engine.solve(Island((body,), (), (NO_DRIVES,)), numbers, numbers)
+            engine.solve(Island(bodies, (), (NO_DRIVES,) * len(bodies)), numbers, numbers)
         else:
-            engine.load((body,), numbers)
+            engine.load(bodies, numbers)
             engine.step(deployment.substeps)
-            engine.read((body,), numbers)
+            engine.read(bodies, numbers)
         if not all(isfinite(number) for number in numbers):
             raise ArithmeticError("a body that touches it is nowhere: its position is not finite")
 

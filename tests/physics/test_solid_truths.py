@@ -11,7 +11,7 @@ import pytest
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.node.physics.bullet_client import make_shape, p
-from foosim.node.physics.bullet_islands import CompositionEngine, _Made
+from foosim.node.physics.bullet_islands import BODIES, SCENERY, CompositionEngine, _Made
 from foosim.node.physics.interface import Island
 from foosim.world.bodies.inertia import turned
 from foosim.world.bodies.urdf import body_of, read_urdf
@@ -459,7 +459,7 @@ class StaticMovers(CompositionEngine):
             useMaximalCoordinates=True,
             physicsClientId=self._client,
         )
-        return _Made(made, body, (), (), True, None, (-1,), parking)
+        return _Made(made, body, (), (), True, None, ((-1, BODIES | SCENERY),), parking)
 
 
 def test_a_mover_pushes_a_box() -> None:

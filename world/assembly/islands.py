@@ -168,6 +168,8 @@ class Assignment:
         self.roster = tuple(roster)
         self.owners = dict(owners)
         self._shares: dict[Touching, dict[str, Share]] = {}
+        self._divided: tuple[list[BodyIsland], dict[str, Share]] = [], {}
+        """The islands of any bodies that were divided last, and their shares."""
 
     def solver_of(self, island: Island) -> str:
         """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
@@ -176,7 +178,10 @@ class Assignment:
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers."""
         if isinstance(self.reach, Volumes):
-            return self._divide_any(self.reach.islands(numbers))
+            islands = self.reach.islands(numbers)
+            if not self._divided[1] or islands is not self._divided[0]:
+                self._divided = islands, self._divide_any(islands)
+            return self._divided[1]
         touching = touching_of(numbers, self.reach)
         if len(self.reach.balls) > 1:
             return self._divide(islands_of(numbers, self.reach, touching))
@@ -184,6 +189,18 @@ class Assignment:
         if shares is None:
             shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
+
+    def approaching(self, numbers: Sequence[float], node: str, ticks: int) -> list[BodyIsland]:
+        """Return the islands that a node may have to solve within some ticks beside those of this one, the likely ones
+        first. No result follows from them."""
+        if not isinstance(self.reach, Volumes):
+            return []
+        return [island for island in self.reach.approaching(numbers, ticks) if self._solver_of_any(island) == node]
+
+    def _solver_of_any(self, island: BodyIsland) -> str:
+        if island.nearest:
+            return self.owners[island.nearest]
+        return solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
 
     def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:
         mine: dict[str, list[tuple[int, ...]]] = {node: [] for node in self.roster}
@@ -199,10 +216,7 @@ class Assignment:
         mine: dict[str, list[BodyIsland]] = {node: [] for node in self.roster}
         solved: dict[str, list[int]] = {node: [] for node in self.roster}
         for island in islands:
-            if island.nearest:
-                solver = self.owners[island.nearest]
-            else:
-                solver = solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
+            solver = self._solver_of_any(island)
             mine[solver].append(island)
             solved[solver].extend(island.entities)
         self._add_unsolved(solved)

@@ -36,11 +36,12 @@ class Rest:
         self, bodies: Sequence[Entity], movers: Sequence[Entity], numbers: Sequence[float], start: Sequence[float]
     ) -> bool:
         """Whether an island is copied unless it is driven: `start` are the numbers at the start of the tick."""
+        slots, ticks = self._slots, self.ticks
         for entity in bodies:
-            at = self._slots.get(entity.index)
-            if at is None or numbers[at] < self.ticks:
+            at = slots.get(entity.index)
+            if at is None or numbers[at] < ticks:
                 return False
-        return not any(_moves(mover, start) for mover in movers)
+        return not movers or not any(moves(mover, start) for mover in movers)
 
     def keep(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
         """Leave bodies at rest as they are; what they touch they have touched before."""
@@ -99,9 +100,10 @@ def _stop(entity: Entity, numbers: list[float]) -> None:
             numbers[at : at + count] = [0.0] * count
 
 
-def _moves(mover: Entity, start: Sequence[float]) -> bool:
-    for field in ("linear_velocity", "angular_velocity", "wheel_speeds"):
-        at = mover.offsets.get(field)
-        if at is not None and any(start[at : at + mover.counts[field]]):
+def moves(entity: Entity, numbers: Sequence[float]) -> bool:
+    """Whether a part of a body has a speed."""
+    for field in ("linear_velocity", "angular_velocity", "joint_velocities", "wheel_speeds"):
+        at = entity.offsets.get(field)
+        if at is not None and any(numbers[at : at + entity.counts[field]]):
             return True
     return False

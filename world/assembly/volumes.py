@@ -9,13 +9,16 @@ go on by a motion) are in no island: each island has those in whose way it is. E
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
+from math import inf
+from operator import itemgetter
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.world.assembly.rest import is_slow, moves
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -27,6 +30,24 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+FEW: Final = 16
+"""Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
+LOOKED_AT: Final = 64
+"""Bodies that a look ahead starts from, and islands that it finds."""
+
+X, Y, Z, W = range(4)
+ROTATION: Final = np.array(
+    [
+        [Y, X, X, X, X, Y, X, Y, X],
+        [Y, Y, Z, Y, X, Z, Z, Z, X],
+        [Z, Z, Y, Z, Z, X, Y, X, Y],
+        [Z, W, W, W, Z, W, W, W, Y],
+    ]
+)
+"""Of each element of a rotation matrix the parts of the quaternion in its two products: x y - z w, and so on."""
+SIGNS: Final = np.array([1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
+TWICE: Final = np.array([-2.0, 2.0, 2.0, 2.0, -2.0, 2.0, 2.0, 2.0, -2.0])
+UNIT: Final = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,30 +82,91 @@ class Volumes:
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
         self._free = np.array([row for row, _, _ in free], np.intp)
-        self._positions = np.array([entity.offsets["position"] for _, entity, _ in free], np.intp)
-        self._orientations = np.array([entity.offsets["orientation"] for _, entity, _ in free], np.intp)
+        self._poses = itemgetter(*[at for _, entity, _ in free for at in _pose_places(entity)]) if free else None
+        """Returns the position and the quaternion's parts of each free body, from a frame's numbers."""
         self._position_of = {entity.index: entity.offsets["position"] for _, entity, _ in free}
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
-        self._middles = np.array(middles).reshape(-1, 3)
-        self._halves = np.array(halves).reshape(-1, 3)
-        self._grown = np.array([body.speed_limit * tick_s + MARGIN_M for _, _, body in free])
+        self._middles = np.array(middles).reshape(-1, 1, 3)
+        self._halves = np.array(halves).reshape(-1, 1, 3)
+        self._ways = np.array([body.speed_limit * tick_s if body.is_free else 0.0 for _, body in felt])
+        """How far each body gets in a tick (m)."""
+        self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
             if not body.is_free:
                 low, high = swept_box(body)
                 self._boxes[row] = [[side - MARGIN_M for side in low], [side + MARGIN_M for side in high]]
         self._fixed = {entity.index: body.position for entity, body in felt if not body.is_free}
+        robots = [entity.is_robot for entity in self._entities if entity.is_rigid]
+        self._has_choice = sum(robots) > 1 and not all(robots)
+        """Whether an island may have several robots and an object: then its solver depends on where they are."""
         self._alone = [
             (entity.index, entity.name if entity.is_robot else "")
             for entity in layout.entities
             if entity.is_solved and not entity.is_rigid
         ]
         """Movers and others that touch nobody: each is solved by itself."""
+        self._found: tuple[list[tuple[int, int]], list[BodyIsland]] | None = None
+        """The pairs and the islands that were found last."""
 
     def islands(self, numbers: Sequence[float]) -> list[BodyIsland]:
-        """Return the islands of an edited frame, and those that move alone, in the order of their first entities."""
+        """Return the islands of an edited frame, and those that move alone, in the order of their first entities.
+
+        It is the same list as the last one where it is equal to that.
+        """
+        pairs = overlapping(self._boxes_at(numbers))
+        if self._found is None or pairs != self._found[0]:
+            self._found = pairs, self._islands_of(pairs)
+        found = [self._with_nearest(island, numbers) for island in self._found[1]] if self._has_choice else None
+        if found is not None and found != self._found[1]:
+            self._found = pairs, found
+        return self._found[1]
+
+    def approaching(self, numbers: Sequence[float], ticks: int) -> list[BodyIsland]:
+        """Return the islands that may come about within some ticks: two of the present ones together, or one with a
+        mover. Those come first whose volumes are nearest. At least one of the two moves.
+
+        Volumes grow by their declared speed limits x so many ticks. What moves is limited to the first `LOOKED_AT`
+        bodies and movers, so that a look costs little in any world.
+        """
+        present = self.islands(numbers)
         boxes = self._boxes_at(numbers)
-        pairs = overlapping(boxes)
+        entities = self._entities
+        moving = [row for row, entity in enumerate(entities) if _is_fast(entity, numbers)][:LOOKED_AT]
+        if not moving:
+            return []
+        gaps = np.maximum(boxes[moving, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[moving, None, 1])
+        gap = gaps.max(axis=2)
+        reach = self._ways * (ticks - 1)
+        near = (gap > 0.0) & (gap <= np.array(reach[moving])[:, None] + reach[None, :])
+        home = {index: number for number, island in enumerate(present) for index in island.entities}
+        found: dict[tuple[int, int], float] = {}
+        for at, other in np.argwhere(near).tolist():
+            one, two = entities[moving[at]], entities[other]
+            if one.is_rigid or two.is_rigid:
+                pair = home[one.index], home[two.index]
+                pair = pair if pair[0] < pair[1] else (pair[1], pair[0])
+                if pair[0] != pair[1]:
+                    found[pair] = min(found.get(pair, inf), float(gap[at, other]))
+        nearest = sorted(found, key=lambda pair: (found[pair], pair))[:LOOKED_AT]
+        return [self._together(present[one], present[other], numbers) for one, other in nearest]
+
+    def _together(self, one: BodyIsland, other: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
+        """Return two islands as one; a mover, which is alone in its island, is in the way of the other."""
+        members = sorted([*one.entities, *other.entities])
+        bodies = [self._layout.entities[index] for index in members if self._layout.entities[index].is_rigid]
+        alone = {index for index in members if not self._layout.entities[index].is_rigid}
+        movers = tuple(sorted({*one.movers, *other.movers, *alone}))
+        return BodyIsland(tuple([entity.index for entity in bodies]), movers, self._nearest(bodies, numbers))
+
+    def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
+        if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice
+            return island
+        nearest = self._nearest([self._layout.entities[index] for index in island.entities], numbers)
+        return island if nearest == island.nearest else replace(island, nearest=nearest)
+
+    def _islands_of(self, pairs: Sequence[tuple[int, int]]) -> list[BodyIsland]:
+        """Return the islands that follow from the pairs of rows that could touch; the robot of each is its first."""
         group = list(range(len(self._entities)))
         movers: list[tuple[int, int]] = []
         for one, other in pairs:
@@ -105,26 +187,23 @@ class Volumes:
             entities = [self._entities[row] for row in rows]
             near = tuple(sorted(in_the_way.get(root, ())))
             indices = tuple([entity.index for entity in entities])
-            found.append(BodyIsland(indices, near, self._nearest(entities, numbers)))
+            first = next((entity.name for entity in entities if entity.is_robot), "")
+            found.append(BodyIsland(indices, near, first))
         found += [BodyIsland((index,), (), name) for index, name in self._alone]
         return sorted(found, key=lambda island: island.entities)
 
     def _boxes_at(self, numbers: Sequence[float]) -> Numbers:
         """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
         boxes = self._boxes.copy()
-        if len(self._free):
-            values = np.array(numbers)
-            x, y, z, w = (values[self._orientations + part] for part in range(4))
-            rows = _rotation(x, y, z, w)
-            middle = np.stack([values[self._positions + axis] for axis in range(3)])
-            half = np.zeros_like(middle)
-            for axis in range(3):
-                for part in range(3):
-                    middle[axis] += rows[axis][part] * self._middles[:, part]
-                    half[axis] += np.abs(rows[axis][part]) * self._halves[:, part]
-            half += self._grown
-            boxes[self._free, 0] = (middle - half).T
-            boxes[self._free, 1] = (middle + half).T
+        if self._poses is not None:
+            poses = np.array(self._poses(numbers)).reshape(-1, 7)
+            turned = _rotations(poses[:, 3:])
+            along = turned * self._middles
+            spread = np.abs(turned) * self._halves
+            middle = poses[:, :3] + (along[:, :, 0] + along[:, :, 1] + along[:, :, 2])
+            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown
+            boxes[self._free, 0] = middle - half
+            boxes[self._free, 1] = middle + half
         return boxes
 
     def _nearest(self, entities: Sequence[Entity], numbers: Sequence[float]) -> str:
@@ -146,7 +225,7 @@ class Volumes:
         return self._fixed[entity.index] if at is None else (numbers[at], numbers[at + 1], numbers[at + 2])
 
 
-def solver_by_name(first: str, roster: Sequence[str]) -> str:
+def solver_by_name(first: str, roster: tuple[str, ...]) -> str:
     """Return the node that solves an island without a robot: it follows from the name of its first entity, so that
     loose objects spread over the nodes."""
     return roster[int.from_bytes(blake2b(first.encode(), digest_size=8).digest(), "little") % len(roster)]
@@ -155,23 +234,35 @@ def solver_by_name(first: str, roster: Sequence[str]) -> str:
 def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     """Return the pairs of boxes (n, 2, 3) that overlap, each with the lower row first, in order.
 
-    Boxes are swept along x, those of one least x by their rows.
+    Boxes are swept along the axis along which their least coordinates vary most, so that a row of boxes costs as
+    little whichever way it goes. The pairs are the same along any.
     """
-    order = np.argsort(boxes[:, 0, 0], kind="stable")
+    count = len(boxes)
+    if count < 2:
+        return []
+    axis = int(boxes[:, 0].var(axis=0).argmax()) if count > FEW else 0
+    order = np.argsort(boxes[:, 0, axis], kind="stable")
     low, high = boxes[order, 0], boxes[order, 1]
-    ends = np.searchsorted(low[:, 0], high[:, 0], side="right")
-    rows = order.tolist()
-    pairs: list[tuple[int, int]] = []
-    for place, end in enumerate(ends.tolist()):
-        if end <= place + 1:
-            continue
-        others = slice(place + 1, end)
-        near = (low[others, 1] <= high[place, 1]) & (high[others, 1] >= low[place, 1])
-        near &= (low[others, 2] <= high[place, 2]) & (high[others, 2] >= low[place, 2])
-        for other in near.nonzero()[0].tolist():
-            one, two = rows[place], rows[place + 1 + other]
-            pairs.append((one, two) if one < two else (two, one))
-    return sorted(pairs)
+    ends = np.searchsorted(low[:, axis], high[:, axis], side="right")
+    counts = ends - np.arange(1, count + 1)  # how many of the later ones begin before a box ends
+    if not counts.any():
+        return []
+    ones = np.repeat(np.arange(count), counts)
+    others = np.arange(len(ones)) - np.repeat(np.cumsum(counts) - counts, counts) + ones + 1
+    meet = ((low[others] <= high[ones]) & (high[others] >= low[ones])).all(axis=1)
+    pairs = np.sort(np.stack((order[ones[meet]], order[others[meet]]), axis=1), axis=1)
+    return sorted(map(tuple, pairs.tolist()))
+
+
+def _is_fast(entity: Entity, numbers: Sequence[float]) -> bool:
+    """Whether a body or a mover may get anywhere."""
+    return not is_slow(entity, numbers) if entity.is_rigid else moves(entity, numbers)
+
+
+def _pose_places(entity: Entity) -> list[int]:
+    """Return the places of a free body's position and of its quaternion's parts."""
+    at, turned = entity.offsets["position"], entity.offsets["orientation"]
+    return [*range(at, at + 3), *range(turned, turned + 4)]
 
 
 def _own_box(body: Body) -> tuple[Vector, Vector]:
@@ -189,13 +280,12 @@ def _own_box(body: Body) -> tuple[Vector, Vector]:
     return middle, (x, y, z)
 
 
-def _rotation(x: Numbers, y: Numbers, z: Numbers, w: Numbers) -> list[list[Numbers]]:
-    """Return the rows of the rotation matrices of unit quaternions."""
-    return [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ]
+def _rotations(quaternions: Numbers) -> Numbers:
+    """Return the rotation matrices (n, 3, 3) of unit quaternions (n, 4): x, y, z, w."""
+    squares = quaternions[:, :, None] * quaternions[:, None, :]
+    first, second = squares[:, ROTATION[0], ROTATION[1]], squares[:, ROTATION[2], ROTATION[3]]
+    parts: Numbers = (UNIT + (first + SIGNS * second) * TWICE).reshape(-1, 3, 3)
+    return parts
 
 
 def _root(group: list[int], row: int) -> int:

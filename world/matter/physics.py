@@ -72,8 +72,8 @@ class SurfaceSettings(SpecBase):
 
 class PhysicsSettings(SpecBase):
     """What all rigid bodies of a world feel: gravity (standard gravity by default, ISO 80000-3), and how often the
-    solver iterates over the contacts and joints of a substep. `contact_erp` is the share of an overlap that a substep
-    corrects.
+    solver iterates at most over the contacts and joints of a substep. `contact_erp` is the share of an overlap that a
+    substep corrects.
     """
 
     gravity: Gravity = default("9.80665 m/s2")
