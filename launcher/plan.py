@@ -23,7 +23,6 @@ from foosim.launcher.run_options import RunOptions, launched_options
 from foosim.protocol import identity
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
-from foosim.world.assembly.hulls import with_hulls
 from foosim.world.assembly.sections import findings_of
 from foosim.world.layout import build_layout
 from foosim.world.scenery import SceneryMesh
@@ -120,7 +119,7 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     has_meshes = any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values())
-    if has_meshes or with_hulls(deployment, build_layout(deployment)):
+    if has_meshes or build_layout(deployment).couples:  # bodies of any kind: some may have hulls
         from foosim.node.physics.mesh_trial import check_models
 
         check_models(deployment, name, text)

@@ -75,6 +75,8 @@ class Member:
         self.refusal = ""
         self.problem = ""
         """Why the run's deployment cannot be used on this machine."""
+        self._not_valid: str | None = None
+        """The deployment of which that is said; another one may still be good."""
         self.build: Build | None = None
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
@@ -107,7 +109,7 @@ class Member:
 
         False also for a message to another boot, or a duplicate. Raises NotValidHere: this process cannot take part.
         """
-        if build.boot != self.boot or self.problem:
+        if build.boot != self.boot or (isinstance(build, Build) and build.deployment == self._not_valid):
             return False
         if self.build is not None:
             return isinstance(build, Build) and self._take_again(self.build, build)
@@ -130,7 +132,7 @@ class Member:
         try:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
-            raise self._invalid(f"the deployment is not valid on its machine: {error.problems[0]}") from None
+            raise self._invalid(build, f"the deployment is not valid on its machine: {error.problems[0]}") from None
         if not deployment.lacks_files:  # else when they have come
             build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self._coming = build, deployment, Fetching(deployment, self._files)
@@ -141,14 +143,15 @@ class Member:
         try:
             deployment = deployment.with_assets(fetching.contents())
         except AssetError as error:
-            raise self._invalid(f"a file of the deployment is not valid on its machine: {error}") from None
+            raise self._invalid(build, f"a file of the deployment is not valid on its machine: {error}") from None
         self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self.deployment = deployment
-        self.build = build
+        self.build, self.problem = build, ""
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
 
-    def _invalid(self, what: str) -> NotValidHere:
+    def _invalid(self, build: Build, what: str) -> NotValidHere:
+        self._not_valid = build.deployment
         self.problem = sendable(f"lost {self.name}: {what}")[: limits.TEXT_LENGTH_MAX]
         self._coming, self.deadline_ns = None, 0
         self._actions.append(Log("error", self.problem))

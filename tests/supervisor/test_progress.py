@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -13,10 +13,11 @@ from msgspec.structs import replace
 
 from foosim.common.units import Pace, parse_pace
 from foosim.node.core import NodeCore
+from foosim.node.tick import Stepper
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
+from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request, Want
 from foosim.rehearsal.run import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
 from foosim.supervisor.progress import ProgressMonitor, _names
@@ -25,6 +26,9 @@ from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
 from foosim.vhub.wait_times import WaitTimes
+from foosim.world.frame import Frame
+from foosim.world.layout import Entity
+from foosim.world.robot_packets import RobotPacket
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -202,6 +206,35 @@ def test_who_keeps_the_vhub_waiting_for_samples_is_lost_not_the_vhub() -> None:
     seen.settings.node = _BlindNode
     reason, tick = ended(seen.go())  # by its heartbeats it may be the vHub that hears nobody: that would show by then
     assert reason == f"lost n2: tick {tick} is overdue by 1.6 s" and 60 <= tick <= 62
+
+
+class _AskedNode(NodeCore):
+    """Is asked five times for the samples of tick 60, as a node is whose sensors take long."""
+
+    def advance(self, now_ns: int) -> None:
+        super().advance(now_ns)
+        if self.name == "n2" and self.frame is not None and self.frame.tick == 60:
+            want = encode(Want("vhub", channels.SAMPLES.name, 60, self.epoch, []))
+            for _ in range(5):
+                self.receive(channels.WANT, "vhub", want, now_ns)
+
+
+def test_a_node_that_is_asked_again_says_the_same_samples_and_measures_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    sensed: list[int] = []
+    sense = Stepper.sense
+
+    def counted(self: Stepper, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
+        sensed.append(frame.tick)
+        return sense(self, frame, robots)
+
+    monkeypatch.setattr(Stepper, "sense", counted)
+    undisturbed = Seen(ticks=100).go()
+    once, sensed[:] = sensed.count(60), []
+    seen = Seen(ticks=100)
+    seen.settings.node = _AskedNode
+    seen.go()
+    assert sensed.count(60) == once == 2, "each node measures once"
+    assert seen.system.supervisor.state.chain == undisturbed.system.supervisor.state.chain
 
 
 class _StuckHub(HubCore):

@@ -253,9 +253,14 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
     processes: dict[str, NodeCore | HubCore] = {"red": node("red"), "vhub": HubCore("boot-red", PRINT, 0)}
     for name, process in processes.items():
         right = Build(name, "boot-red", "first", "run", "t", TEXT, "fast", [])
-        wrong = [
+        not_valid = [
             msgspec.structs.replace(right, deployment="world: ["),
             msgspec.structs.replace(right, deployment=TEXT.replace("seed: 1", "seed: -1")),
+        ]
+        for build in not_valid:
+            process.receive(channels.BUILD, name, encode(build), 0)
+            assert process.member.problem.startswith(f"lost {name}: the deployment is not valid on its machine: t:")
+        wrong = [
             msgspec.structs.replace(right, added=[("dragon", "dragon")]),
             msgspec.structs.replace(right, added=[("ball", "ball")]),
             msgspec.structs.replace(right, name="blue"),
@@ -266,7 +271,7 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
         built = process.member.build
         assert built is None, built
         process.receive(channels.BUILD, name, encode(right), 0)
-        assert process.deployment is not None
+        assert process.deployment is not None and not process.member.problem
         account = process.statistics()
         refused = account.refused if isinstance(account, NodeStatistics) else account.malformed
         assert refused == len(wrong)
