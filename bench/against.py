@@ -1,11 +1,11 @@
-"""`python -m bench.against REVISION [--pairs N] [--install]`: this tree against an earlier one, by interleaved pairs.
+"""`python -m bench.against REVISION [--pairs N] [--compiled] [--install]`: this tree against an earlier one.
 
-Both trees are used as they are checked out, with the packages of this Python. A pair measures one after the other, in
-an order that changes from pair to pair, so that what else the machine does is the same for both; the figures are the
-ratios of the pairs' processor times. Ticks are those of a rehearsal without its start, which is run several times: what
-happens in a tick is the same in each, so it takes the least of its times, whatever else the machine does. Garbage is
-collected seldom, as in the processes of a run. The start is that of a command that rehearses one tick; an install is
-that of `pip install` into an empty folder.
+Both trees are used as they are checked out, or compiled as an install is, with the packages of this Python. A pair
+measures one after the other, in an order that changes from pair to pair, so that what else the machine does is the same
+for both; the figures are the ratios of the pairs' processor times. Ticks are those of a rehearsal without its start,
+which is run several times: what happens in a tick is the same in each, so it takes the least of its times, whatever
+else the machine does. Garbage is collected seldom, as in the processes of a run. The start is that of a command that
+rehearses one tick; an install is that of `pip install` into an empty folder.
 """
 
 from __future__ import annotations
@@ -82,7 +82,13 @@ Measure = Callable[[Path], float]
 
 
 def _environment(tree: Path) -> dict[str, str]:
-    """Return the environment in which `foosim` is that of a tree: a folder with a link for each of its packages."""
+    """Return the environment in which `foosim` is that of a tree: as it is installed beside it, if it is.
+
+    Else it is a folder with a link for each of its packages.
+    """
+    installed = tree.parent / f"{tree.name}-installed"
+    if installed.exists():
+        return {**os.environ, "PYTHONPATH": str(installed)}
     folder = tree.parent / f"{tree.name}-path"
     packages = folder / "foosim"
     if not packages.exists():
@@ -123,9 +129,13 @@ def install_s(tree: Path) -> float:
     """Return the processor time of an install into an empty folder, in seconds; what is compiled is part of it."""
     before_s = _children_s()
     with tempfile.TemporaryDirectory() as folder:
-        pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", folder]
-        _run([*pip, str(tree)], tree)
+        _install(tree, Path(folder))
     return _children_s() - before_s
+
+
+def _install(tree: Path, folder: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(folder)]
+    _run([*pip, str(tree)], tree)
 
 
 def ratio(name: str, measure: Measure, trees: tuple[Path, Path], pairs: int) -> Ratio:
@@ -168,6 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.against", description="This tree against an earlier one.")
     parser.add_argument("revision", help="a commit, as git names it")
     parser.add_argument("--pairs", type=int, default=15, help="of each figure (default 15)")
+    parser.add_argument("--compiled", action="store_true", help="install both trees first, which takes minutes")
     parser.add_argument("--install", action="store_true", help="installs, too: three pairs, which take minutes")
     chosen = parser.parse_args(arguments)
     if chosen.pairs < 1:
@@ -177,6 +188,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"b (a bare tick of the table in Bullet) {b_us:.0f} us; processor time, this tree to {chosen.revision}")
     try:
         with checked_out(chosen.revision) as trees:
+            if chosen.compiled:
+                for tree in trees:
+                    _install(tree, tree.parent / f"{tree.name}-installed")
             for name, measure, pairs in _measures(chosen.pairs, with_install=chosen.install):
                 figures.append(ratio(name, measure, trees, pairs))
                 print(figures[-1].line(), flush=True)
