@@ -12,11 +12,12 @@ from fractions import Fraction
 from typing import Final
 
 from foosim.common import limits, units
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, Refused
 from foosim.common.finding import Location
 from foosim.deployment.text.report import Report
 from foosim.deployment.text.templates import Templates, merged, without
 from foosim.deployment.text.yaml import Fields, Leaf, Place, Scalar, Tree, plain
+from foosim.world.forms import registry
 
 COUNT: Final = "count"
 SPACING: Final = "spacing"
@@ -156,8 +157,11 @@ def _moved(entry: Tree, spacing: Mapping[str, Step], steps: int) -> Tree:
     if steps == 0 or not spacing or not isinstance(entry, Fields):
         return entry
     there = entry.values.get(AT)
+    if there is None and _stands_at_a_pose(entry):
+        there = Fields(entry.place, {}, {})
     if isinstance(there, Fields):
-        return Fields(entry.place, {**entry.values, AT: _moved(there, spacing, steps)}, entry.keys)
+        keys = {AT: next(iter(spacing.values())).key, **entry.keys}
+        return Fields(entry.place, {**entry.values, AT: _moved(there, spacing, steps)}, keys)
     moved = Fields(entry.place, dict(entry.values), dict(entry.keys))
     for axis, step in spacing.items():
         there = entry.values.get(axis)
@@ -166,6 +170,15 @@ def _moved(entry: Tree, spacing: Mapping[str, Step], steps: int) -> Tree:
         elif isinstance(there, Leaf):
             moved.values[axis] = Leaf(there.place, _further(there.value, step, steps))
     return moved
+
+
+def _stands_at_a_pose(entry: Fields) -> bool:
+    """Whether the model of an entry has its place in `at`; what is wrong with the model is found elsewhere."""
+    model = entry.values.get("model")
+    try:
+        return isinstance(model, Leaf) and AT in registry.find_model(str(model.value)).settings.model_fields
+    except Refused:
+        return False
 
 
 def _further(text: Scalar, step: Step, steps: int) -> Scalar:

@@ -3,8 +3,10 @@ is wrong with them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Decimal
 from fnmatch import fnmatchcase
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -17,6 +19,7 @@ from foosim.deployment.text.selection import Population, Selector, TooManyCompar
 from foosim.world.models.rover import RoverRobot
 from tests.deployment.halls import PATROL, hall, long_robot, problems_of, same
 from tests.deployment.test_templates import ROVER
+from tests.kinematic_yard import yard_text
 
 FLEET = ROVER + "robots:\n  rover: {like: rover, count: 12, x: -15 m, y: 10 m, spacing: {x: 1.25 m, y: -50 cm}}\n"
 PILOTS = f"  pilot: {{class: '{PATROL}', rate: 10 Hz, on: $robot, robots: {{$robot: [pose]}}}}\n"
@@ -47,6 +50,16 @@ def test_an_entry_of_its_name_holds_what_is_different_about_one() -> None:
             "r-4": long_robot("9 m", "9 m"),
         },
     )
+
+
+@pytest.mark.parametrize("at", [None, {}, {"yaw": "90 deg"}])
+def test_what_stands_at_a_pose_is_spaced_from_the_origin_where_none_is_given(at: dict[str, str] | None) -> None:
+    robot = {"model": "differential_drive", "count": 3, "spacing": {"x": "2 m", "y": "-50 cm"}}
+    own = {"scout-3": {"at": {"x": "7 m"}}}
+    text = yard_text({"scout": robot | ({} if at is None else {"at": at}), **own})
+    robots: Mapping[str, Any] = load_deployment(text, "yard.yaml").robots
+    places = [robots[name].at.position[:2] for name in ("scout-1", "scout-2", "scout-3")]
+    assert places == [(0.0, 0.0), (2.0, -0.5), (7.0, -1.0)]
 
 
 def test_scenery_has_counts_too_and_starts_at_its_default_place() -> None:
