@@ -1,4 +1,6 @@
-"""A fleet of robots that move by kinematics, each with a sensor of its pose at 50 Hz, in one process without a capture.
+"""A fleet of robots that move by kinematics, in one process without a capture.
+
+Each has a sensor of its pose at 50 Hz, and a scanner of 24 rays at 10 Hz.
 
 They stand in rows on an empty floor and all drive in circles from the first tick on, side by side with neighbours that
 they have to look out for. Each fleet runs by itself, and with one client that hears all of it. Figures are processor
@@ -27,6 +29,10 @@ SIZES: Final = (200, 1000)
 WARM_TICKS: Final = 100
 TICKS_PER_S: Final = 100
 APART_M: Final = 2.0
+SENSORS: Final = {
+    "pose": {"kind": "pose", "rate": "50 Hz"},
+    "scan": {"kind": "laser_scanner", "rate": "10 Hz", "rays": 24, "range": "4 m", "at": {"z": "20 cm"}},
+}
 TO_REACH: Final = {False: 8.0, True: 16.0}
 """In b, of the first fleet: by itself, and with a client that hears all."""
 TIMES: Final = 5.5
@@ -62,7 +68,7 @@ class Fleet:
 def fleet_text(robots: int, *, is_heard: bool) -> str:
     """Return the deployment of a fleet."""
     row = int(robots**0.5) + 1
-    heard = ["pose"] if is_heard else []
+    heard = list(SENSORS) if is_heard else []
     places = {
         f"r{number:04}": {
             "like": "one",
@@ -79,7 +85,7 @@ def fleet_text(robots: int, *, is_heard: bool) -> str:
         "engine": "pure",
         "pace": "fast",
         "scene": {"kind": "empty", "length": "1 km", "width": "1 km"},
-        "templates": {"one": {"model": "differential_drive", "sensors": {"pose": {"kind": "pose", "rate": "50 Hz"}}}},
+        "templates": {"one": {"model": "differential_drive", "sensors": SENSORS}},
         "robots": places,
         "nodes": {"n": {"robots": ["*"]}},
         "players": {
