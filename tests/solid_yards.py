@@ -78,7 +78,8 @@ def three_arms() -> str:
 PUSHED: Final[tuple[Push, ...]] = (
     (5, "ram", (20.0, 0.0, 0.0)),
     (60, "ram", (5.0, 0.0, 0.0)),
-    (110, "ram", (5.0, 0.0, 0.0)),
+    (90, "ram", (5.0, 0.0, 0.0)),
+    (120, "ram", (5.0, 0.0, 0.0)),
 )
 """The ram is thrown at the box, and pushes it on."""
 
