@@ -367,7 +367,8 @@ class NodeCore:
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         islands, movers = term.members(share)
-        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers)
+        values = None if edits or term.stepper.world.has_rules else frame.values
+        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers, values)
         return True
 
     def _collect(self, now_ns: int) -> bool:

@@ -6,15 +6,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import cast
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
+from foosim.node.due_sensors import DueSensors, Turn
 from foosim.node.edited_frame import edit, moved_reference
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
 from foosim.world.assembly.rest import Rest, wake_edited
@@ -39,8 +42,9 @@ _outbox_encoder = msgspec.msgpack.Encoder()
 class Work:
     """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`.
 
-    `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were. `movers`
-    are those in the way of each island, for engines that solve one island after the other.
+    `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were. `values`
+    are the same as an array, where nothing was edited. `movers` are those in the way of each island, for engines that
+    solve one island after the other.
     """
 
     tick: int
@@ -51,6 +55,7 @@ class Work:
     outboxes: dict[int, bytes]
     start: list[float] = field(default_factory=list)
     movers: tuple[tuple[Entity, ...], ...] = ()
+    values: NDArray[np.float64] | None = None
 
 
 class Stepper:
@@ -76,6 +81,7 @@ class Stepper:
         """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
+        self._due = DueSensors((), self._sensors)
         self._sensing = Sensing()
         self._waiting = [
             (layout.entities[index], one)
@@ -102,35 +108,27 @@ class Stepper:
         """Return what computes several sensors or modifiers together, and their names."""
         return self._sensing.groups()
 
-    def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
+    def sense(self, frame: Frame, robots: Sequence[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         """Return what these robots send at the frame's tick, and what their sensors remember.
 
         That is numbers of the next frame, by place. Raises ComponentError.
         """
-        packets: list[RobotPacket] = []
-        tick, outboxes, numbers = frame.tick, frame.outboxes, frame.numbers
-        awake = [robot for robot in robots if numbers[robot.offsets["down"]] == 0.0]
-        due = {robot.name: [one for one in self._sensors[robot.name] if one.is_due(tick, numbers)] for robot in awake}
+        tick, numbers = frame.tick, frame.numbers
+        if self._due.robots != robots:
+            self._due = DueSensors(robots, self._sensors)
+        turn = self._due.at(tick, numbers)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
-        payloads = iter(self._sensing.sample([one for sensors in due.values() for one in sensors], view))
-        for robot in awake:
-            sends: list[tuple[str, str, bytes]] = []
-            for one in due[robot.name]:
-                payload = next(payloads)
-                view.written[one.samples_at] = numbers[one.samples_at] + 1.0
-                if payload is not None:
-                    sends.append((one.channel, "", payload))
-            waiting = outboxes.get(robot.index)
-            if waiting:
-                sends += [
-                    (packet.channel, packet.destination, packet.payload) for packet in _outbox_decoder.decode(waiting)
-                ]
-                sends.sort(key=lambda send: send[0])
-            packets += [
-                RobotPacket(robot.name, index, destination, channel, payload)
-                for index, (channel, destination, payload) in enumerate(sends)
-            ]
+        payloads = self._sensing.sample(turn.sensors, view)
+        for at in turn.counters:
+            view.written[at] = numbers[at] + 1.0
         self.not_finite.update(f"{one.robot} {one.channel}" for one in view.not_finite)
+        if frame.outboxes or None in payloads:
+            return list(_packets(turn, payloads, frame.outboxes)), view.written
+        sent = cast("list[bytes]", payloads)
+        packets = [
+            RobotPacket(robot, number, "", channel, payload)
+            for (robot, number, channel), payload in zip(turn.heads, sent, strict=True)
+        ]
         return packets, view.written
 
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
@@ -218,7 +216,7 @@ class Stepper:
             self._solve_together(cast("Engine", engine), rigid, work, start)
         world.derive(rigid, numbers, work.tick)
         if len(rigid) < len(bodies):
-            world.move(bodies, start, numbers, work.tick)
+            world.move(bodies, start, numbers, work.tick, work.values if work.start else None)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
         if not (isfinite(sum(numbers)) and world.plausible(changed, numbers, before, work.tick)):
             self._quarantine(work, before)
@@ -336,3 +334,18 @@ def moved_slots(written: dict[int, float], old: Layout, new: Layout, gone: Set[s
                 if entity.split <= at < entity.stop:
                     moved[at + shift] = moved_reference(number, old, new, gone) if at in references else number
     return moved
+
+
+def _packets(turn: Turn, payloads: Iterable[bytes | None], outboxes: Mapping[int, bytes]) -> Iterator[RobotPacket]:
+    """Yield what robots send: their readings without those that were dropped, and what waited in their outboxes."""
+    readings = iter(payloads)
+    for robot, sensors in turn.robots:
+        found = [(one.channel, "", payload) for one in sensors if (payload := next(readings)) is not None]
+        waiting = outboxes.get(robot.index)
+        if waiting:
+            found += [
+                (packet.channel, packet.destination, packet.payload) for packet in _outbox_decoder.decode(waiting)
+            ]
+            found.sort(key=lambda send: send[0])
+        for number, (channel, destination, payload) in enumerate(found):
+            yield RobotPacket(robot.name, number, destination, channel, payload)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import blake2b
-from math import isfinite
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -183,12 +182,10 @@ class Barrier:
         values[indices] = np.frombuffer(
             b"".join([raw for part in parts for raw in (part.solver_values, part.owner_values)])
         )
-        frame = Frame(self.tick, layout, values, {o.index: o.packets for part in parts for o in part.outboxes})
-        # A sum is finite only if all numbers are, and checking it is faster.
-        if not isfinite(sum(frame.numbers)) and not all(map(isfinite, frame.numbers)):
+        if not np.isfinite(values).all():
             nodes = [part.node for part in parts if not _is_finite(part)]
             raise BadParts(f"tick {self.tick}: numbers of {', '.join(nodes)} that are not finite", nodes)
-        return frame
+        return Frame(self.tick, layout, values, {o.index: o.packets for part in parts for o in part.outboxes})
 
 
 def _is_finite(part: Part) -> bool:

@@ -38,15 +38,21 @@ class Frame:
         self.layout = layout
         values.setflags(write=False)  # forms get it
         self.values = values
-        self.numbers: list[float] = values.tolist()
-        """The values as Python floats; whoever edits copies the list first."""
+        self._numbers: list[float] | None = None
         self.outboxes: dict[int, bytes] = dict(sorted(outboxes.items())) if outboxes else {}
         self._digest = b""
 
     def take(self, values: NDArray[np.float64]) -> None:
         """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
         values.setflags(write=False)
-        self.values, self.numbers, self._digest = values, values.tolist(), b""
+        self.values, self._numbers, self._digest = values, None, b""
+
+    @property
+    def numbers(self) -> list[float]:
+        """The values as Python floats, made when they are first asked for; whoever edits copies the list first."""
+        if self._numbers is None:
+            self._numbers = self.values.tolist()
+        return self._numbers
 
     @property
     def digest(self) -> bytes:

@@ -265,3 +265,20 @@ def test_bad_settings_are_refused_with_their_place(change: dict[str, Any], said:
     with pytest.raises(DeploymentError) as error:
         load_deployment(yard_text(change, scene={"kind": "boxes", "boxes": {"box": box}}), "yard.yaml")
     assert said in str(error.value)
+
+
+def test_what_is_kept_of_who_may_meet_whom_changes_nothing() -> None:
+    """A crowd that is computed anew at each tick is as one that goes on, also where somebody is put elsewhere."""
+    yard, nowhere = Yard(crowd(2, 80)), 0
+    for tick in range(90):
+        command_all(yard)
+        if tick % 30 == 29:
+            robots = [robot for robot in yard.layout.robots if robot.model != "mover"]
+            one, other = robots[tick % len(robots)], robots[(tick + 40) % len(robots)]
+            x, y, z = yard.vector(other.name, "position")
+            yard.put(one.name, "position", x + 0.4, y, z + 0.05 * (tick % 2))
+        fresh = yard.numbers.copy()
+        yard.solve(yard.layout.robots, fresh, Stepper(yard.deployment, yard.layout))
+        yard.step()
+        nowhere += fresh == yard.numbers
+    assert nowhere == 90

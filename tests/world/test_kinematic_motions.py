@@ -11,8 +11,9 @@ from foosim.world.actuators.v_w import Motion
 from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.actuators.x_y_w import Velocity
+from foosim.world.assembly.world import TOGETHER_MIN
 from foosim.world.components.fitted import sensors_of
-from foosim.world.components.view import View, WritableView
+from foosim.world.components.view import ComponentError, View, WritableView
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
 QUICK: Final = {"acceleration": "100 m/s2"}
@@ -207,3 +208,35 @@ def test_a_zone_counts_who_is_in_it(shape: dict[str, Any]) -> None:
     yard.put("c", "position", 1.0, 1.1)
     rules.apply_rules(yard.numbers, 1)
     assert (yard.vector("world", "goal.count"), yard.vector("world", "goal.all_in")) == ([3.0], [1.0])
+
+
+@pytest.mark.parametrize("kind", ["v_w", "wheel_speeds"])
+def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -> None:
+    robot = {"model": "differential_drive", "actuators": {"motion": {"kind": kind}}}
+    robots = {
+        f"r{n}": {**robot, "at": {"x": f"{n} m"}, "speed": f"{1 + n / 10} m/s", "track": f"{20 + n / 2} cm"}
+        for n in range(TOGETHER_MIN)
+    }
+    yard = Yard(yard_text(robots))
+    for n, name in enumerate(robots):
+        yard.put(name, "motion.set_point", *drawn(name, n, (4.0, 8.0)))
+    world = yard.stepper.world
+    view = View(0, yard.numbers)
+    actuators = [world.actuators[entity.index][0].actuator for entity in yard.layout.robots]
+    together = type(actuators[0]).together(actuators).command(view)  # type: ignore[attr-defined]
+    alone = world.motors(yard.layout.robots, view)
+    assert together.tolist() == [[list(motor) for motor in motors] for motors in alone]
+    at_limit = sum(max(abs(target) for target, _ in motors) > 0.999 * (1 + n / 10) for n, motors in enumerate(alone))
+    assert at_limit > 3 or kind == "wheel_speeds"
+
+
+def test_an_array_that_is_none_of_all_drives_names_them() -> None:
+    yard = Yard(
+        yard_text({f"r{n}": {"model": "differential_drive", "at": {"x": f"{n} m"}} for n in range(TOGETHER_MIN)})
+    )
+    moving = yard.stepper.world._moving_of(yard.layout.robots)
+    ((_, _, together),) = moving.groups
+    together._asked = together._asked[1:]
+    yard.stepper.world._moving = moving
+    with pytest.raises(ComponentError, match="actuators of the motion differential_drive failed at tick 0"):
+        yard.step()

@@ -7,7 +7,8 @@ the robot goes along the arc that was asked for.
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta, Struct
 
@@ -17,6 +18,9 @@ from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.wheels import wheels_of
+
+if TYPE_CHECKING:  # numpy is for those who compute a tick
+    from foosim.world.moving.asked import MotionsAsked
 
 
 class VWSettings(ActuatorSettings):
@@ -70,3 +74,10 @@ class MotionActuator:
             share = most / fastest
             left, right = left * share, right * share
         return self._wheels.asked(left, right, view)
+
+    @staticmethod
+    def together(actuators: Sequence[MotionActuator]) -> MotionsAsked:
+        """Return these as one; their robots move by kinematics."""
+        from foosim.world.moving.asked import MotionsAsked
+
+        return MotionsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])

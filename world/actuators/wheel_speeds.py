@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from msgspec import Struct
 
 from foosim.world.components.entities import Motors
@@ -10,6 +13,9 @@ from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.wheels import wheels_of
+
+if TYPE_CHECKING:  # numpy is for those who compute a tick
+    from foosim.world.moving.asked import WheelSpeedsAsked
 
 
 class WheelSpeedsSettings(ActuatorSettings):
@@ -54,3 +60,10 @@ class DriveActuator:
         """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
         left, right = view.read(self._set_point)
         return self._wheels.asked(left, right, view)
+
+    @staticmethod
+    def together(actuators: Sequence[DriveActuator]) -> WheelSpeedsAsked:
+        """Return these as one; their robots move by kinematics."""
+        from foosim.world.moving.asked import WheelSpeedsAsked
+
+        return WheelSpeedsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])

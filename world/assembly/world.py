@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from foosim.common.errors import Refused
 from foosim.common.keyed_random import draw_key
@@ -47,6 +50,16 @@ NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose marks cannot be told."""
 FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
+TOGETHER_MIN: Final = 32
+"""Actuators from which on they are asked together: fewer are asked one after the other in less time."""
+
+
+class _Moving(NamedTuple):
+    """Entities that are solved in a tick, and those of them that a motion moves: by motion, with what asks their motors
+    at once, or None where each is asked by itself."""
+
+    entities: list[Entity]
+    groups: list[tuple[str, list[Entity], Any]]
 
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
@@ -256,6 +269,7 @@ class World:
         """What moves each robot that has actuators, by the entity's index."""
         self._only = {index: its[0] for index, its in fitted.items() if len(its) == 1}
         self._motions = _motions_of(spec, layout)
+        self._moving = _Moving([], [])
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
@@ -322,24 +336,58 @@ class World:
             except BaseException as error:
                 raise component_error(f"rule {label}", WORLD, tick, error) from error
 
-    def move(self, entities: Sequence[Entity], start: Sequence[float], numbers: list[float], tick: int) -> None:
-        """Move those of these entities that go on by motions: `start` are the numbers at the tick's start."""
+    def move(
+        self,
+        entities: Sequence[Entity],
+        start: Sequence[float],
+        numbers: list[float],
+        tick: int,
+        values: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Move those of these entities that go on by motions.
+
+        `start` are the numbers at the tick's start, `values` the same as an array where there is one already.
+        """
+        if self._moving.entities != entities:
+            self._moving = self._moving_of(entities)
+        if not self._moving.groups:
+            return
+        view, asking = SolvingView(tick, start, numbers, values), View(tick, numbers, start=start)
+        for name, moved, together in self._moving.groups:
+            asked: Any = self.motors(moved, asking) if together is None else _asked(name, together, moved, asking)
+            try:
+                self._motions[name].move(moved, asked, view)
+            except BaseException as error:
+                if not isinstance(error, KeyboardInterrupt) and together is None:
+                    self.check_motors(moved, asked, tick)
+                raise component_error(f"motion {name}", "", tick, error) from error
+
+    def _moving_of(self, entities: Sequence[Entity]) -> _Moving:
         groups: dict[str, list[Entity]] = {}
         for entity in entities:
             name = self._motion_of.get(entity.index)
             if name is not None:
                 groups.setdefault(name, []).append(entity)
-        if not groups:
-            return
-        view, asking = SolvingView(tick, start, numbers), View(tick, numbers, start=start)
-        for name, moving in sorted(groups.items()):
-            asked = self.motors(moving, asking)
-            try:
-                self._motions[name].move(moving, asked, view)
-            except BaseException as error:
-                if not isinstance(error, KeyboardInterrupt):
-                    self.check_motors(moving, asked, tick)
-                raise component_error(f"motion {name}", "", tick, error) from error
+        return _Moving(
+            list(entities), [(name, moved, self._together(name, moved)) for name, moved in sorted(groups.items())]
+        )
+
+    def _together(self, motion: str, entities: Sequence[Entity]) -> Any:
+        """Return what asks the motors of all of these entities at once; None where each is asked by itself."""
+        fitted = [self._only.get(entity.index) for entity in entities]
+        actuators = [one.actuator for one in fitted if one is not None]
+        kinds = {type(one) for one in actuators}
+        if (
+            len(fitted) < TOGETHER_MIN
+            or None in fitted
+            or len(kinds) > 1
+            or not hasattr(type(actuators[0]), "together")
+            or not getattr(self._motions[motion], "takes_arrays", False)
+            or any(entity.index in self._powers for entity in entities)
+        ):
+            return None
+        made: Any = actuators[0]
+        return called(f"actuators of the motion {motion}", "", 0, made.together, actuators)
 
     def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
         """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""
@@ -491,6 +539,17 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
         at = MotionMounting(spec, layout, name, tuple(entities), frozenset(found.writes))
         motions[name] = called(f"motion {name}", "", 0, found.made, at)
     return motions
+
+
+def _asked(motion: str, together: Any, entities: Sequence[Entity], view: View) -> NDArray[np.float64]:
+    """Return what the actuators of several entities ask of their motors at once. Raises ComponentError."""
+    try:
+        asked = together.command(view)
+        if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (len(entities), 2):
+            return asked
+        raise WrongResult(together.command, f"an array of float64 of the shape ({len(entities)}, motors, 2)", asked)
+    except BaseException as error:
+        raise component_error(f"actuators of the motion {motion}", "", view.tick, error) from error
 
 
 def _without_power(one: FittedActuator, view: View) -> Motors:

@@ -12,6 +12,7 @@ Whoever is in something already, since a rigid body was pushed there, may go whe
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -33,13 +34,14 @@ from foosim.world.components.entities import MotionMounting
 from foosim.world.components.view import Slot, SolvingView
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity
-from foosim.world.moving.columns import Columns
 from foosim.world.moving.upright import made_model, upright_of
 from foosim.world.scene import Body, Shape, place, swept_box
 
 Flags: TypeAlias = NDArray[np.bool_]
 HALVINGS: Final = 7
 """A way that is blocked is tried at 1, 1/2, 1/4, ... of its length, so often."""
+SKIN_M: Final = 0.25
+"""Who may meet whom is looked up anew when somebody is this far from where he was then, in x or y."""
 GAP_M: Final = 1e-6
 """Half of what stays between two that move: far above rounding."""
 ROUNDING: Final = 1.000001
@@ -82,33 +84,47 @@ class FreeWay:
         about = np.array([numbers for _, numbers in movers])
         self._radius, self._low, self._high, speed = about.T.copy()
         self._way = speed * self._tick_s * ROUNDING
-        self._places = Columns([[_position(entity)] for entity, _ in movers])
+        self._places = np.array([_position(entity).places for entity, _ in movers])
         self._apart_m = 2.0 * float(np.max(self._radius + self._way)) + 4.0 * GAP_M
-        self._standing = Standing(standing, float(np.max(self._radius + self._way)))
+        self._standing = Standing(standing, float(np.max(self._radius + self._way)) + SKIN_M)
         self._rigid_radius = np.array([one.radius for one in self._rigid])
 
-    def movers(self, entities: Sequence[Entity]) -> Movers:
-        """Return what these that move are to obstacles, for `near`."""
+    def movers(self, entities: Sequence[Entity], *, is_level: bool = False) -> Movers:
+        """Return what these that move are to obstacles, for `near`; those that are `is_level` keep their height."""
         rows = np.array([self._rows[entity.index] for entity in entities])
         way, radius = self._way[rows], self._radius[rows]
         assert (way > 0.0).all(), "the body of what moves says how fast it can be"
-        return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius))
+        return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius), is_level)
 
     def near(self, movers: Movers, view: SolvingView) -> Near:
         """Return what these may meet within the tick."""
-        everybody = self._places.read(view.numbers)
+        everybody = view.values[self._places]
+        candidates = movers.candidates
+        if candidates is None or not candidates.hold(everybody, movers):
+            candidates = movers.candidates = self._candidates(movers, everybody)
         places = everybody[movers.rows]
-        planes, met = self._planes(movers, everybody), self._solids(movers, places, view.numbers)
-        return Near(places, movers, planes, met)
+        planes = self._planes(movers, everybody, candidates)
+        return Near(places, movers, planes, self._solids(movers, places, candidates, view.numbers))
 
-    def _planes(self, movers: Movers, everybody: Floats) -> _Planes:
+    def _candidates(self, movers: Movers, everybody: Floats) -> _Candidates:
+        """Return who may meet whom and what, as long as nobody is farther from here than `SKIN_M`."""
+        places = everybody[movers.rows]
+        who, other = pairs_near(places, everybody, self._apart_m + 2.0 * SKIN_M)
+        is_other = (movers.rows[who] != other).nonzero()[0]
+        met, what = self._standing.near(places[:, 0], places[:, 1])
+        if movers.is_level:
+            found, z = self._standing.solids.at(what), places[met, 2]
+            is_as_high = ((found.low < z + movers.high[met]) & (found.high > z + movers.low[met])).nonzero()[0]
+            met, what = met[is_as_high], what[is_as_high]
+        found = self._standing.solids.at(what)
+        return _Candidates(everybody, places[:, 2], who[is_other], other[is_other], met, found)
+
+    def _planes(self, movers: Movers, everybody: Floats, candidates: _Candidates) -> _Planes:
         """Return the planes half-way to others that are near."""
-        who, other = pairs_near(everybody[movers.rows], everybody, self._apart_m)
-        own = movers.rows[who]
-        is_other = (own != other).nonzero()[0]
-        if not len(is_other):
+        who, other = candidates.who, candidates.other
+        if not len(who):
             return _NO_PLANES
-        who, own, other = who[is_other], own[is_other], other[is_other]
+        own = movers.rows[who]
         here, there = everybody[own], everybody[other]
         dx, dy = there[:, 0] - here[:, 0], there[:, 1] - here[:, 1]
         way = np.sqrt(dx * dx + dy * dy)
@@ -129,10 +145,9 @@ class FreeWay:
         room = np.where(is_upright, half, above[near] / 2.0 - GAP_M)
         return _Planes(who, nx, ny, nz, here[:, 0] * nx + here[:, 1] * ny + here[:, 2] * nz + room)
 
-    def _solids(self, movers: Movers, places: Floats, numbers: Sequence[float]) -> _Met:
+    def _solids(self, movers: Movers, places: Floats, candidates: _Candidates, numbers: Sequence[float]) -> _Met:
         """Return the obstacles that are near, and who is in which of them already."""
-        who, what = self._standing.near(places[:, 0], places[:, 1])
-        found = self._standing.solids.at(what)
+        who, found = candidates.met, candidates.what
         if self._rigid:
             moved, theirs = self._near_rigid(movers, places, numbers)
             who, found = np.concatenate((who, moved)), joined((found, theirs))
@@ -168,7 +183,30 @@ class FreeWay:
         return np.array([mover for mover, _ in met], np.int64), solids(row for _, row in met)
 
 
-class Movers(NamedTuple):
+class _Candidates(NamedTuple):
+    """Who may meet whom and what: a choice that changes nothing but the time that it takes to look.
+
+    It was made where everybody was at these places, and those that move at these heights. `who` may meet `other` that
+    move, by their rows; `met` may meet `what` never moves.
+    """
+
+    everybody: Floats
+    heights: Floats
+    who: Places
+    other: Places
+    met: Places
+    what: Solids
+
+    def hold(self, everybody: Floats, movers: Movers) -> bool:
+        """Whether nobody is too far from where the choice was made."""
+        moved = np.abs(everybody[:, 0:2] - self.everybody[:, 0:2])
+        if not moved.max() <= SKIN_M:
+            return False
+        return not movers.is_level or bool((everybody[movers.rows, 2] == self.heights).all())
+
+
+@dataclass(slots=True)
+class Movers:
     """Bodies that one node moves: their rows among all that move, what they are to obstacles, how far they may go."""
 
     rows: Places
@@ -179,6 +217,9 @@ class Movers(NamedTuple):
     """At most in a tick (m)."""
     pieces: Floats
     """In so many pieces a way is looked at, so that none is longer than the radius."""
+    is_level: bool
+    """Whether they keep their heights."""
+    candidates: _Candidates | None = None
 
 
 _NOTHING: Final = np.zeros(0)

@@ -60,7 +60,10 @@ class Model(Protocol):
 
 
 class Motion(Protocol):
-    """How entities go on: one object moves all of a layout that go on so. It is made from a `MotionMounting`."""
+    """How entities go on: one object moves all of a layout that go on so. It is made from a `MotionMounting`.
+
+    `motors` of a class whose `takes_arrays` is True may be an array of shape (entities, motors, 2).
+    """
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Write the state after a tick of these entities, whose motors are asked for this much.

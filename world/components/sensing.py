@@ -54,12 +54,13 @@ class Sensing:
 @dataclass(frozen=True, slots=True)
 class _Group:
     """Sensors or modifiers of one class that are computed together: the places of their sensors, what they became, how
-    many numbers each has, and their names, for messages."""
+    many numbers each has, their names, for messages, and whether what they compute is what is sent."""
 
     places: list[int]
     made: Any
     size: int
     what: str
+    is_last: bool
 
 
 class Plan:
@@ -105,7 +106,9 @@ class Plan:
                 continue
             names = [f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its]
             what = f"{form} {', '.join(names[:NAMED_MAX])}{', ...' * (len(names) > NAMED_MAX)}"
-            groups.append(_Group([place for place, _ in its], self._put_together(kind, its, what), size, what))
+            places = [place for place, _ in its]
+            is_last = not any(self._fitted[place].modifiers for place in places)
+            groups.append(_Group(places, self._put_together(kind, its, what), size, what, is_last))
         return groups, alone
 
     def _put_together(self, kind: Any, members: Sequence[tuple[int, Any]], what: str) -> Any:
@@ -121,7 +124,8 @@ class Plan:
             readings[place] = _numbers(one, reading, view) if one.modifiers else reading
         for group in self._together:
             rows = _computed(group, len(group.places), view, group.made.sample, view)
-            for place, row in zip(group.places, rows, strict=True):
+            is_sent = group.is_last and np.isfinite(rows).all()
+            for place, row in zip(group.places, _packed(rows) if is_sent else rows, strict=True):
                 readings[place] = row
         for depth, (groups, alone) in enumerate(self._steps):
             for place in alone:
@@ -129,7 +133,16 @@ class Plan:
                     readings[place] = fitted[place].modifiers[depth].apply(_listed(readings[place]), view)
             for group in groups:
                 _apply_together(group, readings, view)
-        return [_payload(one, reading, view) for one, reading in zip(fitted, readings, strict=True)]
+        return [
+            reading if type(reading) is bytes else _payload(one, reading, view)
+            for one, reading in zip(fitted, readings, strict=True)
+        ]
+
+
+def _packed(rows: Numbers) -> list[bytes]:
+    """Return the payloads of readings of finite numbers, as `PayloadCodec.encode_numbers` does of each."""
+    size, packed = rows.shape[1] * rows.itemsize, rows.tobytes()
+    return [packed[start : start + size] for start in range(0, len(packed), size)]
 
 
 def _listed(reading: Any) -> list[float]:

@@ -73,6 +73,11 @@ class Slot:
     is_own: bool
     is_others: bool = False
 
+    @property
+    def places(self) -> range:
+        """The places of its numbers in the frame."""
+        return range(self.at, self.at + self.size)
+
 
 class View:
     """What a component sees of the world in one tick: the numbers of the frame, by slots.
@@ -115,12 +120,13 @@ class View:
 
 
 class SlotReadings:
-    """The readings of several sensors that are the numbers of one slot each, of one length: read as one array."""
+    """The readings of several sensors that are numbers of the frame as they are: read as one array."""
 
-    def __init__(self, slots: Sequence[Slot]) -> None:
+    def __init__(self, places: Sequence[Sequence[int]]) -> None:
+        """`places` are those of each sensor's numbers, of one length."""
         import numpy as np
 
-        self._places = np.array([range(slot.at, slot.at + slot.size) for slot in slots])
+        self._places = np.array(places)
 
     def sample(self, view: View) -> NDArray[np.float64]:
         """Return the numbers, of shape (sensors, numbers)."""
@@ -170,9 +176,17 @@ class SolvingView(WritableView):
 
     __slots__ = ()
 
-    def __init__(self, tick: int, start: Sequence[float], written: list[float]) -> None:
+    def __init__(
+        self,
+        tick: int,
+        start: Sequence[float],
+        written: list[float],
+        values: NDArray[np.float64] | None = None,
+    ) -> None:
+        """`values` are the numbers at the start as an array; None: it is made where somebody asks for it."""
         super().__init__(tick, written, start)
         self.numbers = start
+        self._values = values
 
 
 class SensingView(WritableView):
@@ -290,8 +304,10 @@ class Modifier(Protocol):
 class Actuator(Protocol):
     """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
 
-    A class may have the method `unpowered()`, which returns what is asked of the motors of a robot without power. Where
-    there is none, that is a speed of 0 with the force or acceleration of `command`.
+    A class may have two more methods: `unpowered()`, which returns what is asked of the motors of a robot without
+    power; where there is none, that is a speed of 0 with the force or acceleration of `command`. The static
+    `together(actuators)` returns an object whose `command(view)` gives what several ask, of robots that move by
+    kinematics, as an array of shape (actuators, motors, 2), with the same bits.
     """
 
     def accept(self, command: Any, view: WritableView) -> bool:

@@ -9,7 +9,6 @@ its wheels slipping.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from foosim.world.components.view import SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
+from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import Columns
 from foosim.world.moving.wheels import wheels_of
 
@@ -43,7 +43,7 @@ class _Batch:
     def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.movers = way.movers(entities)
+        self.movers = way.movers(entities, is_level=True)
         wheels = [wheels_of(at.spec, at.layout, entity) for entity in entities]
         self.track = np.array([its.track for its in wheels])
         self.rolls = np.array([[1.0 - its.slips[0], 1.0 - its.slips[1]] for its in wheels])
@@ -53,6 +53,8 @@ class _Batch:
 class DifferentialDrive:
     """Along arcs, as far as nothing is in the way."""
 
+    takes_arrays: Final = True
+
     def __init__(self, at: MotionMounting) -> None:
         self._at = at
         self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
@@ -60,16 +62,15 @@ class DifferentialDrive:
         self._way = FreeWay(at)
         self._batch = _Batch(at, self._way, at.entities)
 
-    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors] | Floats, view: SolvingView) -> None:
         """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
         if self._batch.entities != entities:
             self._batch = _Batch(self._at, self._way, entities)
         batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read(view.numbers)
+        state = batch.state.read_at_start(view)
         place, heading = state[:, 0:3].copy(), state[:, 13].copy()
         speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
-        asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
-        asked = asked.reshape(count, 2, 2)
+        asked = asked_of(motors, STANDING)
         targets, rates = asked[:, :, 0], asked[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)

@@ -8,7 +8,6 @@ way (`clearance.free_way`); it turns where it is blocked.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -19,6 +18,7 @@ from foosim.world.components.view import SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import along_arcs, approached, approached_together
+from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import Columns
 
 STATE: Final = (
@@ -40,7 +40,7 @@ class _Batch:
     def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
         self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.movers = way.movers(entities)
+        self.movers = way.movers(entities, is_level=True)
 
 
 @motion("holonomic", needs=STATE, writes=STATE)
@@ -63,10 +63,9 @@ class HolonomicMotion:
         if self._batch.entities != entities:
             self._batch = _Batch(self._at, self._way, entities)
         batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read(view.numbers)
+        state = batch.state.read_at_start(view)
         place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
-        asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or STANDING for its in motors)), float)
-        asked = asked.reshape(count, 3, 2)
+        asked = asked_of(motors, STANDING)
         targets, rates = asked[:, :, 0], asked[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)

@@ -14,7 +14,6 @@ the way that was left to it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -26,6 +25,7 @@ from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.models.rotorcraft import RotorcraftRobot
 from foosim.world.moving.arcs import Floats, approached, approached_together, shorter, upright_turn, wrapped
+from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import Columns
 
 STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "arrived", "blocked")
@@ -69,10 +69,9 @@ class RotorcraftMotion:
         if self._batch.entities != entities:
             self._batch = _Batch(self._at, self._way, entities)
         batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read(view.numbers)
+        state = batch.state.read_at_start(view)
         place, velocity, heading = state[:, 0:3].copy(), state[:, 7:10].copy(), state[:, 13].copy()
-        asked = np.fromiter(chain.from_iterable(chain.from_iterable(its or NO_GOAL for its in motors)), float)
-        asked = asked.reshape(count, 4, 2)
+        asked = asked_of(motors, NO_GOAL)
         has_goal = np.array([bool(its) for its in motors])
         goal, most = np.where(has_goal[:, None], asked[:, :3, 0], place), asked[:, :, 1]
         yaw = np.where(has_goal, asked[:, 3, 0], heading)

@@ -52,7 +52,7 @@ class Track:
         if self._batch.entities != entities:
             self._batch = _Batch(self._at, self._way, entities)
         batch, tick_s = self._batch, self._tick_s
-        state, clocks = batch.state.read(view.numbers), batch.clock.read(view.numbers)[:, 0].tolist()
+        state, clocks = batch.state.read_at_start(view), batch.clock.read_at_start(view)[:, 0].tolist()
 
         def poses(shares: Floats) -> Floats:
             each = zip(batch.paths, clocks, shares.tolist(), strict=True)

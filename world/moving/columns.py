@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.components.view import Slot, WritableView
+from foosim.world.components.view import Slot, SolvingView, WritableView
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ class Columns:
         assert all(sum(slot.size for slot in slots) == self.width for slots in rows), rows
         self._numbers: Callable[[Sequence[float]], Any] = itemgetter(*places, places[0])
         """With the first one once more, so that there are always several."""
+        self._places = np.array(places).reshape(self._count, self.width)
         self._rows = [tuple(slots) for slots in rows]
         runs = [_run(slots) for slots in rows]
         self._runs = [run for run in runs if run is not None] if None not in runs else []
@@ -31,6 +32,11 @@ class Columns:
     def read(self, numbers: Sequence[float]) -> Floats:
         """Return the numbers, of shape (entities, numbers)."""
         return np.array(self._numbers(numbers)[:-1]).reshape(self._count, self.width)
+
+    def read_at_start(self, view: SolvingView) -> Floats:
+        """Return the numbers that they have at the start of the tick, of shape (entities, numbers)."""
+        found: Floats = view.values[self._places]
+        return found
 
     def write(self, view: WritableView, values: Floats) -> None:
         """Write all of them."""

@@ -38,4 +38,4 @@ class ContactSensor:
     @staticmethod
     def together(sensors: Sequence[ContactSensor]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([one.contacts for one in sensors])
+        return SlotReadings([one.contacts.places for one in sensors])

@@ -36,4 +36,4 @@ class Encoder:
     @staticmethod
     def together(sensors: Sequence[Encoder]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([one.joints for one in sensors])
+        return SlotReadings([one.joints.places for one in sensors])

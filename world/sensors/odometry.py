@@ -39,4 +39,4 @@ class Odometry:
     @staticmethod
     def together(sensors: Sequence[Odometry]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([one.travel for one in sensors])
+        return SlotReadings([one.travel.places for one in sensors])

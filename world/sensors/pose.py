@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from msgspec import Struct
 
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -36,3 +37,8 @@ class PoseTracker:
     def sample(self, view: View) -> Pose:
         x, y, _ = view.read(self._position)
         return Pose(x, y, view.numbers[self._heading.at])
+
+    @staticmethod
+    def together(sensors: Sequence[PoseTracker]) -> SlotReadings:
+        """Return these as one."""
+        return SlotReadings([(*one._position.places[:2], one._heading.at) for one in sensors])

@@ -1,0 +1,63 @@
+"""Which sensors of a node's robots measure at a tick, and what their packets are called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from foosim.world.components.fitted import FittedSensor
+from foosim.world.layout import Entity
+
+TURNS_MAX: Final = 64
+"""Sets of schedules whose turn is kept."""
+
+
+class Turn(NamedTuple):
+    """Who measures at a tick: robots in service with their sensors, these one after the other, and their packets."""
+
+    robots: tuple[tuple[Entity, tuple[FittedSensor, ...]], ...]
+    sensors: tuple[FittedSensor, ...]
+    heads: tuple[tuple[str, int, str], ...]
+    """Robot, number among its packets and channel of each reading, where none is dropped."""
+    counters: tuple[int, ...]
+    """The places of the numbers that count the samples."""
+
+
+class DueSensors:
+    """The sensors of some robots of one layout.
+
+    Sensors that are due at one tick are due together again: what follows from who they are is kept.
+    """
+
+    def __init__(self, robots: Sequence[Entity], sensors: Mapping[str, Sequence[FittedSensor]]) -> None:
+        self.robots = list(robots)
+        self._sensors = [tuple(sensors[robot.name]) for robot in robots]
+        self._down = [robot.offsets["down"] for robot in robots]
+        everyone = [one for its in self._sensors for one in its]
+        self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
+        self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
+        self._turns: dict[tuple[bool, ...], Turn] = {}
+
+    def at(self, tick: int, numbers: Sequence[float]) -> Turn:
+        """Return who measures at a tick, at whose start the numbers of the frame are these."""
+        value = numbers.__getitem__
+        if any(map(value, self._down)) or any(map(value, self._speaks)):
+            return self._turn(tick, numbers)
+        due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])
+        turn = self._turns.get(due)
+        if turn is None:
+            while len(self._turns) >= TURNS_MAX:
+                self._turns.pop(next(iter(self._turns)))
+            turn = self._turns[due] = self._turn(tick, numbers)
+        return turn
+
+    def _turn(self, tick: int, numbers: Sequence[float]) -> Turn:
+        robots = tuple(self._due(tick, numbers))
+        sensors = tuple([one for _, its in robots for one in its])
+        heads = tuple([(robot.name, number, one.channel) for robot, its in robots for number, one in enumerate(its)])
+        return Turn(robots, sensors, heads, tuple([one.samples_at for one in sensors]))
+
+    def _due(self, tick: int, numbers: Sequence[float]) -> Iterator[tuple[Entity, tuple[FittedSensor, ...]]]:
+        for robot, down, sensors in zip(self.robots, self._down, self._sensors, strict=True):
+            if numbers[down] == 0.0:
+                yield robot, tuple([one for one in sensors if one.is_due(tick, numbers)])
