@@ -12,6 +12,7 @@ from functools import cache
 import pytest
 
 from foosim.common.errors import Malformed
+from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.differences import Frames
@@ -69,6 +70,17 @@ def test_a_base_of_one_node_drives_between_islands_of_two_others() -> None:
     partners = {int(one) for frame in frames for one in frame.vector("fallen", "partners", 4)}
     assert base in partners and frames[-1].vector("fallen", "position", 3)[2] == pytest.approx(SIDE_M / 2, abs=0.02)
     assert digests == pushed(3)[0]
+
+
+def test_what_is_kept_of_which_boxes_may_overlap_changes_no_island() -> None:
+    """Frames in their order, and then in any: as found anew for each."""
+    text, files = pin_assets(three_arms(), NAME, DEPLOY)
+    deployment, frames = load_deployment(text, NAME).with_assets(files), pushed(1)[1]
+    kept = Volumes(deployment, frames[0].layout)
+    order = [*range(0, TICKS, 4), *[draw_words(draw_key(7, "order"), n)[0] % TICKS for n in range(30)]]
+    for number in order:
+        anew = Volumes(deployment, frames[0].layout)
+        assert kept.islands(frames[number].numbers) == anew.islands(frames[number].numbers), number
 
 
 def stands_and_falls(stands: int, falls: int) -> None:

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from math import inf
 from operator import itemgetter
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,8 @@ MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
 FEW: Final = 16
 """Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
+SKIN_M: Final = 0.05
+"""Which boxes may overlap is looked up anew when a side of one is this far from where it was then."""
 LOOKED_AT: Final = 64
 """Bodies that a look ahead starts from, and islands that it finds."""
 
@@ -58,6 +59,23 @@ class BodyIsland:
     entities: tuple[int, ...]
     movers: tuple[int, ...]
     nearest: str
+
+
+class _Near(NamedTuple):
+    """The pairs of boxes that may overlap while no side of any is farther than `SKIN_M` from where it is in `boxes`:
+    of each the lower row, and the other one, in order."""
+
+    boxes: Numbers
+    ones: NDArray[np.intp]
+    others: NDArray[np.intp]
+
+
+def _near(boxes: Numbers) -> _Near:
+    grown = boxes.copy()
+    grown[:, 0] -= SKIN_M + MARGIN_M  # the margin is far above rounding
+    grown[:, 1] += SKIN_M + MARGIN_M
+    pairs = np.array(overlapping(grown), np.intp).reshape(-1, 2)
+    return _Near(boxes, pairs[:, 0], pairs[:, 1])
 
 
 def is_felt(body: Body, physics: Physics) -> bool:
@@ -108,13 +126,19 @@ class Volumes:
         """Movers and others that touch nobody: each is solved by itself."""
         self._found: tuple[list[tuple[int, int]], list[BodyIsland]] | None = None
         """The pairs and the islands that were found last."""
+        self._near: _Near | None = None
 
     def islands(self, numbers: Sequence[float]) -> list[BodyIsland]:
         """Return the islands of an edited frame, and those that move alone, in the order of their first entities.
 
         It is the same list as the last one where it is equal to that.
         """
-        pairs = overlapping(self._boxes_at(numbers))
+        boxes = self._boxes_at(numbers)
+        if self._near is None or not (np.abs(boxes - self._near.boxes) <= SKIN_M).all():
+            self._near = _near(boxes)
+        ones, others = self._near.ones, self._near.others
+        meet = ((boxes[others, 0] <= boxes[ones, 1]) & (boxes[others, 1] >= boxes[ones, 0])).all(axis=1)
+        pairs = list(zip(ones[meet].tolist(), others[meet].tolist(), strict=True))
         if self._found is None or pairs != self._found[0]:
             self._found = pairs, self._islands_of(pairs)
         found = [self._with_nearest(island, numbers) for island in self._found[1]] if self._has_choice else None
@@ -139,17 +163,18 @@ class Volumes:
         gap = gaps.max(axis=2)
         reach = self._ways * (ticks - 1)
         near = (gap > 0.0) & (gap <= np.array(reach[moving])[:, None] + reach[None, :])
+        at, other = near.nonzero()
         home = {index: number for number, island in enumerate(present) for index in island.entities}
-        found: dict[tuple[int, int], float] = {}
-        for at, other in np.argwhere(near).tolist():
-            one, two = entities[moving[at]], entities[other]
-            if one.is_rigid or two.is_rigid:
-                pair = home[one.index], home[two.index]
-                pair = pair if pair[0] < pair[1] else (pair[1], pair[0])
-                if pair[0] != pair[1]:
-                    found[pair] = min(found.get(pair, inf), float(gap[at, other]))
-        nearest = sorted(found, key=lambda pair: (found[pair], pair))[:LOOKED_AT]
-        return [self._together(present[one], present[other], numbers) for one, other in nearest]
+        homes, is_mover = np.array([home[entity.index] for entity in entities]), np.array(self._is_mover)
+        one, two = homes[moving][at], homes[other]
+        apart = np.flatnonzero((one != two) & ~(is_mover[moving][at] & is_mover[other]))
+        pairs = np.minimum(one, two)[apart] * len(present) + np.maximum(one, two)[apart]
+        ordered = pairs[np.lexsort((pairs, gap[at, other][apart]))]
+        nearest = ordered[np.sort(np.unique(ordered, return_index=True)[1])][:LOOKED_AT]
+        return [
+            self._together(present[pair // len(present)], present[pair % len(present)], numbers)
+            for pair in nearest.tolist()
+        ]
 
     def _together(self, one: BodyIsland, other: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
         """Return two islands as one; a mover, which is alone in its island, is in the way of the other."""
