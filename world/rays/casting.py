@@ -22,6 +22,8 @@ from foosim.world.rays.triangles import Triangles
 Indices = NDArray[np.intp]
 BUNDLE: Final = 32
 """Rays of a bundle at most: fewer of a fan go in a direction of their own, to which fewer shapes are near."""
+ROUNDING: Final = 1.000001
+"""A square of a distance that is within a reach is no more than that of the reach, but for rounding."""
 PAIRS_AT_ONCE: Final = 16_384
 """So many pairs of a ray and a shape are compared at once: what is computed stays in a cache."""
 
@@ -67,6 +69,10 @@ class Bundles(NamedTuple):
         starts, lengths = _in_pieces(np.arange(fans) * rays, np.full(fans, rays))
         fan = starts // rays
         return cls(origins[:, fan], ranges[fan], passing[fan], starts, lengths, ways.reshape(3, -1))
+
+    def are_even(self, length: int) -> bool:
+        """Whether all bundles have as many rays as this."""
+        return self.ways.shape[1] == length * len(self.starts) and int(self.lengths.min()) == length
 
     def box(self) -> tuple[Floats, Floats]:
         """Return the least and the greatest coordinates of each bundle (3, b)."""
@@ -144,12 +150,20 @@ def _near(placed: Placed, bundles: Bundles) -> Iterator[Pairs]:
 
 def _passing_near(placed: Placed, bundles: Bundles, bundle: Indices, shapes: Indices, length: int) -> Pairs:
     """Return which rays of bundles, of this length, meet the spheres around shapes, or nearly so."""
-    origins = bundles.origins[:, bundle]
+    origins, ranges, radii = bundles.origins[:, bundle], bundles.ranges[bundle], placed.radii[shapes]
     x, y, z = placed.middles[:, shapes] - origins
-    radii, first, ranges = placed.radii[shapes], bundles.starts[bundle], bundles.ranges[bundle]
-    beyond = x * x + y * y + z * z - radii * radii
-    rays = first[:, None] + np.arange(length)
-    dx, dy, dz = bundles.ways[:, rays]
+    square = x * x + y * y + z * z
+    if length > 1:
+        reach = ranges + radii
+        near = np.flatnonzero(square <= reach * reach * ROUNDING)
+        if len(near) < len(bundle):
+            x, y, z, square, ranges, radii = (column[near] for column in (x, y, z, square, ranges, radii))
+            bundle, shapes, origins = bundle[near], shapes[near], origins[:, near]
+    first, beyond = bundles.starts[bundle], square - radii * radii
+    if bundles.are_even(length):
+        dx, dy, dz = bundles.ways.reshape(3, -1, length).take(bundle, axis=1)
+    else:
+        dx, dy, dz = bundles.ways[:, first[:, None] + np.arange(length)]
     along = dx * x[:, None]
     along += dy * y[:, None]
     along += dz * z[:, None]
