@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from foosim.common import names
+from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
@@ -112,6 +113,8 @@ def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
     if context.get("pattern") == names.CLASS_PATTERN:
         nearest = quoted(names.class_path_of(str(value)))
     what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
+    if kind == "bad_value" and isinstance(value, dict):
+        value = ABSENT  # what is wrong is between its settings, which the text names
     return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
 
 
