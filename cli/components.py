@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.world.forms import registry
-from foosim.world.forms.forms import ROBOTS, Component, Form, Model
+from foosim.world.forms.forms import ROBOTS, Component, Form, Model, References
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.registry import FORMS
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
@@ -19,7 +19,7 @@ OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "motion": ("writes",),
     "rule": ("each", "writes"),
     "entity_rule": ("writes", "shared"),
-    "kit": ("entities", "addable", "rules"),
+    "kit": ("entities", "addable", "rules", "presets"),
 }
 """What is told of a form beside what all have: its fields."""
 SETTINGS_OF: Final[Mapping[str, str]] = {
@@ -144,6 +144,8 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  beside the robots: {_paired(about['entities'])}"
     if about.get("addable"):
         yield f"  can be added: {', '.join(about['addable'])}"
+    if about.get("presets"):
+        yield f"  presets: {', '.join(about['presets'])}"
 
 
 def _mover_of(about: Mapping[str, Any]) -> str:
@@ -159,9 +161,11 @@ def _counted(slots: Mapping[str, int]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return mappings and sequences as JSON has them."""
+    """Return mappings, sequences and counts of references as JSON has them."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, References):
+        return int(value)
     return list(value) if isinstance(value, tuple) else value
 
 

@@ -7,7 +7,7 @@ from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form, Model, with_article, word_of
+from foosim.world.forms.forms import Form, Kit, Model, with_article, word_of
 from foosim.world.forms.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
@@ -46,7 +46,14 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
 
 def deployment_schema_text(*, installed: bool = False) -> str:
     """What deploy/deployment.schema.json holds: the JSON Schema of a deployment's file, for editors and for people."""
-    return json.dumps(file_schema(deployment_schema(installed=installed)), indent=2) + "\n"
+    presets = {name: list(kit.presets) for name in registry.names("kit") if (kit := _kit(name)).presets}
+    return json.dumps(file_schema(deployment_schema(installed=installed), presets), indent=2) + "\n"
+
+
+def _kit(name: str) -> Kit:
+    kit = registry.find("kit", name)
+    assert isinstance(kit, Kit), kit
+    return kit
 
 
 def _any_engine(*, installed: bool) -> dict[str, Any]:

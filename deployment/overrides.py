@@ -19,6 +19,7 @@ from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.expand import ENTRIES, Expansion
+from foosim.deployment.text.presets import with_preset
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import (
@@ -170,9 +171,9 @@ class _Taken:
 
     def names(self) -> Sequence[str]:
         """The keys of the mapping at its end."""
-        if not self.steps or self.steps[0] not in (*ENTRIES, TEMPLATES) or not isinstance(self.tree, Fields):
+        if not self.steps or not isinstance(self.tree, Fields):
             return ()
-        if len(self.steps) == 1:
+        if len(self.steps) == 1 and self.steps[0] in (*ENTRIES, TEMPLATES):
             with suppress(Stopped):
                 return Expansion(self.tree, Report()).names(str(self.steps[0]))
             return ()
@@ -183,7 +184,10 @@ class _Taken:
         """The node at its end, or some steps further."""
         node: Tree | None = None
         way = [*self.steps, *more]
-        if isinstance(self.tree, Fields):
+        if isinstance(self.tree, Fields) and way[0] not in (*ENTRIES, TEMPLATES):
+            node = with_preset(str(way[0]), self.tree.values[str(way[0])], Report())
+            way.insert(1, "")
+        elif isinstance(self.tree, Fields):
             with suppress(Stopped):
                 node = Expansion(self.tree, Report()).entry(str(way[0]), str(way[1]))
         for step in way[2:]:

@@ -28,6 +28,7 @@ from foosim.client.main import app as player_app
 from foosim.common import limits, units
 from foosim.console.main import app as console_app
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
+from foosim.fitting.main import app as table_app
 from foosim.node.main import app as node_app
 from foosim.protocol.channels import CHANNELS
 from foosim.runtime.health import app as probe_app
@@ -39,6 +40,7 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-rehearse": rehearse_app,
     "foosim-replay": replay_app,
     "foosim-net": net_app,
+    "foosim-table": table_app,
     "foosim-console": console_app,
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,

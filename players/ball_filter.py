@@ -18,6 +18,8 @@ JUMP_M: Final = 0.02
 """A sample this far from the prediction means that the ball was kicked, or has bounced."""
 SPEED_MAX: Final = 20.0
 """m/s; a faster displacement is a reset of the ball to the kick-off spot."""
+NEVER_NS: Final = -1_000_000_000_000
+"""When a ball was measured that never was: long before tick 0."""
 REBOUND: Final = 0.7
 """Coefficient of restitution at a side wall."""
 
@@ -38,24 +40,24 @@ class BallTrack:
     def __init__(self, deployment: Deployment) -> None:
         table = table_of(deployment)
         self._y_max = table.field.width / 2 - table.ball.radius
-        self._sent_ns = -1
+        self._measured_ns = NEVER_NS
         self._measured = (0.0, 0.0)
         self._ball = Ball(0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def known(self) -> bool:
-        return self._sent_ns >= 0
+        return self._measured_ns != NEVER_NS
 
-    def take(self, sent_ns: int, seen: BallPosition) -> None:
-        """Take a sample; one that is not newer than the last changes nothing."""
-        if sent_ns <= self._sent_ns:
+    def take(self, measured_ns: int, seen: BallPosition) -> None:
+        """Take what was measured at a time (ns); a sample that is not newer than the last changes nothing."""
+        if measured_ns <= self._measured_ns:
             return
         x, y = seen.x, seen.y
         if not self.known:
             self._ball = Ball(x, y, 0.0, 0.0, seen.z)
         else:
-            self._ball = self._corrected((sent_ns - self._sent_ns) * 1e-9, seen)
-        self._sent_ns = sent_ns
+            self._ball = self._corrected((measured_ns - self._measured_ns) * 1e-9, seen)
+        self._measured_ns = measured_ns
         self._measured = (x, y)
 
     def _corrected(self, dt: float, seen: BallPosition) -> Ball:
@@ -77,7 +79,7 @@ class BallTrack:
 
     def at(self, time_ns: int) -> Ball:
         """Return the estimate at a time (simulated ns), carried on from the newest sample."""
-        return self._moved((time_ns - self._sent_ns) * 1e-9)
+        return self._moved((time_ns - self._measured_ns) * 1e-9)
 
     def _moved(self, dt: float) -> Ball:
         return moved(self._ball, dt, self._y_max)

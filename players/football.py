@@ -18,6 +18,7 @@ from foosim.deployment.schema import Deployment
 from foosim.players.ball_filter import Ball, BallTrack, moved
 from foosim.world.actuators.rod_position import Command
 from foosim.world.models.rod import RodRobot
+from foosim.world.modifiers.delay import delay_ns
 from foosim.world.parameters.table import TEAMS, table_of
 from foosim.world.sensors.ball import BallPosition, BallSettings
 from foosim.world.sensors.encoder import EncoderSettings, RodPosition
@@ -227,12 +228,13 @@ class Team:
             for channel, sensor in deployment.robots[rod.name].sensors.items()
             if isinstance(sensor, EncoderSettings)
         }
-        self._cameras = [
-            (name, channel)
+        self._cameras = {
+            (name, channel): delay_ns(sensor.modifiers)
             for name, robot in sorted(deployment.robots.items())
             for channel, sensor in sorted(robot.sensors.items())
             if isinstance(sensor, BallSettings)
-        ]
+        }
+        """The latency of each camera (ns): its ball is where it was so long before the reading was sent."""
 
     def act(self, tick: int, samples: Samples) -> Commands:
         """Return the command of each rod."""
@@ -256,10 +258,10 @@ class Team:
             sample = samples.get(pair)
             if sample is not None and isinstance(sample.value, RodPosition):
                 rod.see(sample.value)
-        for pair in self._cameras:
+        for pair, latency_ns in self._cameras.items():
             sample = samples.get(pair)
             if sample is not None and isinstance(sample.value, BallPosition):
-                self._track.take(sample.sent_ns, sample.value)
+                self._track.take(sample.sent_ns - latency_ns, sample.value)
 
     def _aim(self, tick: int) -> float:
         """Return the y at which shots aim in this quarter of a second: a keyed draw, so that nobody can tell."""

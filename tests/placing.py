@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from foosim.world.forms.forms import NO_ENTITY, References
 from foosim.world.layout import Entity
 
 
@@ -13,6 +14,9 @@ def place_ball(
 ) -> None:
     """Set a ball to `position` (m) and `velocity` (m/s) without spin, its rules' memory and quarantine cleared."""
     numbers[entity.start : entity.split] = [0.0] * (entity.split - entity.start)
+    for field, count in entity.counts.items():
+        if isinstance(count, References):
+            numbers[entity.offsets[field] : entity.offsets[field] + count] = [NO_ENTITY] * count
     start = entity.offsets["position"]
     numbers[start : start + 3] = position
     numbers[entity.offsets["orientation"] + 3] = 1.0

@@ -1,7 +1,8 @@
 """Expands a deployment's tree: what is abbreviated in the text is written out, before the schema and the checks see it.
 
-Abbreviations are templates (`like`), fleets (`count`), entries for each robot (`each`), and selectors in the place of
-robots' names: in the lists of nodes, where `rest` is whatever no other entry names, and as keys of a player's robots.
+Abbreviations are templates (`like`), fleets (`count`), entries for each robot (`each`), presets of kits (`preset`), and
+selectors in the place of robots' names: in the lists of nodes, where `rest` is whatever no other entry names, and as
+keys of a player's robots.
 The expanded tree has the places of what was written. It shares the nodes that several entries have in common, so that
 nobody changes it. Everything else in the tree is passed on as it is, wrong or not.
 """
@@ -21,6 +22,7 @@ from foosim.common.names import nearest_name
 from foosim.deployment.text.each import EACH, BadSign, Each, Filling, put
 from foosim.deployment.text.fleets import Fleet, fleet_and_number, member, members, read_fleets
 from foosim.deployment.text.includes import INCLUDE
+from foosim.deployment.text.presets import with_preset
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.selection import Chosen, Population, TooManyComparisons, is_several
 from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, without
@@ -105,6 +107,7 @@ class Expansion:
         for name, section in values.items():
             if not isinstance(section, Fields):
                 continue
+            values[name] = with_preset(name, section, report)
             if name in FLEETS:
                 values[name] = (self._robots if name == ROBOTS else None) or self._section_of_fleets(name, section)
             elif name in FOR_ROBOTS:

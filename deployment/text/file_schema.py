@@ -6,7 +6,7 @@ have signs (`$robot`). What is missing in the end, and whether names exist, only
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from foosim.common import limits
@@ -15,6 +15,7 @@ from foosim.deployment.text.each import EACH
 from foosim.deployment.text.expand import ENTRIES, FLEETS, FOR_ROBOTS
 from foosim.deployment.text.fleets import AXES, COUNT, SPACING
 from foosim.deployment.text.includes import INCLUDE
+from foosim.deployment.text.presets import PRESET
 from foosim.deployment.text.templates import LIKE, TEMPLATES
 
 Schema = dict[str, Any]
@@ -25,6 +26,7 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     LIKE: "the name of a template, which has what is not written here",
     COUNT: "how many of these there are: NAME-1 to NAME-N",
     SPACING: "how much further along x, y and z each of them stands than the one before",
+    PRESET: "the name of a preset of the kit, which has what is not written here",
     EACH: "a selector of robots: there is one of these for each, and $robot is its name",
 }
 NUMBERED: Final = "-[1-9][0-9]*$"
@@ -37,8 +39,11 @@ _NULL: Final[Schema] = {"type": "null"}
 _SIGNS: Final[Schema] = {"pattern": "[$]", "type": "string"}
 
 
-def file_schema(schema: Schema) -> Schema:
-    """Return the schema of a deployment's file, from that of the expanded deployment, which is not changed."""
+def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
+    """Return the schema of a deployment's file, from that of the expanded deployment, which is not changed.
+
+    `presets` are the names of those of each kit that has some.
+    """
     properties, models = dict(schema["properties"]), dict(schema["$defs"])
     partly_of: list[Schema] = []
     for section in ENTRIES:
@@ -55,6 +60,9 @@ def file_schema(schema: Schema) -> Schema:
             models[name + _PARTIAL] = _with_keys(models[name + _PARTIAL], own)
         partly_of += partly["anyOf"]
         properties[section] = {**properties[section], "patternProperties": _entries(section, pattern, entry, partly)}
+    for kit, names in presets.items():
+        if kit in properties:
+            properties[kit] = _with_presets(properties[kit], names, models)
     models["NodeSpec"] = _with_keys(models["NodeSpec"], {"robots": _selectors()})
     properties[TEMPLATES] = {
         "description": DESCRIPTIONS[TEMPLATES],
@@ -75,6 +83,15 @@ def _entries(section: str, pattern: str, entry: Schema, partly: Schema) -> Schem
         return {pattern: partly, "[$]": partly}
     whole = {"if": {"required": [LIKE]}, "then": partly, "else": entry}
     return {f"^(?!.*{NUMBERED}){pattern[1:]}": whole, f"^(?=.*{NUMBERED}){pattern[1:]}": partly}
+
+
+def _with_presets(section: Schema, names: Sequence[str], models: Schema) -> Schema:
+    """Return the schema of a kit's section, of which any part may be there with a preset."""
+    partly = _Partial(models, has_signs=False).of(section)
+    name = partly["$ref"].removeprefix(_REF)
+    preset = {"description": DESCRIPTIONS[PRESET], "enum": [*names], "type": "string"}
+    models[name] = _with_keys(models[name], {PRESET: preset})
+    return {"if": {"required": [PRESET]}, "then": partly, "else": section}
 
 
 def _with_keys(model: Schema, keys: Schema) -> Schema:

@@ -81,7 +81,10 @@ def told(*words: str, folder: Path | None = None) -> tuple[str, str]:
 
 
 TOLD: Final = {
-    ("rule", "football"): ["slots of each ball: still_ticks, out_ticks, wait_ticks", "writes: ball"],
+    ("rule", "football"): [
+        "slots of each ball: still_ticks, out_ticks, wait_ticks, spot[2], serve, touched_by",
+        "writes: ball",
+    ],
     ("motion", "differential_drive"): [
         "needs a model with: position, orientation, linear_velocity, angular_velocity, heading, wheel_speeds, "
         "wheel_travel, blocked",

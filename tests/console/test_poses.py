@@ -78,7 +78,9 @@ def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str])
     bodies = {body["name"]: (body["pushable"], body["removable"]) for body in shown["bodies"]}
     assert (bodies["ball"], bodies["ball2"], bodies["red.goal"]) == ((True, False), (True, True), (False, False))
     assert shown["marks"]["goal"] == {"look": "score", "text": "goals", "cut": True}
-    assert {name for name, mark in shown["marks"].items() if mark["cut"]} == {"goal", "kickoff", "out", "dead"}
+    assert {name for name, mark in shown["marks"].items() if mark["cut"]} == {
+        *("goal", "own_goal", "kickoff", "out", "dead", "end")
+    }
     layout = build_layout(hall)
     shown = scene_content(hall, layout, build_scene(hall, layout))
     units = {(run["entity"], run["field"]): run["unit"] for run in shown["fields"]}

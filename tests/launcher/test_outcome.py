@@ -38,7 +38,7 @@ from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60
-OF_THE_TABLE: Final = {"score", "ball"}
+OF_THE_TABLE: Final = {"score", "own_goals", "clock_s", "is_over", "winner", "ball"}
 """What rules and kits show of a frame: a run of which nothing was heard has none."""
 
 

@@ -108,21 +108,23 @@ def test_another_process_computes_the_same() -> None:
 
 
 def test_a_kit_changes_nothing_of_another() -> None:
-    """The ball rolls, and rods move, beside rovers as without them."""
+    """The ball rolls, and rods move, beside rovers as without them; what refers to an entity refers to the same one."""
     data = yaml.safe_load(mixed())
     for name in ("rover-1", "rover-2", "charger"):
         del data["robots"][name]
     del data["hall"]
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
-    frames: list[list[list[float]]] = []
+    frames: list[list[list[float | str]]] = []
     for text in (mixed(), written(data)):
-        seen: list[list[float]] = []
+        seen: list[list[float | str]] = []
 
-        def keep(frame: Any, seen: list[list[float]] = seen) -> None:
+        def keep(frame: Any, seen: list[list[float | str]] = seen) -> None:
             names = ("ball", "red.goal", "blue.attack", "world")
-            seen.append(
-                [n for name in names for n in frame.numbers[frame.layout[name].start : frame.layout[name].stop]]
-            )
+            numbers = [float(number) for number in frame.numbers]
+            told: list[float | str] = [*numbers]
+            for place in frame.layout.references:
+                told[place] = frame.layout.entities[int(numbers[place])].name if numbers[place] >= 0.0 else ""
+            seen.append([n for name in names for n in told[frame.layout[name].start : frame.layout[name].stop]])
 
         result = rehearse(text, NAME, TICKS, 1, settings=Settings(on_commit=keep))
         assert not result.json["failed"], result.json["reason"]

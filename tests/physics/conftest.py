@@ -129,14 +129,19 @@ class World:
             passed = passed or self.position[0] > base[0]
         return passed, touches
 
-    def kick(self, name: str, turning: float) -> tuple[float, float, float]:
-        """Let a free rod kick a resting ball; return its speed, the theory's, and the rod's turning speed after."""
+    def kick(self, name: str, turning: float, *, phase: float = 0.0, held: bool = False) -> tuple[float, float, float]:
+        """Let a rod kick a resting ball; return its speed, a free rod's in theory, and the rod's turning speed after.
+
+        The foot meets the ball as it hangs straight down, `phase` of a substep later. The rod is free, or a motor holds
+        its place and speed with any force.
+        """
+        motors: Motors = ((0.0, 1e6), (turning, 1e5)) if held else OFF
         base = self.scene.bodies[name].position
         radius = self.table.ball.radius
-        self.put((base[0] - self.table.rod.foot.length / 2 - radius - 0.004, 0.0, radius))
-        self.set_rod(name, (0.0, -0.1), (0.0, turning))
+        self.put((base[0] - self.table.rod.foot.length / 2 - radius, 0.0, radius))
+        self.set_rod(name, (0.0, -0.1 - phase * turning * self.tick_s / self.deployment.substeps), (0.0, turning))
         for _ in range(round((0.1 + 0.06) / turning / self.tick_s) + 2):
-            self.tick({name: OFF})
+            self.tick({name: motors})
             if self.of("ball", "contacts", 1)[0]:
                 break
         arm = self.table.rod.axis_height - radius

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import initial_numbers, rules_of
 from foosim.world.components.view import WritableView
+from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.parameters.table import table_of
+from foosim.world.parameters.table import places_between_lines, table_of
 from foosim.world.rules.football import kickoff_ticks
 from tests.placing import place_ball
 
@@ -227,6 +230,7 @@ def test_a_reset_leaves_no_memory_behind() -> None:
     numbers[BALL.offsets["position"] : BALL.offsets["position"] + 3] = [LINE_X + 0.01, 0.0, RADIUS]
     apply(numbers)
     fresh = initial_numbers(DEPLOYMENT, LAYOUT)
+    numbers[BALL.offsets["football.serve"]] = 0.0  # the goal was blue's to serve after
     assert numbers[BALL.start : BALL.split] == fresh[BALL.start : BALL.split]
 
 
@@ -244,3 +248,240 @@ def test_times_shorter_than_a_tick_are_a_tick() -> None:
     assert kickoff_ticks(short) == 1
     for position, velocity in (((0.4, 0.2, RADIUS), (0.0, 0.0, 0.0)), ((0.0, 0.0, -0.1), ROLLING)):
         assert field(apply(in_play(position, velocity), deployment=short), "position", 3) == SPOT
+
+
+# --- who touched the ball, own goals ---------------------------------------------------------------------------------
+
+
+def with_rules(*sets: str) -> Deployment:
+    return load_deployment(apply_sets(TEXT, "table.yaml", [f"table.rules.{one}" for one in sets]), "table.yaml")
+
+
+def touch(numbers: list[float], substeps: dict[str, float], layout: Layout = LAYOUT, ball: str = "ball") -> None:
+    """Let rods, and a ball, have had a contact in the last tick, each last in a substep."""
+    for entity in (*layout.of("rod"), layout[ball]):
+        numbers[entity.offsets["contacts"] + 2] = -1.0
+    for name, substep in {**substeps, ball: 3.0}.items():
+        numbers[layout[name].offsets["contacts"] + 2] = substep
+
+
+def shoot(numbers: list[float], side: float) -> None:
+    """Let the ball be in the goal at this end."""
+    numbers[BALL.offsets["position"]] = side * (LINE_X + 0.01)
+
+
+def toucher(numbers: list[float], layout: Layout = LAYOUT, ball: str = "ball") -> str | None:
+    (index,) = field(numbers, "football.touched_by", 1, layout[ball])
+    return None if index < 0.0 else layout.entities[int(index)].name
+
+
+def test_the_rod_that_touched_the_ball_last_is_remembered() -> None:
+    numbers = in_play((0.3, 0.0, RADIUS))
+    assert toucher(apply(numbers)) is None
+    touch(numbers, {"blue.defence": 1.0})  # its axis is at 373 mm
+    assert toucher(apply(numbers)) == "blue.defence"
+    touch(numbers, {})  # a wall
+    assert toucher(apply(numbers)) == "blue.defence"
+    touch(numbers, {"red.attack": 0.0, "blue.defence": 2.0})
+    assert toucher(apply(numbers)) == "blue.defence", "the last one to the substep"
+    touch(numbers, {"red.attack": 2.0, "blue.defence": 2.0})
+    assert toucher(apply(numbers)) == "blue.defence", "the nearest one: 73 mm to 76 mm"
+    numbers[BALL.offsets["contacts"] + 2] = -1.0
+    numbers[LAYOUT["red.attack"].offsets["contacts"] + 2] = 3.0
+    assert toucher(apply(numbers)) == "blue.defence", "the ball was not touched"
+
+
+def test_a_rod_out_of_reach_has_touched_another_ball() -> None:
+    numbers = in_play((0.3, 0.0, RADIUS), layout=TWO)
+    touch(numbers, {"red.goal": 3.0}, TWO)
+    assert toucher(apply(numbers, layout=TWO), TWO) is None
+
+
+@pytest.mark.parametrize(
+    ("rod", "side", "scored", "owned"),
+    [
+        ("red.attack", 1.0, [1.0, 0.0], [0.0, 0.0]),
+        ("blue.goal", 1.0, [1.0, 0.0], [0.0, 1.0]),
+        ("red.goal", -1.0, [0.0, 1.0], [1.0, 0.0]),
+        ("blue.attack", -1.0, [0.0, 1.0], [0.0, 0.0]),
+        (None, 1.0, [1.0, 0.0], [0.0, 0.0]),
+    ],
+)
+def test_a_goal_by_a_rod_of_the_team_that_concedes_it_is_its_own_goal(
+    rod: str | None, side: float, scored: list[float], owned: list[float]
+) -> None:
+    numbers = in_play((side * 0.4, 0.0, RADIUS))
+    if rod is not None:
+        where = TABLE.lines[rod.partition(".")[2]].x * (1.0 if rod.startswith("red") else -1.0)  # type: ignore[index]
+        place_ball(numbers, BALL, (where, 0.0, RADIUS), ROLLING)
+        touch(numbers, {rod: 3.0})
+        apply(numbers)
+        touch(numbers, {})
+    shoot(numbers, side)
+    apply(numbers)
+    assert score(numbers) == scored
+    assert field(numbers, "football.own_goals", 2, LAYOUT["world"]) == owned
+    assert toucher(numbers) is None, "the next ball was touched by nobody"
+
+
+# --- whom a kick-off is for, and where a dead ball comes back --------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_kick_off_after_a_goal_is_for_the_team_that_conceded_it(side: float) -> None:
+    """Blue's goal and its midfield are at positive x."""
+    for number in range(8):
+        numbers = in_play((side * (LINE_X + 0.01), 0.0, RADIUS))
+        numbers[LAYOUT["world"].offsets["football.kickoffs"]] = float(number)
+        apply(numbers, kickoff_ticks(DEPLOYMENT) + 1)
+        assert field(numbers, "linear_velocity")[0] == side * TABLE.rules.kickoff_speed
+    drawn = with_rules("kickoff=drawn")
+    speeds = set()
+    for number in range(8):
+        numbers = in_play((side * (LINE_X + 0.01), 0.0, RADIUS))
+        numbers[LAYOUT["world"].offsets["football.kickoffs"]] = float(number)
+        speeds.add(field(apply(numbers, kickoff_ticks(drawn) + 1, deployment=drawn), "linear_velocity")[0])
+    assert len(speeds) == 2
+
+
+MIDDLES: Final = [-0.4475, -0.2985, -0.1495, 0.0, 0.1495, 0.2985, 0.4475]
+"""Midway between the lines of the table at 522, 373, 224 and 75 mm."""
+
+
+@pytest.mark.parametrize(
+    ("lay", "back"),
+    [
+        ((0.0, 0.1), (0.0, 0.1)),
+        ((0.2, -0.3), (0.1495, -0.3)),
+        ((-0.31, 0.02), (-0.2985, 0.02)),
+        ((0.55, 0.3), (0.4475, 0.245)),  # off the ramp: (600 - 447.5) + (340 - y) mm is at least the ramp's 230 mm
+        ((-0.58, -0.33), (-0.4475, -0.245)),
+    ],
+)
+def test_a_dead_ball_comes_back_between_the_lines_where_it_lay(
+    lay: tuple[float, float], back: tuple[float, float]
+) -> None:
+    lines = with_rules("dead_ball=lines")
+    numbers = in_play((*lay, RADIUS), (0.0, 0.0, 0.0))
+    ticks = TABLE.rules.dead_ball_after_ns // DEPLOYMENT.tick_ns
+    apply(numbers, ticks, deployment=lines)
+    assert field(numbers, "position", 3) == pytest.approx([*back, RADIUS], abs=1e-12)
+    apply(numbers, kickoff_ticks(lines), deployment=lines)
+    vx = field(numbers, "linear_velocity")[0]
+    assert field(numbers, "position", 3) == pytest.approx([*back, RADIUS], abs=1e-12)
+    assert abs(vx) == TABLE.rules.kickoff_speed and vx * back[0] <= 0.0, "away from the nearer goal"
+
+
+def test_places_between_lines_are_those_that_no_figure_reaches() -> None:
+    assert [x for x, _ in places_between_lines(TABLE)] == pytest.approx(MIDDLES)
+    close = table_of(load_deployment(apply_sets(TEXT, "table.yaml", ["table.ball.radius=30 mm"]), "table.yaml"))
+    assert len(places_between_lines(close)) == 0
+
+
+# --- the match -------------------------------------------------------------------------------------------------------
+
+
+def told(numbers: list[float], deployment: Deployment = DEPLOYMENT, layout: Layout = LAYOUT) -> dict[str, Any]:
+    rule = rules_of(deployment, layout)["football"]
+    status: dict[str, Any] = rule.status(WritableView(0, numbers))  # type: ignore[attr-defined]
+    return {**status, "text": rule.text(status)}  # type: ignore[attr-defined]
+
+
+def test_the_clock_counts_the_ticks_with_a_ball_in_play() -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    ticks = kickoff_ticks(DEPLOYMENT)
+    apply(numbers, ticks)
+    assert told(numbers)["clock_s"] == 0.0
+    place_ball(numbers, BALL, (0.3, 0.1, RADIUS), ROLLING)
+    apply(numbers, 100)
+    assert told(numbers)["clock_s"] == 100 * DEPLOYMENT.tick_ns / 1e9
+    place_ball(numbers, BALL, (LINE_X + 0.01, 0.0, RADIUS), ROLLING)
+    apply(numbers, 1 + ticks)
+    assert told(numbers)["clock_s"] == 101 * DEPLOYMENT.tick_ns / 1e9
+
+
+@pytest.mark.parametrize(
+    ("scored", "winner", "text"),
+    [
+        ((2.0, 1.0), "red", "red 2 : 1 blue, red has won"),
+        ((0.0, 1.0), "blue", "red 0 : 1 blue, blue has won"),
+        ((1.0, 1.0), None, "red 1 : 1 blue, a draw"),
+    ],
+)
+def test_a_match_ends_with_its_time(scored: tuple[float, float], winner: str | None, text: str) -> None:
+    timed = with_rules("match={duration: 1 s}")
+    numbers = in_play((0.3, 0.1, RADIUS))
+    at = LAYOUT["world"].offsets["football.score"]
+    numbers[at : at + 2] = scored
+    ticks = 10**9 // timed.tick_ns
+    apply(numbers, ticks - 1, deployment=timed)
+    before = told(numbers, timed)
+    assert not before["is_over"] and before["winner"] is None and " has won" not in before["text"]
+    apply(numbers, 1, deployment=timed)
+    after = told(numbers, timed)
+    assert after == {
+        "score": {"red": int(scored[0]), "blue": int(scored[1])},
+        "own_goals": {"red": 0, "blue": 0},
+        "clock_s": 1.0,
+        "is_over": True,
+        "winner": winner,
+        "text": text,
+    }
+    assert field(numbers, "position", 3) == SPOT and not any(field(numbers, "linear_velocity", 3))
+    rest = numbers.copy()
+    assert apply(numbers, 2000, deployment=timed) == rest, "no clock, no kick-off, no dead ball"
+
+
+def test_a_match_ends_with_its_goals() -> None:
+    short = with_rules("match={goals: 2}")
+    numbers = in_play((0.3, 0.1, RADIUS))
+    for goals in (1, 2):
+        place_ball(numbers, BALL, (-LINE_X - 0.01, 0.0, RADIUS), ROLLING)
+        apply(numbers, deployment=short)
+        assert (told(numbers, short)["is_over"], score(numbers)) == (goals == 2, [0.0, float(goals)])
+        if goals == 1:
+            apply(numbers, kickoff_ticks(short), deployment=short)
+    assert told(numbers, short)["winner"] == "blue"
+
+
+def test_balls_rest_apart_when_a_match_is_over() -> None:
+    short = with_rules("match={goals: 1}")
+    layout = build_layout(short, [("second", "ball"), ("third", "ball")])
+    numbers = initial_numbers(short, layout)
+    for ball in layout.of("ball"):
+        place_ball(numbers, ball, (LINE_X + 0.01, 0.0, RADIUS), ROLLING)
+    apply(numbers, layout=layout, deployment=short)
+    places = sorted(field(numbers, "position", 3, ball)[1] for ball in layout.of("ball"))
+    assert places == pytest.approx([-4 * RADIUS, 0.0, 4 * RADIUS])
+
+
+def test_without_a_match_play_has_no_end() -> None:
+    endless = with_rules("match=null")
+    numbers = in_play((0.3, 0.1, RADIUS))
+    at = LAYOUT["world"].offsets["football.score"]
+    numbers[at : at + 2] = [1000.0, 0.0]
+    numbers[LAYOUT["world"].offsets["football.played_ticks"]] = 1e9
+    assert not told(apply(numbers, deployment=endless), endless)["is_over"]
+
+
+def test_marks_tell_own_goals_and_the_end_to_the_tick() -> None:
+    short = with_rules("match={goals: 1}")
+    numbers = in_play((-TABLE.lines["goal"].x, 0.0, RADIUS))
+    touch(numbers, {"blue.goal": 3.0})
+    before = Frame(0, LAYOUT, np.array(numbers))
+    rule = rules_of(short, LAYOUT)["football"]
+    for tick in range(7):
+        if tick == 4:
+            shoot(numbers, 1.0)
+        rule.apply(WritableView(tick, numbers))
+    after = Frame(10, LAYOUT, np.array(numbers))
+    assert list(rule.marks(before, after)) == [  # type: ignore[attr-defined]
+        (4, "own_goal", "own goal of blue, 1 : 0"),
+        (4, "end", "end of the match, 1 : 0"),
+    ]
+
+
+@pytest.mark.parametrize("match", ["{}", "{duration: null}", "{goals: null, duration: null}"])
+def test_a_match_that_nothing_ends_is_refused(match: str) -> None:
+    with pytest.raises(DeploymentError, match=r"table\.rules\.match: a match that nothing ends"):
+        with_rules(f"match={match}")

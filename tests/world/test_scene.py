@@ -4,8 +4,9 @@ from math import cos, pi, sin, sqrt
 from pathlib import Path
 
 import pytest
+import yaml
 
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.assembly.islands import table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.kinematics import forward_kinematics
@@ -15,7 +16,8 @@ from foosim.world.parameters.table import table_of
 from foosim.world.scene import Box, Shape, Vector, inertia_about_axis, multiply, place, rotate, swept_box, turn
 from tests.placing import place_ball
 
-DEPLOYMENT = load_deployment((Path(__file__).parents[2] / "deploy" / "table.yaml").read_text(), "table.yaml")
+TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+DEPLOYMENT = load_deployment(TEXT, "table.yaml")
 TABLE = table_of(DEPLOYMENT)
 LAYOUT = build_layout(DEPLOYMENT)
 SCENE = build_scene(DEPLOYMENT, LAYOUT)
@@ -122,10 +124,41 @@ def test_inertia_comes_from_the_parts() -> None:
     """A goal keeper's rod: a hollow cylinder and one box that hangs below the axis."""
     link = SCENE.bodies["red.goal"].links[1]
     rod = TABLE.rod
-    tube = rod.mass * (rod.radius**2 + rod.inner_radius**2) / 2
+    tube = rod.tube_mass * (rod.radius**2 + rod.inner_radius**2) / 2
     figure = rod.figure_mass * ((0.02**2 + 0.09**2) / 12 + 0.016**2)
     assert inertia_about_axis(link) == pytest.approx(tube + figure)
     assert link.mass == pytest.approx(0.946)
     assert link.mass * link.centre_of_mass[2] == pytest.approx(-rod.figure_mass * 0.016)
     assert link.inertia[0] == pytest.approx(link.inertia[2], rel=0.01)
     assert sqrt(sum(part * part for part in link.centre_of_mass)) < 0.001
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_strip_rises_from_the_floor_to_the_side_wall(side: float) -> None:
+    """Along the whole wall, in front of the ramps' corners, too."""
+    sets = ["table.strips={height: 6 mm, width: 20 mm}", "table.ramps.height=0 mm"]
+    spec = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    strips = [shape for shape in build_scene(spec, build_layout(spec)).scenery if shape.surface == "ramps"]
+    wide = TABLE.field.width / 2
+    assert len(strips) == 2
+    for x in (-0.59, 0.0, 0.3, 0.59):
+        for share in (0.01, 0.5, 0.99):
+            y, z = side * (wide - 0.02 * (1 - share)), 0.006 * share
+            assert any(inside(shape, (x, y, z - 1e-6), 0.0) for shape in strips)
+            assert not any(inside(shape, (x, y, z + 1e-6), 0.0) for shape in strips)
+        assert not any(inside(shape, (x, side * (wide - 0.021), -1e-6), 0.0) for shape in strips)
+
+
+@pytest.mark.parametrize(("inner", "mass"), [("0 mm", 1.736), ("6 mm", 0.760)])
+def test_a_rod_without_a_mass_is_of_steel(inner: str, mass: float) -> None:
+    """7,850 kg/m3 of a tube, or of a solid rod: about twice as heavy, and it turns harder."""
+    sets = [f"table.rod.inner_radius={inner}"]
+    data = yaml.safe_load(apply_sets(TEXT, "table.yaml", sets))
+    del data["table"]["rod"]["mass"]
+    spec = load_deployment(yaml.safe_dump(data, sort_keys=False), "table.yaml")
+    rod = table_of(spec).rod
+    assert rod.mass is None and rod.tube_mass == pytest.approx(mass, abs=0.001)
+    link = build_scene(spec, build_layout(spec)).bodies["red.goal"].links[1]
+    figure = rod.figure_mass * ((0.02**2 + 0.09**2) / 12 + 0.016**2)
+    assert link.mass == pytest.approx(rod.tube_mass + rod.figure_mass)
+    assert inertia_about_axis(link) == pytest.approx(rod.tube_mass * (rod.radius**2 + rod.inner_radius**2) / 2 + figure)

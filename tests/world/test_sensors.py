@@ -27,7 +27,9 @@ from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import RobotPacket
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
-DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")
+AT_ONCE: Final = "robots.camera.sensors.ball.modifiers=[{kind: gaussian_noise, std: {x: 1.5 mm, y: 1.5 mm}}]"
+"""A camera without its latency: each tick has its picture."""
+DEPLOYMENT: Final = load_deployment(apply_sets(TEXT, "table.yaml", [AT_ONCE]), "table.yaml")
 LAYOUT: Final = build_layout(DEPLOYMENT)
 NUMBERS: Final = initial_numbers(DEPLOYMENT, LAYOUT)
 COUNT: Final = 20_000
@@ -36,7 +38,7 @@ CHI2_63_999: Final = 103.44
 
 
 def deployed(*sets: str) -> Deployment:
-    return load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    return load_deployment(apply_sets(TEXT, "table.yaml", [AT_ONCE, *sets]), "table.yaml")
 
 
 def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> FittedSensor:

@@ -70,7 +70,8 @@ def test_a_reference_follows_its_entity_and_is_none_when_that_is_gone() -> None:
     assert layout.digest != LAYOUT.digest
     numbers = initial_numbers(DEPLOYMENT, layout)
     target, index = (layout["ball"].offsets[f"own.{slot}"] for slot in ("target", "index"))
-    assert layout.references == (target,) and numbers[target] == NO_ENTITY and numbers[index] == 0.0
+    own = layout["ball"].offsets["football.touched_by"]
+    assert layout.references == (own, target) and numbers[target] == NO_ENTITY and numbers[index] == 0.0
     numbers[target] = numbers[index] = float(layout["red.goal"].index)
     frame = Frame(0, layout, np.array(numbers))
     more, added = edit(frame, [Add("a1", "ball", (0.1, 0.0, 0.02), STILL)], DEPLOYMENT)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot
 from typing import Final
 
 from foosim.common.finding import Finding
 from foosim.world.clearance.convex import Solid, convex_parts, overlap_of
 from foosim.world.models.rod import ALONG_Y, RodRobot, figure_ys, line_x_m
-from foosim.world.parameters.table import table_of
+from foosim.world.parameters.table import rod_reach, table_of
 from foosim.world.scene import UPRIGHT, Cylinder, Sphere, Vector, shape_box
 from foosim.world.scenery import scenery_shape
 from foosim.world.spec import WorldSpec
@@ -68,9 +67,7 @@ def _swept(spec: WorldSpec) -> Iterator[_Swept]:
         (ball, ball, 2.0 * ball),
         Solid(Sphere(ball), (0.0, 0.0, ball), UPRIGHT),
     )
-    feet = hypot(rod.foot.length / 2, rod.foot_radius)
-    top = rod.foot.height + rod.body.height - rod.foot_radius
-    reach = max(feet, hypot(rod.body.length / 2, top), hypot(rod.body.length / 2, rod.foot_radius - rod.foot.height))
+    reach = rod_reach(rod)
     wide = max(rod.foot.width, rod.body.width) / 2
     for name, robot in spec.robots.items():
         if not isinstance(robot, RodRobot):

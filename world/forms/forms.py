@@ -321,9 +321,11 @@ class Kit(Form):
     """A section of a deployment that makes a world from few numbers.
 
     `entities` are what is in the world beside the robots, their models by name; `addable` the models of which a running
-    world can have more; `rules` the rules of the world, by name.
+    world can have more; `rules` the rules of the world, by name. `presets` are whole sections, as plain data, by name:
+    a section may name one in place of what it leaves out.
     """
 
     entities: Mapping[str, str] = field(default_factory=dict)
     addable: tuple[str, ...] = ()
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

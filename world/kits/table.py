@@ -12,6 +12,7 @@ from foosim.world.forms.registry import kit
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
 from foosim.world.parameters.table_checks import table_findings
+from foosim.world.parameters.table_presets import PRESETS
 from foosim.world.scene import Shape
 from foosim.world.scenes.football_table import table_scenery
 from foosim.world.spec import WorldSpec
@@ -26,7 +27,9 @@ SILENT = frozenset({"floor", "ramps"})
 """What a ball rolls on: its contacts are not logged."""
 
 
-@kit(TABLE, Table, entities={BALL: "ball"}, addable=("ball",), rules={"football": {"kind": "football"}})
+@kit(
+    TABLE, Table, entities={BALL: "ball"}, addable=("ball",), rules={"football": {"kind": "football"}}, presets=PRESETS
+)
 class TableKit:
     """A football table with its ball, which rods play by the rules of the game."""
 

@@ -139,12 +139,12 @@ def _spin_mass(table: Table, line: Line) -> tuple[float, float, Vector]:
     rod = table.rod
     below = rod.figure_com_below_axis
     count = line.figures
-    mass = rod.mass + count * rod.figure_mass
+    mass = rod.tube_mass + count * rod.figure_mass
     centre = -count * rod.figure_mass * below / mass
     radii = rod.radius * rod.radius + rod.inner_radius * rod.inner_radius
     long, wide, tall = rod.body.length, rod.body.width, rod.foot.height + rod.body.height
     squares = sum(y * y for y in figure_ys(line))
-    tube_across = rod.mass * (radii / 4.0 + rod.length * rod.length / 12.0)
+    tube_across = rod.tube_mass * (radii / 4.0 + rod.length * rod.length / 12.0)
     figure_x = (wide * wide + tall * tall) / 12.0 + below * below
     figure_y = (long * long + tall * tall) / 12.0 + below * below
     figure_z = (long * long + wide * wide) / 12.0
@@ -154,7 +154,7 @@ def _spin_mass(table: Table, line: Line) -> tuple[float, float, Vector]:
         centre,
         (
             tube_across + rod.figure_mass * (count * figure_x + squares) - shift,
-            rod.mass * radii / 2.0 + rod.figure_mass * count * figure_y - shift,
+            rod.tube_mass * radii / 2.0 + rod.figure_mass * count * figure_y - shift,
             tube_across + rod.figure_mass * (count * figure_z + squares),
         ),
     )

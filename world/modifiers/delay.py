@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import Field
@@ -28,6 +29,12 @@ class DelaySettings(ModifierSettings):
     """
 
     time_ns: Delay = Field(alias="time")
+
+
+def delay_ns(modifiers: Iterable[ModifierSettings]) -> int:
+    """Return by how much later than measured a reading leaves its robot, or than received a command takes effect, as
+    these modifiers say (ns). Who knows the deployment knows it, as the player of a real camera knows its latency."""
+    return sum(one.time_ns for one in modifiers if isinstance(one, DelaySettings))
 
 
 def slots(settings: DelaySettings, of: Carrier) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""The football table's scenery: floor, walls, goals, corner ramps."""
+"""The football table's scenery: floor, walls, goals, corner ramps, strips along the side walls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 from foosim.world.forms.registry import scene
 from foosim.world.forms.settings import SceneSettings
 from foosim.world.matter import materials
-from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Table, Walls
+from foosim.world.parameters.table import TABLE, Floor, Goal, Playfield, Ramps, Strips, Table, Walls
 from foosim.world.scene import Box, Colour, Shape, Vector
 
 GREEN: Final[Colour] = (0.16, 0.45, 0.24, 1.0)
@@ -35,12 +35,14 @@ class FootballTableSettings(SceneSettings):
     walls: Walls
     goal: Goal
     ramps: Ramps
+    strips: Strips | None = None
 
 
 @scene("football_table", FootballTableSettings)
 def table_scenery(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
-    """Floor, walls, goals and ramps; boxes only, since a concave mesh lets fast balls through."""
-    return (_floor(table), *_side_walls(table), *_end_walls(table), *_goals(table), *_ramps(table))
+    """Floor, walls, goals, ramps and strips; boxes only, since a concave mesh lets fast balls through."""
+    walls = (*_side_walls(table), *_end_walls(table))
+    return (_floor(table), *walls, *_goals(table), *_ramps(table), *_strips(table))
 
 
 def _box(low: Vector, high: Vector, surface: str, colour: Colour) -> Shape:
@@ -124,3 +126,24 @@ def _ramp(table: Table | FootballTableSettings, side_x: float, side_y: float) ->
     )
     box = Box((slope / 2.0, run, thick / 2.0))
     return Shape(box, "ramps", DARK_GREEN, middle, orientation, materials.WOOD, TABLE)
+
+
+def _strips(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
+    """Return a tilted box along each side wall whose upper face rises from the floor to the wall."""
+    return () if table.strips is None else tuple(_strip(table, table.strips, side) for side in (1.0, -1.0))
+
+
+def _strip(table: Table | FootballTableSettings, strips: Strips, side: float) -> Shape:
+    """Return one strip: its local y climbs towards the wall at y of this sign, its local z is the face's normal."""
+    thick = table.floor.thickness
+    slope = sqrt(strips.width * strips.width + strips.height * strips.height)
+    rise, level = strips.height / slope, strips.width / slope
+    half_cos = sqrt((1.0 + level) / 2.0)
+    half_sin = rise / (2.0 * half_cos)
+    middle = (
+        0.0,
+        side * (table.field.width / 2 - strips.width / 2 + thick / 2.0 * rise),
+        strips.height / 2.0 - thick / 2.0 * level,
+    )
+    box = Box((table.field.length / 2, slope / 2.0, thick / 2.0))
+    return Shape(box, "ramps", DARK_GREEN, middle, (side * half_sin, 0.0, 0.0, half_cos), materials.WOOD, TABLE)

@@ -1,0 +1,247 @@
+"""Fits the surfaces of a table to measured tracks of its ball, by least squares, with confidence intervals.
+
+Each track has a start of its own (place, velocity, how much of it rolls), which is fitted along; the surfaces are those
+of all tracks. Residuals are the distances of measured places from the motion's, in x and y, and count alike. The
+intervals are those of linear regression at the best fit: Student's t with the variance of the residuals, J the
+derivatives (Seber and Wild, Nonlinear Regression, 1989, 5.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from foosim.common.errors import Failed
+from foosim.fitting.motion import Array, Field, Motion, Pairs, Start, motion
+
+STARTS: Final = len(Start._fields)
+LEAST: Final = Pairs(0.0, 0.0, 0.0, 0.0)
+MOST: Final = Pairs(0.01, 2.0, 1.0, 2.0)
+STEPS: Final = Pairs(1e-6, 1e-4, 1e-4, 1e-4)
+"""By how much a surface is changed for a derivative; of starts see START_STEPS."""
+START_STEPS: Final = (1e-5, 1e-5, 1e-4, 1e-4, 1e-3)
+BEGINNING: Final = 10
+"""A start is guessed from so many of the first points."""
+CONFIDENCE: Final = 0.95
+HORIZONS_S: Final = (0.3, 0.6, 1.2)
+"""The fit begins with so much of each track, and goes on with more from what it has found: a rebound at a wrong time,
+which a start at a wrong speed comes to, would keep it from the right one."""
+SCALES: Final = Pairs(2e-4, 0.1, 0.1, 0.1)
+HELD_M: Final = 0.003
+"""On the way there a surface that is SCALES beside where it began counts as much as a place that is this far off: what
+so short a track does not tell stays."""
+TRIES_MAX: Final = 60
+SLOW: Final = 0.1
+"""m/s: what comes to a wall more slowly may as well have been lost in the noise."""
+BESIDE: Final = 4
+"""Speeds before and after a rebound are measured over so many points."""
+KNOWN: Final = 0.5
+"""An interval that reaches farther than this share of its value, to either side, says that the tracks do not tell."""
+
+
+class NoLeastSquares(Failed):
+    """The library that fits is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A surface's value, half of its interval of confidence, and whether the tracks tell it."""
+
+    value: float
+    half: float
+
+    @property
+    def is_known(self) -> bool:
+        return self.half <= KNOWN * abs(self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What was fitted, by field of `Pairs`; the standard deviation of the residuals (m), points, rebounds at walls."""
+
+    pairs: dict[str, Fitted]
+    noise: float
+    points: int
+    rebounds: int
+
+
+def fit(tracks: Sequence[Array], field: Field, first: Pairs) -> Result:
+    """Return the surfaces that fit tracks best. `first` are those that the fit begins with.
+
+    The rows of a track are time (s), x and y (m). Where no track comes back from a wall nothing of walls is fitted.
+    Raises NoLeastSquares.
+    """
+    try:
+        from scipy.optimize import least_squares
+        from scipy.stats import t as students
+    except ImportError:
+        raise NoLeastSquares("the fit needs scipy, which is not installed: pip install 'foosim[fit]'") from None
+    first = first._replace(bounce=_bounce(tracks, field) or first.bounce)
+    names = Pairs._fields if rebounds(tracks, field) else ("rolling", "floor")
+    vector: Array | None = None
+    longest = max(float(track[-1, 0] - track[0, 0]) for track in tracks)
+    for horizon in (*(one for one in HORIZONS_S if one < longest), longest):
+        problem = _Problem([_upto(track, horizon) for track in tracks], field, first, names, horizon < longest)
+        best = least_squares(
+            problem.residuals,
+            problem.begin(first) if vector is None else vector,
+            problem.derivatives,
+            bounds=problem.bounds,
+            x_scale="jac",
+            ftol=1e-7,
+            xtol=1e-7,
+            max_nfev=TRIES_MAX,
+        )
+        vector = problem.within(best.x)
+    count = 2 * sum(len(track) for track in tracks)
+    free = count - len(best.x)
+    variance = 2.0 * best.cost / free
+    spread = _spread(best.jac) * variance
+    factor = float(students.ppf(0.5 + CONFIDENCE / 2.0, free))
+    pairs = {
+        name: Fitted(float(best.x[place]), factor * float(np.sqrt(spread[place]))) for place, name in enumerate(names)
+    }
+    met = sum(len(one.rebounds) for one in problem.motions(best.x))
+    return Result(pairs, float(np.sqrt(variance)), count // 2, met)
+
+
+def _spread(jac: Array) -> Array:
+    """Return the diagonal of the inverse of J^T J; infinite for what nothing tells."""
+    scale = np.sqrt((jac * jac).sum(axis=0))
+    scale[scale == 0.0] = np.inf
+    _, singular, rows = np.linalg.svd(jac / scale, full_matrices=False)
+    singular[singular < 1e-10 * singular[0]] = 1e-10 * singular[0]
+    inverse: Array = ((rows / singular[:, None]) ** 2).sum(axis=0) / scale**2
+    inverse[~np.isfinite(scale)] = np.inf
+    return inverse
+
+
+def guess(track: Array) -> Start:
+    """Return a start from the first points of a track, by straight lines: one that rolls."""
+    first = track[:BEGINNING]
+    time = first[:, 0] - first[0, 0]
+    middle = time - time.mean()
+    speeds = (first[:, 1:] * middle[:, None]).sum(axis=0) / (middle * middle).sum()
+    x, y = first[:, 1:].mean(axis=0) - speeds * time.mean()
+    return Start(float(x), float(y), float(speeds[0]), float(speeds[1]), 0.9)
+
+
+def _upto(track: Array, horizon: float) -> Array:
+    """Return the points of so much time of a track, as many as a start is guessed from at least."""
+    count = int(np.searchsorted(track[:, 0], track[0, 0] + horizon, side="right"))
+    return track[: max(count, BEGINNING)]
+
+
+def rebounds(tracks: Sequence[Array], field: Field) -> list[float]:
+    """Return by how much of its speed onto the wall each rebound of tracks comes back, as their points tell."""
+    found = []
+    for track in tracks:
+        for axis, most in ((1, field.x), (2, field.y)):
+            place = track[:, axis]
+            for at in range(BESIDE, len(track) - BESIDE):
+                is_farthest = abs(place[at]) == np.abs(place[at - BESIDE : at + BESIDE + 1]).max()
+                if is_farthest and abs(place[at]) > most - 2.0 * field.radius:
+                    before, after = (
+                        _slope(track[one], axis) for one in (slice(at - BESIDE, at), slice(at + 1, at + 1 + BESIDE))
+                    )
+                    if before * place[at] > 0.0 > after * place[at] and abs(before) > SLOW:
+                        found.append(-after / before)
+    return found
+
+
+def _slope(rows: Array, axis: int) -> float:
+    time = rows[:, 0] - rows[:, 0].mean()
+    return float((time * rows[:, axis]).sum() / (time * time).sum())
+
+
+def _bounce(tracks: Sequence[Array], field: Field) -> float | None:
+    """Return the restitution that the points beside rebounds tell, roughly; None without a rebound."""
+    found = rebounds(tracks, field)
+    return min(max(float(np.median(found)), 0.05), 0.98) if found else None
+
+
+class _Problem:
+    """The residuals of all tracks and their derivatives, by the vector of what is fitted: surfaces, then starts.
+
+    `is_held`: surfaces are held to what the fit began with, by residuals of their own.
+    """
+
+    def __init__(
+        self, tracks: Sequence[Array], field: Field, first: Pairs, names: Sequence[str], is_held: bool
+    ) -> None:
+        self._tracks, self._field, self._first, self._names = tracks, field, first, names
+        self._held = len(names) if is_held else 0
+        self._times = [track[:, 0] - track[0, 0] for track in tracks]
+        starts = [(-field.x, field.x), (-field.y, field.y), (-50.0, 50.0), (-50.0, 50.0), (0.0, 1.0)] * len(tracks)
+        low = [getattr(LEAST, name) for name in names] + [least for least, _ in starts]
+        high = [getattr(MOST, name) for name in names] + [most for _, most in starts]
+        self.bounds = (low, high)
+
+    def begin(self, pairs: Pairs) -> Array:
+        """Return the vector to begin with."""
+        surfaces = [getattr(pairs, name) for name in self._names]
+        return self.within(np.array(surfaces + [value for track in self._tracks for value in guess(track)]))
+
+    def within(self, vector: Array) -> Array:
+        """Return a vector that is not on a bound, where the solver cannot begin."""
+        low, high = np.array(self.bounds)
+        edge = 1e-6 * (high - low)
+        begun: Array = np.clip(vector, low + edge, high - edge)
+        return begun
+
+    def _pairs(self, vector: Array) -> Pairs:
+        return self._first._replace(**dict(zip(self._names, map(float, vector), strict=False)))
+
+    def _of(self, number: int, pairs: Pairs, start: Array) -> Motion:
+        return motion(Start(*map(float, start)), pairs, self._field, float(self._times[number][-1]) + 1e-9)
+
+    def _start(self, number: int, vector: Array) -> Array:
+        at = len(self._names) + STARTS * number
+        return vector[at : at + STARTS]
+
+    def motions(self, vector: Array) -> list[Motion]:
+        """Return the way of each track."""
+        pairs = self._pairs(vector)
+        return [self._of(number, pairs, self._start(number, vector)) for number in range(len(self._tracks))]
+
+    def residuals(self, vector: Array) -> Array:
+        """Return by how much each place of each motion is beside the measured one (m)."""
+        held = [
+            HELD_M * (vector[place] - getattr(self._first, name)) / getattr(SCALES, name)
+            for place, name in enumerate(self._names[: self._held])
+        ]
+        beside = [
+            (one.at(times) - track[:, 1:]).ravel()
+            for one, times, track in zip(self.motions(vector), self._times, self._tracks, strict=True)
+        ]
+        return np.concatenate([*beside, np.array(held)])
+
+    def derivatives(self, vector: Array) -> Array:
+        """Return the derivatives of the residuals, by central differences: a start matters to its own track alone."""
+        pairs = self._pairs(vector)
+        rows: Array = np.zeros((2 * sum(map(len, self._tracks)) + self._held, len(vector)))
+        for place, name in enumerate(self._names[: self._held]):
+            rows[place - self._held, place] = HELD_M / getattr(SCALES, name)
+        row = 0
+        for number, times in enumerate(self._times):
+            start = self._start(number, vector)
+            upto = row + 2 * len(times)
+            for place, name in enumerate(self._names):
+                step = getattr(STEPS, name)
+                sides = [
+                    self._of(number, pairs._replace(**{name: max(getattr(pairs, name) + sign * step, 0.0)}), start)
+                    for sign in (1.0, -1.0)
+                ]
+                width = step + min(step, getattr(pairs, name))
+                rows[row:upto, place] = (sides[0].at(times) - sides[1].at(times)).ravel() / width
+            for place, step in enumerate(START_STEPS):
+                moved = [start.copy(), start.copy()]
+                moved[0][place] += step
+                moved[1][place] -= step
+                one, other = (self._of(number, pairs, side).at(times) for side in moved)
+                rows[row:upto, len(self._names) + STARTS * number + place] = (one - other).ravel() / (2.0 * step)
+            row = upto
+        return rows
