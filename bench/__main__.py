@@ -31,6 +31,7 @@ from bench import (
     rigid_fleet,
     swarm,
     table_one_process,
+    table_sensors,
     validate,
     verdict,
     vhub_loss,
@@ -74,6 +75,12 @@ BENCHES: Final = (
         "the table in one process (rehearsal, one node, no capture)",
         with_default(table_one_process.table_one_process),
         table_one_process.lines,
+    ),
+    Bench(
+        "table-sensors",
+        "the table in one process, with all sensors",
+        with_default(table_sensors.table_sensors),
+        table_sensors.lines,
     ),
     Bench(
         "distributed",

@@ -84,7 +84,7 @@ class MeteredEngine:
         self._engine.load(entities, state)
         self._meter.add("load", begun_ns)
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
         begun_ns = time.perf_counter_ns()
         self._engine.command(entities, commands)
         self._meter.add("command", begun_ns)

@@ -76,6 +76,7 @@ ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000)
 SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
 SPIN: Final = Dimension("rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30})
 ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": Fraction(1, 1000)})
+ANGULAR_ACCELERATION: Final = Dimension("angular acceleration", {"rad/s2": Fraction(1), "deg/s2": _DEGREE})
 FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
 IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
@@ -84,6 +85,14 @@ ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e
 POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
 VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
 CURRENT: Final = Dimension("current", _sizes(A="1", mA="1e-3"))
+RESISTANCE: Final = Dimension("resistance", _sizes(Ohm="1", mOhm="1e-3"))
+INERTIA: Final = Dimension("moment of inertia", {"kg m2": Fraction(1), "g cm2": Fraction(1, 10**7)})
+FORCE_CONSTANT: Final = Dimension("force constant", {"N/A": Fraction(1)})
+TORQUE_CONSTANT: Final = Dimension("torque constant", {"N m/A": Fraction(1), "mN m/A": Fraction(1, 1000)})
+SPEED_CONSTANT: Final = Dimension("voltage per speed", {"V s/m": Fraction(1)})
+SPIN_CONSTANT: Final = Dimension(
+    "voltage per rotational speed", {"V s/rad": Fraction(1), "mV s/rad": Fraction(1, 1000)}
+)
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)}, usual="%")
 FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
 BITRATE: Final = Dimension(

@@ -20,7 +20,9 @@ from foosim.deployment.schema import Deployment
 from foosim.node.due_sensors import DueSensors, Turn
 from foosim.node.edited_frame import edit, moved_reference
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
+from foosim.node.physics.touch_log import clear_touches
 from foosim.world.assembly.rest import Rest, wake_edited
+from foosim.world.assembly.standing import Standing
 from foosim.world.assembly.world import World
 from foosim.world.components.fitted import named_modifiers, sensors_of
 from foosim.world.components.sensing import Sensing
@@ -70,6 +72,9 @@ class Stepper:
         self.substeps = deployment.substeps
         self.rest = Rest(deployment, layout)
         self._by_island = layout.couples
+        self._standing = Standing(layout, self.world.actuators, self.world.ruled)
+        self._alone: frozenset[int] = frozenset()
+        """Bodies that are islands by themselves, of the islands that were solved last."""
         self._divided: tuple[
             tuple[tuple[Entity, ...], ...], list[tuple[tuple[Entity, ...], tuple[Entity, ...], bool]]
         ] = (), []
@@ -139,6 +144,7 @@ class Stepper:
         world.apply_rules(numbers, frame.tick)
         if edits or world.has_rules:
             wake_edited(frame, layout, numbers)
+            self._standing.wake_edited(frame, layout, numbers)
         return layout, numbers
 
     def deliver(
@@ -192,17 +198,7 @@ class Stepper:
     def solve(self, engine: AnyEngine, work: Work) -> None:
         """Load, command, step, read: write the next state of every body of `work` into its numbers."""
         numbers = work.numbers
-        if work.islands is not self._islands:
-            self._islands = work.islands
-            self._bodies = [entity for island in work.islands for entity in island]
-            self._quarantined = [entity.offsets["quarantined"] for entity in self._bodies]
-        bodies = self._bodies
-        is_partial = any(map(numbers.__getitem__, self._quarantined))
-        if is_partial:
-            for entity in bodies:
-                if numbers[entity.offsets["quarantined"]] != 0.0:
-                    _clear_results(entity, numbers)
-            bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
+        bodies, is_partial = self._awake(work)
         if not bodies:
             return
         world, before = self.world, numbers.copy()
@@ -218,8 +214,29 @@ class Stepper:
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick, work.values if work.start else None)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
+        if not self._by_island:
+            self._standing.note(bodies, numbers, before)
         if not (isfinite(sum(numbers)) and world.plausible(changed, numbers, before, work.tick)):
             self._quarantine(work, before)
+
+    def _awake(self, work: Work) -> tuple[list[Entity], bool]:
+        """Return what is solved, neither what stands nor what is in quarantine, and whether anything is in that."""
+        numbers = work.numbers
+        if work.islands is not self._islands:
+            self._islands = work.islands
+            self._bodies = [entity for island in work.islands for entity in island]
+            self._quarantined = [entity.offsets["quarantined"] for entity in self._bodies]
+            self._alone = frozenset([island[0].index for island in work.islands if len(island) == 1])
+        bodies = self._bodies
+        is_partial = any(map(numbers.__getitem__, self._quarantined))
+        if is_partial:
+            for entity in bodies:
+                if numbers[entity.offsets["quarantined"]] != 0.0:
+                    _clear_results(entity, numbers)
+            bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
+        if work.start and not self._by_island:
+            bodies = self._standing.awake(bodies, self._alone, numbers, work.start)
+        return bodies, is_partial
 
     def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:
         """Solve bodies whose joints do not couple: all in one go."""
@@ -313,10 +330,12 @@ def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:
 
 
 def _clear_results(entity: Entity, numbers: list[float]) -> None:
-    """Empty the contact log and the efforts of a body that was not solved: they are those of one tick."""
+    """Empty the contact logs and the efforts of a body that was not solved: they are those of one tick."""
     start = entity.offsets.get("contacts")
     if start is not None:
         numbers[start : start + 3] = (0.0, 0.0, -1.0)
+    if "touches" in entity.offsets:
+        clear_touches(entity, numbers)
     start = entity.offsets.get("joint_efforts")
     if start is not None:
         count = entity.counts["joint_efforts"]

@@ -119,20 +119,20 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
 def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_path: Path) -> None:
     """With foosim as pip installs it, and a file as the guide has it."""
     guide = (ROOT / "docs" / "how-to" / "extending.md").read_text()
-    (source,) = re.findall(r"```python\n# currents\.py\n(.*?)```", guide, re.DOTALL)
-    (setting,) = re.findall(r"--set '(.*currents:MotorCurrent.*)'\n", guide)
-    (tmp_path / "currents.py").write_text(source)
+    (source,) = re.findall(r"```python\n# powers\.py\n(.*?)```", guide, re.DOTALL)
+    (setting,) = re.findall(r"--set '(.*powers:MotorPower.*)'\n", guide)
+    (tmp_path / "powers.py").write_text(source)
     shutil.copy(ROOT / "deploy" / "table.yaml", tmp_path)
     options = ["--in", "table.yaml", "--ticks", "40", "--set", "engine=pure", "--set", "players={}", "--set", setting]
     command = installed.commands / "foosim-supervisor"
-    shown = run(command, "check-component", "motor_current", *options, cwd=tmp_path, PYTHONPATH=str(tmp_path))
-    assert "sensor motor_current: the same world on 1, 2 and 3 nodes" in shown
+    shown = run(command, "check-component", "motor_power", *options, cwd=tmp_path, PYTHONPATH=str(tmp_path))
+    assert "sensor motor_power: the same world on 1, 2 and 3 nodes" in shown
 
 
 @pytest.mark.parametrize(
     ("names", "shows"),
     [
-        (("currents.py", "low_pass.py"), "score"),
+        (("powers.py", "low_pass.py"), "score"),
         (("laps.py", "service.py"), "laps"),
         (("omni.py",), "world"),
         (("yards.py",), "world"),

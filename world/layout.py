@@ -103,7 +103,7 @@ class Declared:
     `names` are the entities that are always there; `carried` what entities carry, by name; `memory` what the rules of
     the world remember of each entity of a model; `addable` the models of which a running world can have more; `fields`
     those of the state of entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose
-    settings ask for a variant of their model.
+    settings ask for a variant of their model; `demanded` the fields on demand that entities have, by name.
     """
 
     names: frozenset[str] = frozenset()
@@ -112,6 +112,7 @@ class Declared:
     addable: tuple[str, ...] = ()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
+    demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def kind_of(self, name: str, model: str) -> Model:
         """Return what there is to know of an entity, by its name and that of its model."""
@@ -119,9 +120,9 @@ class Declared:
 
     def fields_of(self, name: str, kind: Model) -> Mapping[str, int]:
         """Return the fields of the state of an entity of a model."""
-        if kind.declared is not None:
-            return kind.declared
-        return self.fields[name]
+        fields = self.fields[name] if kind.declared is None else kind.declared
+        more = self.demanded.get(name)
+        return {**fields, **more} if more else fields
 
     def remembered(self, kind: Model) -> dict[str, int]:
         """Return the slots in which the rules of the world remember what they know of each entity of a model."""
@@ -248,7 +249,8 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
-    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields, variants)
+    demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
+    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields, variants, demanded)
     for name, model in added:
         if not addable:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")
@@ -398,6 +400,21 @@ def unheard(spec: WorldSpec) -> Iterator[Finding]:
                 valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
                 what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
                 yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
+
+
+def _demanded(robot: RobotSettings) -> dict[str, int]:
+    """Return the fields of a robot that its model has on demand."""
+    model = registry.model_of(robot)
+    if not model.on_demand:
+        return {}
+    components = [
+        registry.find_component(form, its.kind)
+        for form, having in (("sensor", robot.sensors), ("actuator", robot.actuators))
+        for its in having.values()
+    ]
+    needs = [need for one in components for need in (*one.needs, one.speaks)]
+    needs += [need for its in robot.rules.values() for need in find_entity_rule(its).needs]
+    return model.demanded(needs)
 
 
 def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:

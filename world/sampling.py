@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from foosim.common.names import CHANNEL_ECHO
 from foosim.world.forms import registry
 from foosim.world.frame import Frame
@@ -33,15 +35,16 @@ class Sampling:
         )
         """Robots with a sensor that speaks, its channel, and the field that makes it measure."""
         self._layout = b""
-        self._places: list[int] = []
+        self._places = np.zeros(0, np.intp)
 
     def is_due(self, tick: int) -> bool:
         """Whether some sensor samples at a tick by its rate."""
         return any((tick * step + shift) % period < step for step, shift, period in self._schedules)
 
-    def may_be_due(self, tick: int) -> bool:
-        """Whether some sensor may sample at a tick whose frame is not known."""
-        return bool(self._speaking) or self.is_due(tick)
+    @property
+    def speaking(self) -> frozenset[tuple[str, str]]:
+        """Robots and channels of the sensors that may measure at any tick."""
+        return frozenset([(robot, channel) for robot, channel, _ in self._speaking])
 
     def is_silent(self, frame: Frame) -> bool:
         """Whether no robot sends anything at the frame's tick."""
@@ -53,12 +56,15 @@ class Sampling:
         layout = frame.layout
         if layout.digest != self._layout:
             self._layout = layout.digest
-            self._places = [
-                layout[name].offsets[slot_that_speaks(layout[name], channel, field)]
-                for name, channel, field in self._speaking
-                if name in layout
-            ]
-        return any(frame.numbers[place] != 0.0 for place in self._places)
+            self._places = np.array(
+                [
+                    layout[name].offsets[slot_that_speaks(layout[name], channel, field)]
+                    for name, channel, field in self._speaking
+                    if name in layout
+                ],
+                np.intp,
+            )
+        return bool(frame.values[self._places].any())
 
 
 def are_answered(packets: Iterable[Delivered]) -> bool:

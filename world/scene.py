@@ -168,6 +168,29 @@ def inertia_about_axis(link: Link) -> float:
     return link.inertia[axis] + link.mass * (along[0] * along[0] + along[1] * along[1])
 
 
+def inertia_about(link: Link, axis: Vector, centre: Vector) -> float:
+    """Return the inertia (kg m2) of a link about a unit axis, from which `centre` leads to its centre of mass (m).
+
+    Both are in the frame of the link. By the parallel axis theorem."""
+    x, y, z = rotate(conjugate(link.principal), axis)
+    arm = cross(axis, centre)
+    about_centre = link.inertia[0] * x * x + link.inertia[1] * y * y + link.inertia[2] * z * z
+    return about_centre + link.mass * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
+
+
+def load_of(body: Body, index: int) -> float:
+    """Return what a motor accelerates on the joint of a link while all others stand still: of one that slides the mass
+    (kg) of its link and of all links that hang on that, of one that turns the moment of inertia (kg m2) of its link."""
+    link = body.links[index]
+    if link.joint != "prismatic":
+        return inertia_about(link, link.axis, link.centre_of_mass)
+    carried = {index}
+    for number, other in enumerate(body.links):
+        if other.parent in carried:
+            carried.add(number)
+    return sum([body.links[number].mass for number in sorted(carried)])
+
+
 def cross(a: Vector, b: Vector) -> Vector:
     """Return the cross product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

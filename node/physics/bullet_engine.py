@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
-from math import fsum
+from math import fsum, isfinite
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
@@ -28,10 +28,13 @@ from foosim.node.physics.bullet_client import (
     settings_of,
     start_client,
 )
+from foosim.node.physics.joint_forces import MotorForces, Stops, ends_of, may_stop, without_sloping
+from foosim.node.physics.touch_log import TouchLog
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
+from foosim.world.components.drives import Motor, share_of
 from foosim.world.layout import Entity, Layout
-from foosim.world.scene import UPRIGHT, Body, Shape, in_pieces
+from foosim.world.scene import UPRIGHT, Body, Shape, Vector, in_pieces, load_of, swept_box
 
 # Pairs that can touch: free bodies with everything, nothing else. Jointed bodies may run through the scenery, and
 # without a filter a step costs five times as much.
@@ -44,13 +47,10 @@ PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the scenery: no pair of theirs can touch."""
 FREE_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_velocity")
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
+NO_TOUCHES: Final = TouchLog()
 BREAKING_THRESHOLD: Final = 0.02
 """As a share of a sphere's radius it is how far it may roll in a substep: more than the way after which it has
 lifted its last point of contact by as much as it falls, sqrt(2 g r) substeps."""
-STOP_MARGIN_M: Final = 0.005
-STOP_ACCELERATION: Final = 500.0
-"""A joint that can reach a stop within a tick is watched: one that is nearer than this and its way, at its speed and
-with so great an acceleration (m/s2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,9 @@ class Chain:
     """A jointed body: its id in Bullet, its joints, as many zeros, and the places of its numbers in the frame.
 
     Of each joint `places` are its index and those of position, velocity and effort; `log` is that of the contacts.
-    `stops` are the joints with limits: index, places of position and velocity, least and greatest position.
+    `loads` are what the motors of its joints accelerate, `ends` what limits these, `stops` those of them that are
+    limited, each with its limits and the places of its position and velocity. `low` and `high` are the ends of the box
+    that its shapes reach, `axis` is that of its first joint, which may be one that `slides`.
     """
 
     body: int
@@ -66,7 +68,13 @@ class Chain:
     zeros: tuple[float, ...]
     places: tuple[tuple[int, int, int, int], ...]
     log: int
-    stops: tuple[tuple[int, int, int, float, float], ...]
+    loads: tuple[float, ...]
+    ends: tuple[tuple[float, float], ...]
+    stops: tuple[tuple[int, tuple[float, float], int, int], ...]
+    low: Vector
+    high: Vector
+    axis: Vector
+    slides: bool
 
 
 def _chain(made: int, body: Body, entity: Entity) -> Chain:
@@ -75,18 +83,26 @@ def _chain(made: int, body: Body, entity: Entity) -> Chain:
     assert entity.counts["joint_positions"] == count, f"{body.name} has {count} joints"
     at, speed, effort = (entity.offsets[field] for field in ("joint_positions", "joint_velocities", "joint_efforts"))
     joints = tuple(range(count))
+    ends = tuple(ends_of(body))
     return Chain(
         made,
         joints,
         (0.0,) * count,
         tuple((joint, at + joint, speed + joint, effort + joint) for joint in joints),
         entity.offsets["contacts"],
-        tuple(
-            (joint, at + joint, speed + joint, *link.limits)
-            for joint, link in enumerate(body.links)
-            if link.joint == "prismatic"
-        ),
+        tuple(load_of(body, joint) for joint in joints),
+        ends,
+        tuple((joint, ends[joint], at + joint, speed + joint) for joint in joints if isfinite(sum(ends[joint]))),
+        *swept_box(body),
+        body.links[0].axis,
+        body.links[0].joint == "prismatic",
     )
+
+
+def _reach(body: Body, tick_s: float) -> float:
+    """Return how far from its position a free sphere, or what is round it, is felt within a tick (m)."""
+    low, high = swept_box(body)
+    return max(*(abs(value) for value in (*low, *high))) + body.speed_limit * tick_s
 
 
 class BulletEngine:
@@ -130,24 +146,39 @@ class BulletEngine:
             else:
                 self._chains[name] = _chain(self._make_jointed(bodies[name]), bodies[name], layout[name])
             yield
+        self._tick_s = deployment.tick_ns / 1e9
+        self._comers = [(layout[name].offsets["position"], _reach(bodies[name], self._tick_s)) for name in self._free]
+        """Of free bodies: the place of their position in the frame, and how far from it they are felt within a tick."""
         self._free, self._chains = dict(sorted(self._free.items())), dict(sorted(self._chains.items()))
         self._bases = {name: body.position for name, body in bodies.items()}
         self._jointed_of_id = {chain.body: name for name, chain in self._chains.items()}
         spots = enumerate(sorted(bodies))
         self._parking = {name: (0.0, 0.0, PARKING_Z_M + PARKING_STEP_M * index) for index, name in spots}
+        self._begin(layout)
+        for name in self._chains:
+            self._park_jointed(name)
+        self._wipe()
+
+    def _begin(self, layout: Layout) -> None:
+        """Set what a tick leaves behind, as none has been."""
         self._loaded_jointed: set[str] = set()
         self._loaded_free: list[str] = []
         self._idle: set[str] = set()
         self._slack: dict[str, list[int]] = {}
         """Jointed bodies with motors that have no force: the places of these motors' efforts."""
-        self._near_stops: list[tuple[int, int, float, float]] = []
-        """Joints that may reach a stop in this tick: body, joint, least and greatest position."""
-        self._stop_margin_m = STOP_MARGIN_M + STOP_ACCELERATION / 2.0 * (self._dt * self._substeps) ** 2
+        self._state: Sequence[float] = ()
+        """The frame's numbers, as they were loaded."""
+        self._governed: dict[str, MotorForces] = {}
+        """Jointed bodies with motors whose forces are set at each substep."""
+        self._stops: dict[str, Stops] = {}
+        """Those whose joints may come to an end within the tick."""
+        self._detailed = {name: layout[name] for name in self._chains if "touches" in layout[name].offsets}
+        """Jointed bodies that log who touches which of their links."""
+        self._indices = {name: layout[name].index for name in self._free}
+        self._details: dict[str, TouchLog] = {}
+        """Those that were touched in the tick."""
         self._logs: dict[str, tuple[float, float, float]] = {}
         self._touching: set[str] = set()
-        for name in self._chains:
-            self._park_jointed(name)
-        self._wipe()
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -298,7 +329,8 @@ class BulletEngine:
             self._change_jointed(jointed)
         self._idle = jointed.copy()
         self._slack = {}
-        self._near_stops = []
+        self._governed, self._stops, self._details = {}, {}, {}
+        self._state = state
         self._loaded_free = []
         last = self._substeps - 1.0
         self._logs = {}
@@ -310,10 +342,10 @@ class BulletEngine:
                 body = chain.body
                 for joint, at, speed, _ in chain.places:
                     reset(body, joint, state[at], state[speed], client)
-                for joint, at, speed, least, most in chain.stops:
-                    way = self._stop_margin_m + abs(state[speed]) * self._dt * self._substeps
-                    if not least + way < state[at] < most - way:
-                        self._near_stops.append((body, joint, least, most))
+                for _, ends, at, speed in chain.stops:
+                    if may_stop(ends, state[at], state[speed], self._tick_s):
+                        limited = [(joint, *its) for joint, its, _, _ in chain.stops]
+                        self._stops[name] = Stops(client, body, limited)
                 log = chain.log
             elif name in free:
                 self._load_free(entity, state)
@@ -335,8 +367,8 @@ class BulletEngine:
         p.resetBaseVelocity(body, state[velocity : velocity + 3], state[spin : spin + 3], self._client)
         self._loaded_free.append(entity.name)
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units).
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
+        """Set the motors of these robots: for each joint what a `drives.Motor` has.
 
         Bullet sorts motors by island, unstably. That reorders nothing where the joints of a body do not couple.
         """
@@ -345,15 +377,54 @@ class BulletEngine:
             name = entity.name
             chain = chains.get(name)
             if chain is not None:
-                if len(chain.joints) == 2:  # takes a third of what zip does
+                if len(motors) == len(motors[0]) == len(motors[1]) == 2:  # takes a third of what zip does
                     (one, force), (other, torque) = motors
                     speeds, forces = (one, other), (force, torque)
+                elif any(len(motor) > 2 for motor in motors):
+                    self._govern(name, chain, [Motor(*motor) for motor in motors])
+                    continue
                 else:
                     speeds, forces = zip(*motors, strict=True)
                 drive(chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
                 if 0.0 in forces:
                     self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
         self._idle.difference_update([entity.name for entity in entities])
+
+    def _govern(self, name: str, chain: Chain, motors: Sequence[Motor]) -> None:
+        """Set motors whose forces fall with the speed.
+
+        Whether a free body can touch this one within the tick, or a joint come to its end, follows from the frame
+        alone: it is the same whoever else is loaded.
+        """
+        forces: Sequence[float] = [motor.force for motor in motors]
+        gains = [share_of(motor.slope, load, self._dt) for motor, load in zip(motors, chain.loads, strict=True)]
+        if name in self._stops or self._may_be_touched(chain):
+            self._governed[name] = MotorForces(
+                self._client, chain.body, chain.joints, motors, chain.loads, chain.ends, self._dt
+            )
+            forces, gains = without_sloping(motors), [1.0] * len(motors)
+        p.setJointMotorControlArray(
+            chain.body,
+            chain.joints,
+            p.VELOCITY_CONTROL,
+            targetVelocities=[motor.speed for motor in motors],
+            forces=forces,
+            velocityGains=gains,
+            physicsClientId=self._client,
+        )
+        if 0.0 in forces:
+            self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
+
+    def _may_be_touched(self, chain: Chain) -> bool:
+        """Whether a free body can come to a jointed one within the tick."""
+        for at, reach in self._comers:
+            place = self._state[at : at + 3]
+            if all(
+                low - reach <= value <= high + reach
+                for low, value, high in zip(chain.low, place, chain.high, strict=True)
+            ):
+                return True
+        return False
 
     def step(self, substeps: int) -> None:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""
@@ -362,32 +433,21 @@ class BulletEngine:
             self._motors_off(self._chains[name])
             self._slack[name] = [place for _, _, _, place in self._chains[name].places]
         client = self._client
+        governed, stops = list(self._governed.values()), list(self._stops.values())
         for substep in range(substeps):
+            for motors in governed:
+                motors.apply()
             p.stepSimulation(client)
-            if self._near_stops:
-                self._stop()
+            for ends in stops:
+                ends.apply()
             touched: dict[str, list[float]] = {}
             for name in self._loaded_free:
-                self._collect(name, touched)
+                self._collect(name, touched, substep)
             if touched:
                 self._log(substep, touched)
             self._touching = set(touched)
 
-    def _stop(self) -> None:
-        """Stop joints dead that have come to a limit in this substep.
-
-        Bullet notices a limit in the substep after it was passed, by up to the way of a substep, and pushes the joint
-        back at a speed that grows with how far it was.
-        """
-        client = self._client
-        for body, joint, least, most in self._near_stops:
-            position, speed, _, _ = p.getJointState(body, joint, client)
-            if position > most:
-                p.resetJointState(body, joint, most, min(speed, 0.0), client)
-            elif position < least:
-                p.resetJointState(body, joint, least, max(speed, 0.0), client)
-
-    def _collect(self, name: str, touched: dict[str, list[float]]) -> None:
+    def _collect(self, name: str, touched: dict[str, list[float]], substep: int) -> None:
         """Add the normal impulses of a free body's contacts to it and to the jointed bodies that it touches."""
         body = self._free[name]
         for point in p.getContactPoints(body, physicsClientId=self._client):
@@ -400,6 +460,20 @@ class BulletEngine:
             jointed = self._jointed_of_id.get(other)
             if jointed is not None:
                 touched.setdefault(jointed, []).append(impulse)
+                if jointed in self._detailed:
+                    on_free, of_free, on_jointed, of_jointed = point[5], point[3], point[6], point[4]
+                    link, place = (of_jointed, on_jointed) if point[1] == body else (of_free, on_free)
+                    self._note(jointed, link, place, name, impulse, substep)
+
+    def _note(self, jointed: str, link: int, point: Vector, free: str, impulse: float, substep: int) -> None:
+        """Note which link of a jointed body a free one touches, and where along the axis of the first joint."""
+        chain = self._chains[jointed]
+        along = sum([(a - b) * c for a, b, c in zip(point, self._bases[jointed], chain.axis, strict=True)])
+        slid = p.getJointState(chain.body, 0, self._client)[0] if chain.slides else 0.0
+        log = self._details.get(jointed)
+        if log is None:
+            log = self._details[jointed] = TouchLog()
+        log.add(self._indices[free], link, along - slid, impulse, substep)
 
     def _log(self, substep: int, touched: dict[str, list[float]]) -> None:
         """Count touches that begin, sum impulses, note the last substep.
@@ -413,6 +487,7 @@ class BulletEngine:
     def read(self, entities: Sequence[Entity], state: list[float]) -> None:
         """Write position, velocity and the tick's contact log of these bodies into `state`."""
         client, states, chains, logs, slack = self._client, p.getJointStates, self._chains, self._logs, self._slack
+        governed, detailed = self._governed, self._detailed
         for entity in entities:
             name = entity.name
             chain = chains.get(name)
@@ -427,9 +502,14 @@ class BulletEngine:
             else:
                 continue
             state[log : log + 3] = logs.get(name, NO_CONTACT)
+            if detailed and name in detailed:
+                self._details.get(name, NO_TOUCHES).write(entity, state, self._substeps)
             if slack and name in slack:
                 for place in slack[name]:  # without a force Bullet keeps what a motor applied last
                     state[place] = 0.0
+            if governed and name in governed:
+                for number, force in zip(governed[name].numbers, governed[name].efforts, strict=True):
+                    state[chains[name].places[number][3]] = force
 
     def _read_free(self, entity: Entity, state: list[float]) -> None:
         body, offsets = self._free[entity.name], entity.offsets

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import fsum, sqrt
+from math import fsum, inf, isfinite, sqrt
 from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
@@ -36,6 +36,8 @@ from foosim.node.physics.bullet_client import (
     start_client,
 )
 from foosim.node.physics.interface import ISLAND_ENGINES_MAX, Island
+from foosim.node.physics.joint_forces import MotorForces, Stops, ends_of, may_stop, without_sloping
+from foosim.node.physics.touch_log import TouchLog
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene, initial_numbers
@@ -54,9 +56,9 @@ from foosim.world.scene import (
     Link,
     Shape,
     Vector,
-    conjugate,
-    cross,
     in_pieces,
+    inertia_about,
+    load_of,
     moved,
     rotate,
     swept_box,
@@ -338,13 +340,8 @@ def stable_damping(link: Link, parent: Link | None, substep_s: float) -> float:
 
 def _inertia_about(link: Link, axis: Vector, centre: Vector, joint: str) -> float:
     """Return the inertia (kg m2) of a link about an axis from which its centre of mass is so far away; of a joint that
-    slides its mass (kg). The parallel axis theorem."""
-    if joint == "prismatic":
-        return link.mass
-    x, y, z = rotate(conjugate(link.principal), axis)
-    arm = cross(axis, centre)
-    about_centre = link.inertia[0] * x * x + link.inertia[1] * y * y + link.inertia[2] * z * z
-    return about_centre + link.mass * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
+    slides its mass (kg)."""
+    return link.mass if joint == "prismatic" else inertia_about(link, axis, centre)
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)  # tests break its rules
@@ -376,6 +373,14 @@ class CompositionEngine:
         """Of the bodies of the island that was loaded last."""
         self._touches: dict[tuple[int, int], _Touch] = {}
         """Of the tick, by the ids of both bodies."""
+        self._governed: dict[int, MotorForces] = {}
+        """Motors whose forces are set at each substep, by the places of their bodies."""
+        self._details: dict[int, TouchLog] = {}
+        """What bodies of the island log of their touches, by their places."""
+        self._bases: list[Vector] = []
+        """Where the bodies of the island stand."""
+        self._stops: list[Stops] = []
+        """Joints that may come to an end within the tick."""
         self._steps: Iterator[None] | None = self._build(tuple(scenery), (*bodies, *movers))
         while at_once and self.build_some():
             continue
@@ -526,6 +531,13 @@ class CompositionEngine:
                 place(made.id, bodies[index].position, bodies[index].orientation, client)
         for number, mover in enumerate(island.movers, self._count):
             self._load_mover(mover, self._made[number], bodies[number], start)
+        found = [
+            self._stops_of(entity, self._made[place], self._slots[place], numbers)
+            for place, entity in enumerate(island.bodies)
+        ]
+        self._stops = [ends for ends in found if ends is not None]
+        self._details = {place: TouchLog() for place, entity in enumerate(island.bodies) if "touches" in entity.offsets}
+        self._bases = [body.position for body in bodies] if self._details else []
         self._command(island)
 
     def _slots_of(self, entity: Entity) -> _Slots:
@@ -544,12 +556,35 @@ class CompositionEngine:
     def _command(self, island: Island) -> None:
         """Set the motors of joints: speeds, and the greatest forces with which they are reached."""
         client, mode, drive = self._client, p.VELOCITY_CONTROL, p.setJointMotorControlArray
-        for made, drives in zip(self._made, island.drives, strict=False):
+        self._governed = {}
+        for place, (made, drives) in enumerate(zip(self._made, island.drives, strict=False)):
             if made.joints:
                 motors = drives.motors
                 speeds = [motor.speed for motor in motors] if motors else made.zeros
                 forces = [motor.force for motor in motors] if motors else made.zeros
+                if any(motor.slope != inf for motor in motors):
+                    self._governed[place] = self._motor_forces(made, motors)
+                    forces = without_sloping(motors)
                 drive(made.id, made.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
+
+    def _motor_forces(self, made: _Made, motors: Sequence[Motor]) -> MotorForces:
+        loads = [load_of(made.body, index) for index, link in enumerate(made.body.links) if link.joint in MOVING]
+        return MotorForces(self._client, made.id, made.joints, motors, loads, ends_of(made.body), self._dt)
+
+    def _stops_of(self, entity: Entity, made: _Made, slots: _Slots, numbers: Sequence[float]) -> Stops | None:
+        """Return the ends of a body's joints where one may come to its own, of a body whose joints do not couple.
+
+        In one whose joints do, a joint that stops changes the speeds of others, which is for the solver.
+        """
+        if entity.kind.couples or not made.joints:
+            return None
+        ends = ends_of(made.body)
+        at, speed, tick_s = slots.joint_positions, slots.joint_velocities, self._dt * self._substeps
+        for number, its in enumerate(ends):
+            if may_stop(its, numbers[at + number], numbers[speed + number], tick_s):
+                limited = [(made.joints[n], *its) for n, its in enumerate(ends) if isfinite(sum(its))]
+                return Stops(self._client, made.id, limited)
+        return None
 
     def _push(self, island: Island) -> None:
         """Apply the forces on bases, which Bullet forgets after each substep."""
@@ -565,19 +600,41 @@ class CompositionEngine:
         self._touches = touches
         pushed = any(drives.wrench is not None for drives in island.drives)
         client, step, contacts = self._client, p.stepSimulation, p.getContactPoints
+        governed = list(self._governed.values())
         for substep in range(self._substeps):
             if pushed:
                 self._push(island)
+            for driven in governed:
+                driven.apply()
             step(client)
+            for ends in self._stops:
+                ends.apply()
             for point in contacts(*EVERYWHERE, client):
                 force = point[9]
                 if force > 0.0:
+                    if self._details:
+                        self._note(island, point, substep)
                     pair = point[1:3]
                     touch = touches.get(pair)
                     if touch is None:
                         touches[pair] = touch = _Touch()
                     touch.forces.append(force)
                     touch.substeps |= 1 << substep
+
+    def _note(self, island: Island, point: Sequence[Any], substep: int) -> None:
+        """Note which link of a body that logs its touches meets another one, and where along its first joint's axis."""
+        everybody = (*island.bodies, *island.movers)
+        for own, other, link, at in ((1, 2, 3, 5), (2, 1, 4, 6)):
+            place, partner = self._place.get(point[own], -1), self._place.get(point[other], -1)
+            log = self._details.get(place)
+            if log is None or partner < 0:
+                continue
+            made = self._made[place]
+            first = made.body.links[0]
+            base = self._bases[place]
+            along = sum([(a - b) * c for a, b, c in zip(point[at], base, first.axis, strict=True)])
+            slid = p.getJointState(made.id, 0, self._client)[0] if first.joint == "prismatic" else 0.0
+            log.add(everybody[partner].index, point[link], along - slid, point[9] * self._dt, substep)
 
     def read(self, island: Island, numbers: list[float]) -> None:
         """Write the state of the island's bodies, and what they touched, into the numbers."""
@@ -590,7 +647,13 @@ class CompositionEngine:
                 numbers[speed : speed + 3], numbers[spin : spin + 3] = p.getBaseVelocity(made.id, client)
             if made.joints:
                 self._read_joints(made, slots, numbers, island.drives[place].motors)
+                if place in self._governed:
+                    driven = self._governed[place]
+                    for number, effort in zip(driven.numbers, driven.efforts, strict=True):
+                        numbers[slots.joint_efforts + number] = effort
             self._read_log(place, slots, island, met.get(place, ()), numbers)
+            if place in self._details:
+                self._details[place].write(island.bodies[place], numbers, self._substeps)
 
     def _read_joints(self, made: _Made, slots: _Slots, numbers: list[float], motors: Sequence[Motor]) -> None:
         states = p.getJointStates(made.id, made.joints, self._client)

@@ -65,8 +65,9 @@ class Engine(Protocol):
     def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
         """Wipe what the engine remembers and set these bodies (those with a body) to their state; park all others."""
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units)."""
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
+        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units), and maybe
+        by how much the force falls with the speed (`drives.Motor`)."""
 
     def step(self, substeps: int) -> None:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""

@@ -27,7 +27,7 @@ class NoEngine:
         """Nothing is loaded."""
         assert not entities, entities
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
         """There are no motors."""
 
     def step(self, substeps: int) -> None:

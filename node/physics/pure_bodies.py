@@ -8,9 +8,12 @@ a length rho gives a = 5/7 rho g / r. Plain floats and one spelling of sin, cos 
 
 from __future__ import annotations
 
-from math import sin, sqrt
+from collections.abc import Sequence
+from math import inf, sin, sqrt
 from typing import Final
 
+from foosim.node.physics.touch_log import TouchLog
+from foosim.world.components.drives import share_of
 from foosim.world.matter.physics import Contact
 from foosim.world.scene import Body, Sphere, Vector, inertia_about_axis
 
@@ -43,13 +46,15 @@ class FreeSphere:
     """A free body: position, velocity and spin in the world frame. `travel` is how far it can reach within a tick."""
 
     __slots__ = (
-        "gravity", "inertia", "log", "mass", "radius", "travel", "vx", "vy", "vz", "wx", "wy", "wz", "x", "y", "z",
+        "gravity", "inertia", "log", "mass", "name", "radius", "travel", "vx", "vy", "vz", "wx", "wy", "wz", "x", "y",
+        "z",
     )  # fmt: skip
 
     def __init__(self, body: Body, gravity: float, tick_s: float) -> None:
         (link,) = body.links
         (shape,) = link.shapes
         assert isinstance(shape.geometry, Sphere), f"the free body {body.name} is no sphere"
+        self.name = body.name
         self.radius, self.mass, self.inertia, self.gravity = shape.geometry.radius, link.mass, link.inertia[0], gravity
         self.travel = self.radius + body.speed_limit * tick_s
         self.x = self.y = self.z = self.vx = self.vy = self.vz = self.wx = self.wy = self.wz = 0.0
@@ -106,9 +111,33 @@ class Shaft:
     """
 
     __slots__ = (
-        "angle", "angle_speed", "dt", "inertia", "log", "mass", "name", "slide", "slide_force", "slide_kick",
-        "slide_motor", "slide_push", "slide_scale", "slide_speed", "spin_force", "spin_kick", "spin_motor", "spin_push",
-        "spin_scale", "stroke", "swing", "x", "z",
+        "angle",
+        "angle_speed",
+        "dt",
+        "inertia",
+        "log",
+        "mass",
+        "name",
+        "slide",
+        "slide_force",
+        "slide_kick",
+        "slide_motor",
+        "slide_push",
+        "slide_scale",
+        "slide_share",
+        "slide_speed",
+        "slide_stall",
+        "spin_force",
+        "spin_kick",
+        "spin_motor",
+        "spin_push",
+        "spin_scale",
+        "spin_share",
+        "stroke",
+        "swing",
+        "touches",
+        "x",
+        "z",
     )  # fmt: skip
 
     def __init__(self, body: Body, gravity: float, dt: float) -> None:
@@ -124,12 +153,25 @@ class Shaft:
         self.slide = self.slide_speed = self.angle = self.angle_speed = 0.0
         self.slide_motor = self.spin_motor = self.slide_kick = self.spin_kick = 0.0
         self.slide_force = self.spin_force = self.slide_push = self.spin_push = 0.0
+        self.slide_share = self.slide_stall = self.spin_share = 1.0
         self.log = Log(False)
+        self.touches: TouchLog | None = None
+        """Of a shaft that logs who touches which of its links; None of any other."""
 
-    def drive(self, slide: tuple[float, float], spin: tuple[float, float]) -> None:
-        """Set the target speed and greatest force of both motors for this tick."""
-        self.slide_motor, self.slide_force = slide
-        self.spin_motor, self.spin_force = spin
+    def drive(self, slide: Sequence[float], spin: Sequence[float]) -> None:
+        """Set what is asked of both motors for this tick (`drives.Motor`).
+
+        Of a force that falls with the speed `slide_share` is what it takes from the difference as the mean over a
+        substep, `slide_stall` what it would if the speed stayed.
+        """
+        self.slide_motor, self.slide_force = slide[0], slide[1]
+        self.spin_motor, self.spin_force = spin[0], spin[1]
+        self.slide_share = self.slide_stall = self.spin_share = 1.0
+        if len(slide) > 2:
+            self.slide_share = share_of(slide[2], self.mass, self.dt)
+            self.slide_stall = slide[2] * self.dt / self.mass if slide[2] != inf else 1.0
+        if len(spin) > 2:
+            self.spin_share = share_of(spin[2], self.inertia, self.dt)
         self.slide_kick = self.slide_force * self.dt / self.mass
         self.spin_kick = self.spin_force * self.dt / self.inertia
 
@@ -145,9 +187,12 @@ class Shaft:
         dt, swing, stroke = self.dt, self.swing, self.stroke
         slide, speed, wanted, kick = self.slide, self.slide_speed, self.slide_motor, self.slide_kick
         angle, turning, wanted_turning, twist = self.angle, self.angle_speed, self.spin_motor, self.spin_kick
-        push, turn = self.slide_push, self.spin_push
+        push, turn, spin_share = self.slide_push, self.spin_push, self.spin_share
+        share, stall = self.slide_share, self.slide_stall
         for _ in range(substeps):
             change = wanted - speed
+            is_pressed = (slide >= stroke and change > 0.0) or (slide <= -stroke and change < 0.0)
+            change *= stall if is_pressed else share
             push = kick if change > kick else -kick if change < -kick else change
             speed += push
             slide += speed * dt
@@ -156,7 +201,7 @@ class Shaft:
             elif slide < -stroke:
                 slide, speed = -stroke, 0.0
             turning += swing * sin(angle)
-            change = wanted_turning - turning
+            change = spin_share * (wanted_turning - turning)
             turn = twist if change > twist else -twist if change < -twist else change
             turning += turn
             angle += turning * dt

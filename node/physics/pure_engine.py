@@ -16,6 +16,7 @@ from mypy_extensions import mypyc_attr
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.pure_bodies import FreeSphere, Log, Shaft, meet_scenery, meet_shaft, meet_sphere, yield_shaft
 from foosim.node.physics.pure_shapes import Scenery, ShaftShapes, Still, Touch
+from foosim.node.physics.touch_log import TouchLog
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -43,6 +44,7 @@ class PureEngine:
         self._shapes = {name: ShaftShapes(scene.bodies[name], surfaces) for name in self._all_shafts}
         things = [Still(shape, surfaces) for shape in scene.scenery if shape.surface in surfaces]
         radii = {sphere.radius for sphere in self._all_spheres.values()}
+        self._indices = {entity.name: entity.index for entity in layout.entities}
         self._scenery = {radius: Scenery(things, radius) for radius in radii}
         self._spheres: dict[str, FreeSphere] = {}
         self._shafts: dict[str, Shaft] = {}
@@ -62,6 +64,7 @@ class PureEngine:
                 shaft.slide_speed, shaft.angle_speed = state[speed], state[speed + 1]
                 shaft.drive((0.0, 0.0), (0.0, 0.0))
                 shaft.log = Log(state[offsets["contacts"] + 2] == last)
+                shaft.touches = TouchLog() if "touches" in offsets else None
                 continue
             sphere = self._all_spheres.get(name)
             if sphere is not None:
@@ -74,8 +77,8 @@ class PureEngine:
                 at = offsets["orientation"]
                 self._quaternions[name] = (state[at], state[at + 1], state[at + 2], state[at + 3])
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
-        """Set the motors of these robots: for each joint the target speed and the greatest force (SI units)."""
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
+        """Set the motors of these robots: for each joint what a `drives.Motor` has."""
         for entity, (slide, spin) in zip(entities, commands, strict=True):
             shaft = self._shafts.get(entity.name)
             if shaft is not None:
@@ -123,6 +126,9 @@ class PureEngine:
         if impulse > 0.0:
             sphere.log.add(impulse, substep)
             shaft.log.add(impulse, substep)
+            if shaft.touches is not None:
+                place = sphere.y - sphere.radius * normal[1] - shaft.slide
+                shaft.touches.add(self._indices[sphere.name], shapes.link_of(pair), place, impulse, substep)
 
     def _yield(self, sphere: FreeSphere, near: Sequence[tuple[Shaft, ShaftShapes]]) -> None:
         """Shafts that still overlap a sphere after it met the scenery have pinned it: they stop."""
@@ -169,6 +175,8 @@ class PureEngine:
                 state[speed], state[speed + 1] = shaft.slide_speed, shaft.angle_speed
                 state[effort], state[effort + 1] = shaft.efforts()
                 log = shaft.log
+                if shaft.touches is not None:
+                    shaft.touches.write(entity, state, self._substeps)
             else:
                 sphere = self._spheres.get(name)
                 if sphere is None:

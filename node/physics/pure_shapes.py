@@ -147,6 +147,10 @@ class ShaftShapes:
         """Greatest distance of a shape from the axis."""
         return self._reach
 
+    def link_of(self, pair: Contact) -> int:
+        """Return the index of the link that has a contact with such a surface."""
+        return 0 if pair is self._core_pair else 1
+
     def contact(self, sphere: FreeSphere, shaft: Shaft) -> Touch | None:
         """Return the deepest contact of a sphere with the shaft, or None where they do not touch."""
         dx, dz = sphere.x - shaft.x, sphere.z - shaft.z

@@ -21,7 +21,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
-from foosim.world.forms.registry import FOLDERS, FORMS
+from foosim.world.forms.registry import FORMS, own_module
 from tests.forms.limits import Edge, edges
 from tests.forms.worlds import VARIANTS, WORLDS, World
 
@@ -37,7 +37,7 @@ EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
 @cache
 def own() -> list[tuple[str, str]]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    return sorted((form.form, form.name) for form in found if form.module == f"{FOLDERS[form.form]}.{form.name}")
+    return sorted((form.form, form.name) for form in found if form.module == own_module(form.form, form.name))
 
 
 def test_every_form_has_a_world_of_its_own() -> None:

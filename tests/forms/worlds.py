@@ -215,6 +215,15 @@ def _jointed(kind: str, bounds: Sequence[float]) -> World:
     return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")})
 
 
+def _driven(kind: str, bounds: Sequence[float]) -> World:
+    """The table with other drives of its rods."""
+    data = json.loads(json.dumps(_table()))
+    for rod in RODS:
+        data["robots"][rod]["actuators"] = {"motors": {"kind": kind}}
+    place: Place = ("robots", RODS[0], "actuators", "motors")
+    return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")}, place)
+
+
 class World(NamedTuple):
     """The plain data of a deployment, and the place of the form's settings in it; no place: it has none."""
 
@@ -283,9 +292,12 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("motion", "rotorcraft"): YARD,
     ("motion", "track"): YARD,
     ("sensor", "ball"): sensor(TABLE, ["camera"], "ball"),
+    ("sensor", "ball_state"): sensor(TABLE, ["camera"], "ball_state"),
     ("sensor", "battery"): sensor(HALL, ROVERS, "battery"),
     ("sensor", "contact"): sensor(TABLE, RODS, "contact"),
     ("sensor", "encoder"): sensor(TABLE, RODS, "encoder"),
+    ("sensor", "figure_contact"): sensor(TABLE, RODS, "figure_contact"),
+    ("sensor", "motor_current"): sensor(TABLE, RODS, "motor_current", slide="9 N/A", spin="0.2 N m/A"),
     ("sensor", "gps"): sensor(EARTH, ROVERS, "gps", at={"x": "10 cm", "z": "50 cm"}),
     ("sensor", "imu"): sensor(TABLE, RODS, "imu", at={"link": "spin", "x": "5 cm", "y": "20 cm"}),
     ("sensor", "joint_state"): sensor(
@@ -303,7 +315,10 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("actuator", "force"): _pushed(),
     ("actuator", "joint_position"): _jointed("joint_position", (0.1, 2.0)),
     ("actuator", "joint_velocity"): _jointed("joint_velocity", (0.5, 20.0)),
+    ("actuator", "rod_force"): _driven("rod_force", (40.0, 0.5)),
     ("actuator", "rod_position"): TABLE,
+    ("actuator", "rod_velocity"): _driven("rod_velocity", (1.0, 100.0)),
+    ("actuator", "rod_voltage"): _driven("rod_voltage", (20.0, 40.0)),
     ("actuator", "rotor_speeds"): SOLIDS,
     ("model", "box"): SOLIDS,
     ("model", "capsule"): SOLIDS,

@@ -20,6 +20,7 @@ from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_engine import BulletEngine
 from foosim.node.physics.interface import Engine, EngineFactory
 from foosim.node.physics.pure_engine import PureEngine
+from foosim.world.actuators.rod_voltage import VoltageActuator
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import actuators_of
@@ -109,6 +110,7 @@ class Comparison:
             for rod in self.layout.of("rod")
             for fitted in actuators_of(self.deployment, self.layout, rod)
         }
+        self.is_of_voltages = any(isinstance(one, VoltageActuator) for one in self.actuators.values())
         lines = table_of(self.deployment).lines
         self.figures = {
             name: figure_ys(lines[robot.line])
@@ -146,15 +148,21 @@ class Comparison:
         return outcome
 
     def _want(self, tick: int) -> None:
-        """Let every rod follow the ball with its nearest figure, and kick every 100 ms."""
+        """Let every rod follow the ball with its nearest figure, and kick every 100 ms.
+
+        Motors at voltages, which are no positions, go to and fro, into their stops as well.
+        """
+        along, around = (200.0, 6.0) if self.is_of_voltages else (1.0, 1.0)
         ball = self.numbers[self.layout["ball"].offsets["position"] + 1]
         for rod in self.layout.of("rod"):
             start = rod.offsets["position.set_point"]
             if tick % 10 == 0:
                 side = min((ball - y for y in self.figures[rod.name]), key=abs)
-                self.numbers[start] = min(max(side + draw(200 + rod.index, tick, -0.02, 0.02), -0.11), 0.11)
+                wanted = min(max(side + draw(200 + rod.index, tick, -0.02, 0.02), -0.11), 0.11)
+                self.numbers[start] = along * wanted
             if tick % max(1, 100_000_000 // self.deployment.tick_ns) == 0:
-                self.numbers[start + 1] = draw(300 + rod.index, tick, -1.0, 1.0) * draw(350 + rod.index, tick, 0.2, 7.0)
+                turn = draw(300 + rod.index, tick, -1.0, 1.0) * draw(350 + rod.index, tick, 0.2, 7.0)
+                self.numbers[start + 1] = around * turn
 
     def _solve(self, engine: Engine, bodies: Sequence[Entity], numbers: list[float], tick: int) -> None:
         rods = [entity for entity in bodies if entity.model == "rod"]
@@ -179,6 +187,7 @@ class Comparison:
             self.parts[spot].close()
             self.parts[spot] = self.factory(self.deployment, self.layout)
             outcome.rebuilt += 1
+        start = numbers.copy()
         for part, (node, share) in zip(self.parts, self.assignment.shares(numbers).items(), strict=True):
             bodies = [self.layout.entities[index] for island in share.islands for index in island]
             outcome.island_max = max([outcome.island_max, *map(len, share.islands)])
@@ -187,7 +196,10 @@ class Comparison:
                 self.balls_solver = node
             if bodies:
                 outcome.bodies_loaded_max = max(outcome.bodies_loaded_max, len(bodies))
-                self._solve(part, bodies, numbers, tick)
+                own = start.copy()
+                self._solve(part, bodies, own, tick)
+                for body in bodies:
+                    numbers[body.start : body.split] = own[body.start : body.split]
 
     def _count(self, numbers: Sequence[float]) -> None:
         self.outcome.rod_touches += sum(numbers[rod.offsets["contacts"]] for rod in self.layout.of("rod"))
@@ -221,6 +233,11 @@ DOMES = (
 """Domes between the rods, as meshes."""
 
 
+VOLTAGES = tuple(
+    f"robots.{team}.{line}.actuators={{position: {{kind: rod_voltage}}}}"
+    for team, line in product(("red", "blue"), ("goal", "defence", "midfield", "attack"))
+)
+"""Motors whose force falls with the speed."""
 POSTS = (
     "scenery={"
     + ", ".join(
@@ -253,7 +270,7 @@ def compare(factory: EngineFactory, ticks: int, sets: Sequence[str] = (), pile: 
 def test_who_computes_what_changes_nothing(factory: EngineFactory, sets: Sequence[str]) -> None:
     outcome = compare(factory, TICKS, sets)
     assert outcome.differing == []
-    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 14, outcome
+    assert outcome.rod_touches >= 6 and outcome.ball_touches >= 13, outcome
     assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
     assert outcome.island_max == 4, "the ball and at most three rods"
 
@@ -261,7 +278,7 @@ def test_who_computes_what_changes_nothing(factory: EngineFactory, sets: Sequenc
 def test_meshes_change_nothing() -> None:
     outcome = compare(BulletEngine, TICKS, (DOMES,))
     assert outcome.differing == []
-    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 20, outcome
+    assert outcome.rod_touches >= 6 and outcome.ball_touches >= 16, outcome
     assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
 
 
@@ -269,7 +286,16 @@ def test_meshes_change_nothing() -> None:
 def test_cylinders_change_nothing(factory: EngineFactory) -> None:
     outcome = compare(factory, TICKS, (POSTS,))
     assert outcome.differing == []
-    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 17, outcome
+    assert outcome.rod_touches >= 6 and outcome.ball_touches >= 16, outcome
+    assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
+
+
+@pytest.mark.parametrize("factory", [BulletEngine, PureEngine])
+def test_motors_at_voltages_change_nothing(factory: EngineFactory) -> None:
+    """Nobody else's node knows whether a rod is driven at each substep: near the ball, or near its stop."""
+    outcome = compare(factory, TICKS, VOLTAGES)
+    assert outcome.differing == []
+    assert outcome.rod_touches >= 3 and outcome.ball_touches >= 8, outcome
     assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
 
 
@@ -353,7 +379,7 @@ class StillAsleep(BulletEngine):
         (DefaultIslands, (), True),
         (SomeOtherOrder, (), True),
         (ContactOrder, ("table.surfaces.balls.restitution=0.4",), True),
-        (RigidSpheres, (), False),
+        (RigidSpheres, (), True),
         (StillAsleep, (), False),
     ],
 )

@@ -19,7 +19,8 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
-from foosim.world.forms.registry import FOLDERS, FORMS
+from foosim.world.forms.registry import FORMS, own_module
+from tests.forms.worlds import driver
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 TICKS: Final = 300
@@ -41,8 +42,16 @@ OF_ROD: Final[dict[str, Any]] = {
     "imu": {"kind": "imu", "rate": "333 Hz", "at": {"link": "spin", "x": "5 cm"}},
     "joints": {"kind": "joint_state", "rate": "70 Hz", "modifiers": [{"kind": "bias_walk", "walk": 0.001}]},
     "touch": {"kind": "contact", "rate": "7 Hz"},
+    "figures": {"kind": "figure_contact", "rate": "7 Hz"},
+    "current": {"kind": "motor_current", "rate": "333 Hz", "slide": "14 N/A", "spin": "0.32 N m/A"},
 }
 """Sensors of the rod of each goal, at rates that are not whole ticks."""
+DRIVES: Final = {
+    "red.defence": ("rod_voltage", (20.0, 40.0)),
+    "blue.midfield": ("rod_velocity", (1.0, 100.0)),
+    "blue.attack": ("rod_force", (40.0, 0.5)),
+}
+"""Rods with other drives than that to positions, and the bounds of their commands."""
 UNUSED: Final = {
     ("engine", "pure"),
     ("scene", "hall"),
@@ -74,6 +83,14 @@ def mixed() -> str:
     data["origin"] = {"latitude": "52.5 deg", "longitude": "13.4 deg"}
     for rod in ("red.goal", "blue.goal"):
         data["robots"][rod]["sensors"] |= OF_ROD
+    data["robots"]["camera"]["sensors"]["exact"] = {"kind": "ball_state", "rate": "50 Hz"}
+    for rod, (kind, _) in DRIVES.items():
+        data["robots"][rod]["actuators"] = {"motors": {"kind": kind}}
+        for player in data["players"].values():
+            player["robots"].pop(rod, None)
+    data["players"] |= {
+        rod.replace(".", "-"): driver([rod], kind, bounds, "50 Hz")["driver"] for rod, (kind, bounds) in DRIVES.items()
+    }
     data["robots"] |= {
         "rover-1": {"model": "rover", "x": "1.4 m", "y": "0 m", "heading": "170 deg", "sensors": sensors},
         "rover-2": {"model": "rover", "x": "-1.6 m", "y": "1 m", "charge": "50 %", "sensors": sensors},
@@ -95,7 +112,7 @@ def mixed() -> str:
 def test_every_form_is_in_it() -> None:
     used = {(form.form, form.name) for form in forms_of(load_deployment(mixed(), NAME))}
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    known = {(form.form, form.name) for form in found if form.module == f"{FOLDERS[form.form]}.{form.name}"}
+    known = {(form.form, form.name) for form in found if form.module == own_module(form.form, form.name)}
     assert known - used == UNUSED
 
 

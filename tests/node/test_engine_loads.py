@@ -40,7 +40,7 @@ class Counting(PureEngine):
         self.loads.append({entity.name for entity in entities})
         super().load(entities, state)
 
-    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
         assert {entity.name for entity in entities} == self.loads[-1] - {"ball"}, "who is parked is not commanded"
         super().command(entities, commands)
 

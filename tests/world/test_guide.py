@@ -42,10 +42,10 @@ class Use(NamedTuple):
 
 
 USES: Final[Mapping[str, Use]] = {
-    "currents.py": Use(
+    "powers.py": Use(
         "deploy/table.yaml",
-        "sensor motor_current",
-        ('robots.red.goal.sensors.current={kind: "currents:MotorCurrent", rate: 100 Hz, torque_per_ampere: 50 mN m}',),
+        "sensor motor_power",
+        ('robots.red.goal.sensors.power={kind: "powers:MotorPower", rate: 100 Hz, efficiency: 80 %}',),
     ),
     "low_pass.py": Use(
         "deploy/table.yaml",
@@ -65,7 +65,7 @@ USES: Final[Mapping[str, Use]] = {
     "yards.py": Use("yard.yaml", "kit yard", ("scene=null", "yard={side: 8 m}"), BASES, is_package=True),
 }
 """Of each example: how it is used. Those of one deployment are tested together."""
-RUNS: Final = ("currents.py", "low_pass.py", "laps.py", "service.py", "omni.py", "yards.py")
+RUNS: Final = ("powers.py", "low_pass.py", "laps.py", "service.py", "omni.py", "yards.py")
 """The examples whose worlds differ."""
 FORCED: Final = "engine=pure"
 TICKS: Final = {"deploy/table.yaml": 120, "deploy/warehouse.yaml": 40, "yard.yaml": 200}

@@ -20,7 +20,10 @@ from foosim.world.actuators.force import Push
 from foosim.world.actuators.joint_position import JointPositions
 from foosim.world.actuators.joint_torque import JointEfforts
 from foosim.world.actuators.joint_velocity import JointVelocities
+from foosim.world.actuators.rod_force import RodForce
 from foosim.world.actuators.rod_position import Command
+from foosim.world.actuators.rod_velocity import RodVelocity
+from foosim.world.actuators.rod_voltage import RodVoltages
 from foosim.world.actuators.rotor_speeds import RotorSpeeds
 from foosim.world.actuators.v_w import Motion
 from foosim.world.actuators.waypoint import Waypoint
@@ -42,6 +45,9 @@ from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 from foosim.world.sensors.range import Distance
+from foosim.world.sensors.table.ball_state import BallState
+from foosim.world.sensors.table.figure_contact import FigureTouches
+from foosim.world.sensors.table.motor_current import Currents
 from foosim.world.sensors.velocity import Velocity
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -51,6 +57,20 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "encoder": (RodPosition(0.1, -2.5), [0.1, -2.5], ["m", "rad"]),
     "ball": (BallPosition(1 / 3, -0.0, 1e-300), [1 / 3, -0.0, 1e-300], ["m", "m", "m"]),
     "rod_position": (Command(-0.12, 1.5), [-0.12, 1.5], ["m", "rad"]),
+    "rod_force": (RodForce(-12.0, 1 / 3), [-12.0, 1 / 3], ["N", "N m"]),
+    "rod_velocity": (RodVelocity(-1.5, 1 / 3), [-1.5, 1 / 3], ["m/s", "rad/s"]),
+    "rod_voltage": (RodVoltages(-48.0, 1 / 3), [-48.0, 1 / 3], ["V", "V"]),
+    "ball_state": (
+        BallState(*(value / 3 for value in range(9))),
+        [value / 3 for value in range(9)],
+        [*["m"] * 3, *["m/s"] * 3, *["rad/s"] * 3],
+    ),
+    "motor_current": (Currents(0.5, -1 / 3), [0.5, -1 / 3], ["A", "A"]),
+    "figure_contact": (
+        FigureTouches(1.0, (0.0, -1.0), (4.0, -1.0), (3.0, -1.0), (0.25, 0.0)),
+        [1.0, 0.0, -1.0, 4.0, -1.0, 3.0, -1.0, 0.25, 0.0],
+        ["", "", "", "", "N s"],
+    ),
     "pose": (Pose(1 / 3, -7.5, 3.1), [1 / 3, -7.5, 3.1], ["m", "m", "rad"]),
     "odometry": (WheelTravel(12.5, -0.25), [12.5, -0.25], ["m", "m"]),
     "battery": (Battery(0.5, 24.6), [0.5, 24.6], ["", "V"]),
@@ -81,10 +101,12 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 }  # fmt: skip
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
+SIZES |= {"rod_force": 16, "rod_velocity": 16, "rod_voltage": 16, "ball_state": 72, "motor_current": 16}
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
 SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "velocity": 48}
 """In bytes, of the kinds that have as many numbers always."""
 SEVERAL = {
+    "figure_contact",
     "joint_position",
     "joint_state",
     "joint_torque",
@@ -93,6 +115,8 @@ SEVERAL = {
     "proximity",
     "rotor_speeds",
 }
+SINGLE = {"figure_contact": 1}
+"""Fields of one number before those of several."""
 
 
 def codec(kind: str) -> PayloadCodec:
@@ -123,8 +147,9 @@ def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
     fields = codec(kind).fields
     assert [field.name for field in fields] == list(structs.asdict(value))
     assert [field.unit for field in fields] == units
-    assert [field.is_number for field in fields] == [kind not in SEVERAL] * len(fields)
-    assert [field.is_several for field in fields] == [kind in SEVERAL] * len(fields)
+    single = SINGLE.get(kind, 0 if kind in SEVERAL else len(fields))
+    assert [field.is_number for field in fields] == [place < single for place in range(len(fields))]
+    assert [field.is_several for field in fields] == [place >= single for place in range(len(fields))]
 
 
 @given(st.sampled_from(sorted(SIZES)), st.binary(max_size=64))

@@ -204,7 +204,8 @@ def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
 def test_foosims_own_models_keep_the_places_of_their_fields() -> None:
     """Digests of layouts, and captures, have them."""
     assert [*find_model("rod").fields_of(None, None)] == [
-        *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused")
+        *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused"),
+        "unmoved",
     ]
     assert (
         [*find_model("station").fields_of(None, None)]

@@ -30,17 +30,19 @@ from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, sensor
+from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, own_module, sensor
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
 ACTUATORS = [
-    *("force", "joint_position", "joint_torque", "joint_velocity", "rod_position", "rotor_speeds", "wheel_speeds")
+    *("force", "joint_position", "joint_torque", "joint_velocity"),
+    *("rod_force", "rod_position", "rod_velocity", "rod_voltage", "rotor_speeds", "wheel_speeds"),
 ]
 SENSORS: Final = [
-    *("ball", "battery", "contact", "encoder", "gps", "imu", "joint_state", "odometry", "pose", "pose_3d", "proximity")
+    *("ball", "ball_state", "battery", "contact", "encoder", "figure_contact", "gps", "imu", "joint_state"),
+    *("motor_current", "odometry", "pose", "pose_3d", "proximity"),
 ]
 
 GAUGES: Final = '''
@@ -242,7 +244,7 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     for form in ("sensor", "actuator", "model", "motion"):
-        files = (Path(__file__).parents[2] / "world" / f"{form}s").glob("[!_]*.py")
+        files = (Path(__file__).parents[2] / "world" / f"{form}s").rglob("[!_]*.py")
         assert names(form) == sorted(file.stem for file in files)
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
@@ -253,10 +255,10 @@ def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
     folder = Path(str(import_module(FOLDERS[form]).__file__)).parent
-    assert names(form) == sorted(path.stem for path in folder.glob("*.py") if path.stem != "__init__")
+    assert names(form) == sorted(path.stem for path in folder.rglob("*.py") if path.stem != "__init__")
     for name in names(form):
         component = find(form, name)
-        assert (component.form, component.name, component.module) == (form, name, f"{FOLDERS[form]}.{name}")
+        assert (component.form, component.name, component.module) == (form, name, own_module(form, name))
         assert component.summary.endswith(".")
         assert find(form, f"{component.module}:{component.made.__qualname__}") is component
 

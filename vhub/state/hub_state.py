@@ -73,7 +73,7 @@ class HubState:
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._transit = InFlightLimit(len(self._endpoints))
-        self._here = Here(deployment)
+        self._here = Here(deployment, self.sampling.speaking)
 
     # --- joining -----------------------------------------------------------------------------------------------------
 
@@ -232,11 +232,12 @@ class HubState:
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
         filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
+        What a sensor measures besides its rate is for clients, who are asked when they are due.
         """
         if not self._here.is_complete:
             return 0
         members = [member for member in self.members.values() if member.active]
-        if any(member.period == 0 for member in members):
+        if self._here.is_called_at_any_tick or any(member.period == 0 for member in members):
             return 0
         if self._is_clogged(tick) or (self._here.on_arrival and any(map(self._here.calls, self._sendings.waiting))):
             return 0
@@ -244,7 +245,7 @@ class HubState:
             return 0
         for following in range(limits.RELEASE_AHEAD):
             sent, arrival = tick + 1 + following, tick + 2 + following
-            if self.sampling.may_be_due(sent) or any(member.may_be_due(sent) for member in members):
+            if self.sampling.is_due(sent) or any(member.may_be_due(sent) for member in members):
                 return following
             if self._here.on_arrival and any(map(self._here.calls, self._flights.get(sent, ()))):
                 return following

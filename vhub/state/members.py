@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 
 from msgspec import convert
 
@@ -74,13 +74,17 @@ class Member:
 class Here:
     """Values derived from the members, computed anew after each join or leave."""
 
-    def __init__(self, deployment: Deployment) -> None:
+    def __init__(self, deployment: Deployment, speaking: Set[tuple[str, str]]) -> None:
+        """`speaking` are the robots and channels of sensors that may measure at any tick."""
+        self._speaking = speaking
         clients = [*deployment.players, *deployment.clients]
         self._lockstep = tuple(name for name in clients if may_lockstep(deployment, name))
         self.is_complete = not self._lockstep
         """Whether all declared lockstep clients take part: one that does not may join at any tick."""
         self.on_arrival: dict[str, Member] = {}
         """Clients that act at arrival, in name order."""
+        self.is_called_at_any_tick = False
+        """Whether a client acts at the arrival of what may be measured at any tick."""
         self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
         """Subscribers of each (endpoint, channel), in name order."""
 
@@ -89,6 +93,9 @@ class Here:
         here = {name: member for name, member in sorted(members.items()) if member.active}
         self.is_complete = all(name in here for name in self._lockstep)
         self.on_arrival = {name: member for name, member in here.items() if member.arrivals}
+        self.is_called_at_any_tick = any(
+            pair in self._speaking for member in self.on_arrival.values() for pair in member.arrivals
+        )
         heard: dict[tuple[str, str], list[str]] = {}
         for name, member in here.items():
             for pair in member.subscriptions:

@@ -6,7 +6,7 @@ the one of the original table (`docs/reference/table.md`); its gains and limits 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import ClassVar, Final
 
 from msgspec import Struct
 
@@ -14,7 +14,7 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.models.rod import RodRobot
+from foosim.world.parameters.rod_drives import RodLimits
 from foosim.world.parameters.table import table_of
 
 ANGLE_RAD_MAX: Final = 1000.0
@@ -43,15 +43,17 @@ class Command(Struct, frozen=True):
 class PositionActuator:
     """A proportional loop from a rod's set-point to the speeds of its motors."""
 
+    steady: ClassVar = True
+    """What it asks follows from the state of its rod alone."""
+
     def __init__(self, settings: RodPositionSettings, at: Mounting) -> None:
-        robot = at.spec.robots[at.robot.name]
-        assert isinstance(robot, RodRobot)
-        drive = table_of(at.spec).drive
-        self._slide_m_max = table_of(at.spec).lines[robot.line].half_stroke
+        drive, limits = table_of(at.spec).drive, RodLimits(at)
+        self._slide_m_max = limits.half_stroke
         self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
         self._set_point_at, self._joints_at = self._set_point.at, self._joints.at
-        self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)
-        self._spin = (drive.spin.gain, drive.spin.speed, drive.spin.torque)
+        force, torque = limits.forces
+        self._slide = (drive.slide.gain, drive.slide.speed, force)
+        self._spin = (drive.spin.gain, drive.spin.speed, torque)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest slide (m) and spin (rad) that are accepted."""

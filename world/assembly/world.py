@@ -273,6 +273,8 @@ class World:
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
+        self.ruled = frozenset(self._entity_rules)
+        """Entities that have rules of their own, by their indices."""
         self._powers: dict[int, list[tuple[str, Any]]] = {}
         """The rules that say whether an entity's drives have power, by its index."""
         for index, its in self._entity_rules.items():
@@ -555,7 +557,7 @@ def _asked(motion: str, together: Any, entities: Sequence[Entity], view: View) -
 def _without_power(one: FittedActuator, view: View) -> Motors:
     """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
     unpowered = getattr(one.actuator, "unpowered", None)
-    asked: Motors = tuple((0.0, most) for _, most in one.actuator.command(view)) if unpowered is None else unpowered()
+    asked: Motors = tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if unpowered is None else unpowered()
     return asked
 
 
@@ -566,11 +568,12 @@ def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: 
 
 
 def _are_motors(asked: object, count: int | None) -> bool:
-    """Whether that is what an actuator can ask of so many motors, or of any number."""
+    """Whether that is what an actuator can ask of so many motors of a rigid body, or of any number of a motion's."""
+    lengths = (2,) if count is None else (2, 3)
     return (
         isinstance(asked, tuple)
         and count in (None, len(asked))
-        and all(isinstance(one, tuple) and len(one) == 2 for one in asked)
+        and all(isinstance(one, tuple) and len(one) in lengths for one in asked)
         and all(isinstance(number, int | float) for one in asked for number in one)
     )
 

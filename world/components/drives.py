@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import inf
 from typing import Final, NamedTuple, TypeAlias
 
+from foosim.common.exact_math import exp
 from foosim.world.scene import Vector, moved
 
 
 class Motor(NamedTuple):
     """What is asked of the motor of a joint: a speed (m/s or rad/s), the greatest force with which it is reached (N or
-    N m)."""
+    N m), and by how much the force falls with the speed (N s/m or N m s/rad).
+
+    The force is slope x (speed - actual speed), at most `force`: that of an electric motor at a voltage. Without a
+    slope it is that of an ideal servo, whatever reaches the speed within a substep.
+    """
 
     speed: float
     force: float
+    slope: float = inf
+
+
+@lru_cache(maxsize=256)
+def share_of(slope: float, load: float, substep_s: float) -> float:
+    """Return the share of the difference from its speed that a motor without another load takes away in a substep.
+
+    `load` is what it accelerates (kg, kg m2). It is the closed form of m dv/dt = b (v0 - v), 1 - exp(-b h / m), so that
+    a joint follows its exponential exactly, however steep the slope is.
+    """
+    return 1.0 if slope == inf else 1.0 - exp(-slope * substep_s / load)
 
 
 Wrench: TypeAlias = tuple[Vector, Vector]

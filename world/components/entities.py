@@ -20,8 +20,10 @@ from foosim.world.spec import WorldSpec
 if TYPE_CHECKING:
     from foosim.common.finding import Finding
 
-Motors = tuple[tuple[float, float], ...]
-"""What actuators ask of each motor of an entity: target speed, and greatest force or acceleration (SI units)."""
+Motors = tuple[tuple[float, ...], ...]
+"""What actuators ask of each motor of an entity: target speed, and greatest force or acceleration (SI units).
+
+Of a rigid body a third number may follow, `drives.Motor.slope`."""
 Marked: TypeAlias = tuple[int, str, str]
 """What happened: the tick, the kind of the mark, the text."""
 

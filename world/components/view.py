@@ -322,5 +322,8 @@ class Actuator(Protocol):
     def stir(self, view: WritableView) -> None:
         """Ask for some motion, for the fixed small run that tells engines apart."""
 
-    def command(self, view: View) -> tuple[tuple[float, float], ...]:
-        """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units."""
+    def command(self, view: View) -> tuple[tuple[float, ...], ...]:
+        """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units.
+
+        For motors of rigid bodies a third number may follow, `drives.Motor.slope`.
+        """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -57,6 +57,21 @@ PARTNERS: Final[Mapping[str, int]] = MappingProxyType(
 )
 """Whom a rigid body touched in the last tick, of at most four entities with the greatest impulses, in name order; and
 these impulses (N s)."""
+TOUCHES_MAX: Final = 2
+TOUCHES: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "touches": 1,
+        "touch_partners": References(TOUCHES_MAX),
+        "touch_links": TOUCHES_MAX,
+        "touch_places": TOUCHES_MAX,
+        "touch_starts": TOUCHES_MAX,
+        "touch_ends": TOUCHES_MAX,
+        "touch_impulses": TOUCHES_MAX,
+    }
+)
+"""With whom the links of a jointed body were in contact in the last tick, of at most two with the greatest impulses in
+the order in which they began: how many contacts began; of each its partner, the index of the link, the place along the
+axis of the first joint, from that joint (m), the first and the last substep, and the impulse (N s)."""
 RESTING: Final[Mapping[str, int]] = MappingProxyType({"slow_ticks": 1})
 """How many ticks a rigid body has been slow: bodies of an island that all have been for long are at rest."""
 
@@ -204,6 +219,8 @@ class Model(Form):
     is_robot: bool = True
     has_body: bool = True
     """Whether it is somewhere, with an antenna; else only a place of the network can say where."""
+    on_demand: Mapping[str, int] = field(default_factory=dict)
+    """Further fields that an entity of it has where a component of it needs them."""
     is_rigid: bool = False
     couples: bool = True
     """Whether something in it couples its parts, as the motors of an arm do: its island has a solve of its own."""
@@ -242,6 +259,11 @@ class Model(Form):
             return self.slots
         found = slots_found(self.name, self.slots, settings, spec)
         return {**found, **{slot: 1 for slot in self.needed if slot not in found}}
+
+    def demanded(self, needs: Iterable[str]) -> dict[str, int]:
+        """Return the fields on demand that are among what the components of an entity need."""
+        needed = {*needs}
+        return {slot: count for slot, count in self.on_demand.items() if slot in needed}
 
     @property
     def needed(self) -> tuple[str, ...]:

@@ -83,7 +83,7 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
     if isinstance(form, Component) and _speaks_by_model(form) and form.speaks not in needs:
         needs = (*needs, form.speaks)
-    missing = [] if has is None else [field for field in needs if field not in has]
+    missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing, has)}")
@@ -100,7 +100,7 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
 def _having(fields: Collection[str]) -> Iterator[str]:
     """Yield the names of the models of robots whose state has these fields, and of their variants that alone do."""
     for model in models_of(robots=True):
-        if {*fields} <= {*(model.declared or ())}:
+        if {*fields} <= {*(model.declared or ()), *model.on_demand}:
             yield model.name
             continue
         for dynamics, variant in model.variants.items():

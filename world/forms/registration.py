@@ -108,6 +108,7 @@ def _component(found: Any) -> Iterator[str]:
 def _model(found: Any) -> Iterator[str]:
     if not callable(found.slots):
         yield from _slots(found.slots)
+    yield from _slots(found.on_demand, "on_demand")
     for slot in () if callable(found.slots) else (*OF_ROBOTS, *OF_SOLVED):
         if found.slots.get(slot, 1) != 1:
             yield f"{slot}, which foosim writes, is one number, not {show(found.slots[slot])}"

@@ -1,9 +1,9 @@
 """The registry of forms: models, sensors, rules and whatever else a world is made of, by form and name.
 
 Each stands in a file of its own and registers itself there, under the name by which deployments ask for it. One of
-foosim's own is in the folder of its form, in a module of its name; one of another package is in a module that the
-package names as an entry point of the group `foosim.world`; and `module:Class` names one of any module on the path.
-Modules are imported when one of theirs is asked for.
+foosim's own is in the folder of its form, or in a folder of that, in a module of its name; one of another package is in
+a module that the package names as an entry point of the group `foosim.world`; and `module:Class` names one of any
+module on the path. Modules are imported when one of theirs is asked for.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -221,7 +220,7 @@ def _registering(describe: Callable[[Callable[..., Any]], Form]) -> Callable[[Ma
         found = describe(made)
         check_form(found)
         key = found.form, found.name
-        own = f"{FOLDERS[found.form]}.{found.name}"
+        own = own_module(*key)
         if found.module != own and _is_there(*key):
             raise Refused(f"{found.form} {found.name} is registered by {found.module}, and is in {own}")
         first = _known.setdefault(key, found)
@@ -285,15 +284,14 @@ def model_of(settings: EntitySettings) -> Model:
 
 def names(form: str) -> list[str]:
     """Return the names of all that are installed here, in name order: foosim's own, and those of other packages."""
-    folder = import_module(FOLDERS[form])
-    for module in iter_modules(folder.__path__):
-        _own(form, module.name)
+    for name in _own_modules(form):
+        _own(form, name)
     load_entry_points()
     packages = {entry.module.partition(".")[0] for entry in _entry_points()}
     return sorted(
         name
         for (known, name), found in _known.items()
-        if known == form and (found.module == f"{FOLDERS[form]}.{name}" or found.module.partition(".")[0] in packages)
+        if known == form and (found.module == own_module(form, name) or found.module.partition(".")[0] in packages)
     )
 
 
@@ -329,14 +327,32 @@ def _load(entry: EntryPoint) -> str:
 def _own(form: str, name: str) -> Form | None:
     """Return one of foosim's own, imported from its module; None where there is none."""
     if _is_there(form, name):
-        import_module(f"{FOLDERS[form]}.{name}")
+        import_module(own_module(form, name))
     return _known.get((form, name))
 
 
 def _is_there(form: str, name: str) -> bool:
     """Whether foosim has a module of that name for a form."""
-    module = f"{FOLDERS[form]}.{name}"
-    return name.isidentifier() and (module in sys.modules or find_spec(module) is not None)
+    return name in _own_modules(form)
+
+
+def own_module(form: str, name: str) -> str:
+    """Return the module that one of foosim's own is in, or would be."""
+    return _own_modules(form).get(name, f"{FOLDERS[form]}.{name}")
+
+
+@cache
+def _own_modules(form: str) -> Mapping[str, str]:
+    """Return the modules of foosim's own forms by name: those of the form's folder, and of folders in that."""
+    folder = import_module(FOLDERS[form])
+    found: dict[str, str] = {}
+    for one in iter_modules(folder.__path__):
+        if one.ispkg:
+            inner = iter_modules([f"{path}/{one.name}" for path in folder.__path__])
+            found |= {its.name: f"{folder.__name__}.{one.name}.{its.name}" for its in inner}
+        else:
+            found[one.name] = f"{folder.__name__}.{one.name}"
+    return found
 
 
 def _of_class(form: str, path: str) -> Form:

@@ -7,10 +7,11 @@ from math import sqrt
 from typing import Final
 
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import CONTACTS, JOINTS
+from foosim.world.forms.forms import CONTACTS, JOINTS, TOUCHES
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL, PLASTIC
+from foosim.world.parameters.rod_drives import RodVoltageSettings
 from foosim.world.parameters.table import Line, LineName, Table, Team, table_of
 from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Shape, Vector
 from foosim.world.spec import WorldSpec
@@ -49,7 +50,9 @@ def line_x_m(spec: WorldSpec, robot: RodRobot) -> float:
         "down": 1,
         **CONTACTS,
         "refused": 1,
+        "unmoved": 1,
     },
+    on_demand=TOUCHES,
     is_rigid=True,
     couples=False,
     kit="table",
@@ -80,17 +83,19 @@ class Rod:
         rod, line = table.rod, table.lines[self._settings.line]
         tube = Shape(Cylinder(rod.radius, rod.length), "rods", STEEL, orientation=ALONG_Y, radio=METAL)
         thin = rod.carriage_mass * rod.length * rod.length / 12.0
-        mass, centre, inertia = _spin_mass(table, line)
+        mass, centre, (across, about, upwards) = _spin_mass(table, line)
+        along, around = _rotors(self._settings)
         slide = Link(
             name=f"{name}/slide",
             joint="prismatic",
             shapes=(tube,),
-            mass=rod.carriage_mass,
+            mass=rod.carriage_mass + along,
             inertia=(thin, rod.carriage_mass * rod.radius * rod.radius, thin),
             axis=Y_AXIS,
             limits=(-line.half_stroke, line.half_stroke),
         )
         figures = _figures(table, line, TEAM_COLOURS[self._settings.team])
+        inertia = across, about + around, upwards
         spin = Link(f"{name}/spin", "continuous", figures, mass, inertia, (0.0, 0.0, centre), Y_AXIS, parent=0)
         x = line_x_m(self._at.spec, self._settings)
         return Body(name, "rod", (x, 0.0, rod.axis_height), (slide, spin))
@@ -109,6 +114,12 @@ class Rod:
             and -self._slide_speed_max <= numbers[speed] <= self._slide_speed_max
             and -self._spin_speed_max <= numbers[speed + 1] <= self._spin_speed_max
         )
+
+
+def _rotors(settings: RodRobot) -> tuple[float, float]:
+    """Return what the rotors of a rod's motors add: to what slides (kg), and to what turns (kg m2)."""
+    motors = [its for _, its in sorted(settings.actuators.items()) if isinstance(its, RodVoltageSettings)]
+    return sum([its.slide.rotor for its in motors], 0.0), sum([its.spin.rotor for its in motors], 0.0)
 
 
 def figure_ys(line: Line) -> list[float]:

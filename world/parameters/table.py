@@ -12,6 +12,8 @@ from pydantic import Field
 
 from foosim.common import units
 from foosim.common.spec_base import (
+    Acceleration,
+    AngularAcceleration,
     Coefficient,
     Force,
     Gain,
@@ -162,23 +164,31 @@ class Line(SpecBase):
 
 
 class SlideAxis(SpecBase):
-    """A rod's motor along y: target speed = gain (1/s) x error, within +-speed, at no more than the force."""
+    """A rod's motor along y: target speed = gain (1/s) x error, within +-speed, at no more than the force.
+
+    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    """
 
     speed: Speed
     force: Force
+    acceleration: Acceleration | None = None
     gain: Gain
 
 
 class SpinAxis(SpecBase):
-    """A rod's motor around y: target speed = gain (1/s) x error, within +-speed, at no more than the torque."""
+    """A rod's motor around y: target speed = gain (1/s) x error, within +-speed, at no more than the torque.
+
+    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    """
 
     speed: Spin
     torque: Torque
+    acceleration: AngularAcceleration | None = None
     gain: Gain
 
 
 class Drive(SpecBase):
-    """The position drive that every rod has."""
+    """The limits of a rod's drives, and the gains of position drives."""
 
     slide: SlideAxis
     spin: SpinAxis

@@ -125,11 +125,13 @@ GERMAN: Final[Mapping[str, Any]] = {
         "slide": {
             "speed": "3.5 m/s",  # [S] the Isaac model: 3.48 m/s
             "force": "90 N",  # [D] its 104 m/s2 on a rod of about 1 kg: 90 to 110 N
+            "acceleration": "100 m/s2",  # [S] its 104 m/s2
             "gain": 30,  # [M] 0.3 a control period of 10 ms: within 1 mm of a 100 mm step in 136 ms, no overshoot
         },
         "spin": {
             "speed": "150 rad/s",  # [A] half of the Isaac model's 314 rad/s; a 15 m/s shot takes about 140 rad/s [D]
             "torque": "2 N m",  # [D] the Isaac model's 9425 rad/s2 on 2e-4 kg m2
+            "acceleration": "9400 rad/s2",  # [S] the Isaac model's 9425 rad/s2, of rods with one figure, too
             "gain": 60,  # [A] below 2 x 9425 / 150 per second, so that the torque can brake in time
         },
     },

@@ -1,0 +1,66 @@
+"""Bodies that stand: what a solve has left as it was, to the last bit, is left so until something changes it.
+
+A solve is a function of the state of an island and of what is asked of its motors. So the next solve of a body that
+is alone, whose state the last one has left as it was, and whose actuators ask for what follows from that state alone,
+would leave it so again. Its slot `unmoved` says that the last one did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from foosim.world.components.fitted import FittedActuator
+from foosim.world.frame import Frame
+from foosim.world.layout import Entity, Layout
+
+UNMOVED = "unmoved"
+
+
+class Standing:
+    """Which bodies of a layout may stand: those with the slot, whose actuators say that they are `steady`, without
+    rules of their own."""
+
+    def __init__(
+        self, layout: Layout, actuators: Mapping[int, Sequence[FittedActuator]], ruled: Collection[int]
+    ) -> None:
+        """`actuators` and `ruled` are by the entities' indices."""
+        self._places = {
+            entity.index: entity.offsets[UNMOVED]
+            for entity in layout.entities
+            if UNMOVED in entity.offsets
+            and entity.index not in ruled
+            and all(getattr(one.actuator, "steady", False) for one in actuators.get(entity.index, ()))
+        }
+
+    def awake(
+        self, bodies: Sequence[Entity], alone: Collection[int], numbers: Sequence[float], start: Sequence[float]
+    ) -> list[Entity]:
+        """Return the bodies that are solved: `alone` are those that are islands by themselves, `start` the numbers
+        before commands reached them."""
+        places, found = self._places, []
+        for entity in bodies:
+            at, first, last = places.get(entity.index, -1), entity.start, entity.split
+            stands = at >= 0 and numbers[at] == 1.0 and entity.index in alone
+            if not stands or numbers[first:last] != start[first:last]:
+                found.append(entity)
+        return found
+
+    def note(self, solved: Iterable[Entity], numbers: list[float], before: Sequence[float]) -> None:
+        """Say of each body that was solved whether that has left it as it was before."""
+        for entity in solved:
+            at = self._places.get(entity.index, -1)
+            if at >= 0:
+                numbers[at] = before[at]
+                first, last = entity.start, entity.split
+                numbers[at] = 1.0 if numbers[first:last] == before[first:last] else 0.0
+
+    def wake_edited(self, before: Frame, layout: Layout, numbers: list[float]) -> None:
+        """Let those be solved that an order or a rule of the world has changed."""
+        old = before.numbers
+        for entity in layout.entities:
+            at = entity.offsets.get(UNMOVED, -1)
+            if at < 0 or numbers[at] == 0.0 or entity.name not in before.layout:
+                continue
+            was = before.layout[entity.name]
+            if numbers[entity.start : entity.split] != old[was.start : was.split]:
+                numbers[at] = 0.0

@@ -1,0 +1,1 @@
+"""Sensors of a football table, each in a file of its own."""
