@@ -22,7 +22,7 @@ help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
 	@echo 'make test    lint, type check and all tests (ARGS: options of pytest)'
 	@echo 'make slow    tests of processes on a machine made slow: each start takes 7 s longer, all cores are busy'
-	@echo 'make play    minutes of the table as deployed: goals, hand-overs; law 1 by further seeds'
+	@echo 'make play    minutes of the table as deployed: goals, hand-overs, matches of its players; law 1 by further seeds'
 	@echo 'make minutes minutes of the table under a thousand faults each: no digest changes; takes hours (ARGS: -k NAME)'
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
 	@echo 'make faults  faults on real processes at random times, with their figures (N=20; ARGS: --seed S, --only KIND)'
@@ -44,7 +44,7 @@ up: environment
 	@.venv/bin/foosim-supervisor up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
 
 play: environment
-	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/laws $(ARGS)
+	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/players/test_matches.py tests/laws $(ARGS)
 
 minutes: environment
 	@$(PYTEST) -o timeout=0 -m campaign tests/rehearsal/test_swarm.py $(ARGS)

@@ -186,8 +186,9 @@ def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:
         if places.setdefault(process, place) != place:
             yield Finding(location, "a process whose roles are not all on the same host", process)
         launch = view.get(*role, "launch")
-        if role[0] == "nodes" and launch in ("manual", "systemd"):
-            yield Finding(location, f"a process for a node with `launch: {launch}`, which has its own", process)
+        if role[0] in ("nodes", "players") and launch in ("manual", "systemd"):
+            what = f"a process for a {role[0][:-1]} with `launch: {launch}`, which has its own"
+            yield Finding(location, what, process)
         is_apart = process == view.get("supervisor", "process") != view.get("vhub", "process")
         if role[0] == "players" and is_apart:  # it would start before it is known where to connect
             yield Finding(location, "a player shares the supervisor's process only together with the vHub", process)

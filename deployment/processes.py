@@ -47,7 +47,7 @@ def parse_shape(text: str) -> Shape:
 def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str, Process]:
     """Return the processes of a run by name: that of the supervisor first, then those of vHub, nodes and players.
 
-    Nodes that `up` does not start have processes of their own. Players that share a process without other roles do so
+    Roles that `up` does not start have processes of their own. Players that share a process without other roles do so
     in each shape.
     """
     hosts, roles = places(deployment), [VHUB, SUPERVISOR, *sorted(deployment.nodes), *sorted(deployment.players)]
@@ -55,7 +55,7 @@ def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str,
     fleets = {*declared.values()} - {name for role, name in declared.items() if role not in deployment.players}
     groups: dict[str, list[str]] = {}
     for role in roles:
-        is_ours = role not in deployment.nodes or deployment.nodes[role].launch == "local"
+        is_ours = deployment.launch_of(role) == "local"
         if shape == "one" and is_ours:
             name = f"{ONE}-{hosts[role]}" if role in hosts else ONE
             if role in deployment.players and role not in hosts and VHUB in hosts:

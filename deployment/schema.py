@@ -47,7 +47,7 @@ class NodeSpec(Placed):
 
 
 class Player(Placed):
-    """A controller that `up` starts: a class with `act(tick, samples) -> commands`.
+    """A controller: a class with `act(tick, samples) -> commands`.
 
     It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
     robot is on board of it: its packets leave from and come to where the robot is. Players that name the same `process`
@@ -63,6 +63,8 @@ class Player(Placed):
     arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     on: RobotName | None = None
     process: Name | None = None
+    launch: Literal["local", "manual"] = "local"
+    """Who starts it: `up`, or a person by the command that `up` prints, in a terminal of its own."""
     restart: bool = True
     """Whether its process is started again when a signal has ended it, or it was lost with its machine; before the
     first tick, when it has no memory to lose, it always is."""
@@ -198,6 +200,12 @@ class Deployment(WorldSpec):
         on_board = [(name, player.on) for name, player in self.players.items()]
         on_board += [(name, client.on) for name, client in self.clients.items()]
         return {name: robot for name, robot in on_board if robot is not None}
+
+    def launch_of(self, role: str) -> Literal["local", "manual", "systemd"]:
+        """Who starts the process of a role."""
+        if role in self.nodes:
+            return self.nodes[role].launch
+        return self.players[role].launch if role in self.players else "local"
 
     def declared_processes(self) -> dict[str, str]:
         """The process of each role that names one, by role."""

@@ -18,6 +18,7 @@ import typer.main
 from foosim.capture.rows import ROW_TYPES, row_schema
 from foosim.cli.doctor import app as doctor_app
 from foosim.cli.guard import app as guard_app
+from foosim.cli.match.command import app as match_app
 from foosim.cli.net import app as net_app
 from foosim.cli.pki import app as pki_app
 from foosim.cli.process import app as process_app
@@ -38,6 +39,7 @@ DOCS: Final = Path(__file__).parent
 COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-supervisor": supervisor_app,
     "foosim-rehearse": rehearse_app,
+    "foosim-match": match_app,
     "foosim-replay": replay_app,
     "foosim-net": net_app,
     "foosim-table": table_app,

@@ -77,7 +77,7 @@ def check_certificates(plan: Plan) -> list[str]:
         process
         for process in plan.processes.values()
         if not {*process.roles} & {*elsewhere}
-        and not any(role in deployment.nodes and deployment.nodes[role].launch != "local" for role in process.roles)
+        and all(deployment.launch_of(role) == "local" for role in process.roles)
     ]
     everybody = [who for process in started for who in identity.of_process(process, deployment)]
     found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]

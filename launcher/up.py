@@ -193,8 +193,8 @@ class Up:
             self._not_home = str(failed)
 
     def _starts_early(self, process: Process) -> bool:
-        node = self.plan.deployment.nodes.get(process.name)
-        return process.name not in self._launcher.remotes and (node is None or node.launch == "local")
+        name = process.name
+        return name not in self._launcher.remotes and self.plan.deployment.launch_of(name) == "local"
 
     def _show_network(self) -> None:
         from foosim.vhub.links.summary import summaries
@@ -204,12 +204,13 @@ class Up:
             self.display.say(line)
 
     def _begin(self, process: Process, info: RunInfo | None) -> None:
-        """Start a process, or print the command line of a node that is started by hand."""
+        """Start a process, or print the command line of one that is started by hand."""
         name = process.name
         command = self._commands.of(process, info, self._launcher.remotes.get(name))
-        node = self.plan.deployment.nodes.get(name)
-        if node is not None and node.launch == "manual":
-            self.display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
+        if self.plan.deployment.launch_of(name) == "manual":
+            is_player = name in self.plan.deployment.players
+            what, where = ("player", "in a terminal of its own") if is_player else ("node", "on its machine")
+            self.display.say(f"waiting for {what} {name}; start it {where}: {command_line(command)}")
         else:
             self._launch(name, command)
 

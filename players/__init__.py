@@ -1,4 +1,4 @@
-"""Controllers as content: the football teams, and the rovers of the warehouse with their base."""
+"""Controllers as content: players of the football table, the rovers of the warehouse with their base."""
 
 MOVED = {
     "foosim.client.players": "foosim.players.football",
@@ -6,3 +6,11 @@ MOVED = {
     "foosim.client.dispatch": "foosim.players.warehouse_base",
 }
 """Modules that deployments of earlier versions name, and where their classes are."""
+
+OF_THE_TABLE = {
+    "keeper": "foosim.players.football:Keeper",
+    "passive": "foosim.players.football:Passive",
+    "striker": "foosim.players.football:Striker",
+    "team": "foosim.players.football:Team",
+}
+"""Classes that play football by themselves, by the names that `foosim-match` knows."""

@@ -17,34 +17,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, TextIO
 
-_ESCAPED: Final = {"\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left"}
+from foosim.runtime.keys import is_foreground, split_keys
+
 LOOK_S: Final = 0.2
 """The interval at which the thread checks whether it has to end."""
-
-
-def split_keys(text: str) -> tuple[list[str], str]:
-    """Return the keys in the text of a terminal, and the beginning of an incomplete one."""
-    keys: list[str] = []
-    text = text.replace("\x1bO", "\x1b[")  # some terminals send arrows so
-    while text and text not in ("\x1b", "\x1b["):
-        length = 3 if text[:3] in _ESCAPED else 1
-        keys.append(_ESCAPED.get(text[:3], text[0]))
-        text = text[length:]
-    return keys, text
 
 
 @contextmanager
 def keys_of_terminal(pressed: Callable[[str], object]) -> Iterator[bool]:
     """Pass each key to `pressed`, from a thread, while the context lasts; gives False where there is no terminal."""
     stream = sys.stdin
-    if stream is None or stream.closed or not stream.isatty() or not _is_foreground(stream.fileno()):
+    if stream is None or stream.closed or not stream.isatty() or not is_foreground(stream.fileno()):
         yield False
         return
     file, ended = stream.fileno(), threading.Event()
     saved = termios.tcgetattr(file)
 
     def set_mode(*_: object) -> None:
-        if _is_foreground(file):
+        if is_foreground(file):
             tty.setcbreak(file, termios.TCSADRAIN)
 
     before = signal.signal(signal.SIGCONT, set_mode)
@@ -57,22 +47,14 @@ def keys_of_terminal(pressed: Callable[[str], object]) -> Iterator[bool]:
         ended.set()
         thread.join()
         signal.signal(signal.SIGCONT, before)
-        if _is_foreground(file):
+        if is_foreground(file):
             termios.tcsetattr(file, termios.TCSADRAIN, saved)
-
-
-def _is_foreground(file: int) -> bool:
-    """Whether this process may touch the terminal: the kernel stops background processes that do."""
-    try:
-        return os.tcgetpgrp(file) == os.getpgrp()
-    except OSError:
-        return False
 
 
 def _read(file: int, pressed: Callable[[str], object], ended: threading.Event) -> None:
     rest = ""
     while not ended.is_set():
-        if not _is_foreground(file):
+        if not is_foreground(file):
             ended.wait(LOOK_S)
             continue
         if not select.select([file], [], [], LOOK_S)[0]:

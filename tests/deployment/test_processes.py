@@ -8,7 +8,7 @@ import pytest
 
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.processes import joint_processes, parse_shape, processes_of
+from foosim.deployment.processes import SHAPES, joint_processes, parse_shape, processes_of
 from foosim.deployment.schema import Deployment
 from tests.apart import apart
 
@@ -103,12 +103,23 @@ def test_processes_that_connect_with_several_roles_have_an_identity() -> None:
             ("nodes.red.launch=manual", "nodes.red.process=main"),
             "nodes.red.process: a process for a node with `launch: manual`, which has its own",
         ),
+        (
+            ("players.player-red.launch=manual", "players.player-red.process=main"),
+            "players.player-red.process: a process for a player with `launch: manual`, which has its own",
+        ),
     ],
 )
 def test_what_cannot_share_is_refused_with_its_place(sets: tuple[str, ...], problem: str) -> None:
     with pytest.raises(DeploymentError) as refused:
         deployed(*sets)
     assert problem in str(refused.value)
+
+
+def test_a_player_that_a_person_starts_has_a_process_of_its_own_in_each_shape() -> None:
+    deployment = deployed("players.player-red.launch=manual")
+    assert deployment.launch_of("player-red") == "manual" and deployment.launch_of("player-blue") == "local"
+    for shape in SHAPES:
+        assert ("player-red",) in roles(deployment, shape).values(), shape
 
 
 def test_an_unknown_shape_is_refused_with_the_known_ones() -> None:

@@ -18,7 +18,7 @@ from foosim.protocol.messages import Answer, Request
 from foosim.replay.core import AT_ONCE_MAX, STEPS_MAX, Playback, Span
 from foosim.replay.entries import Entry
 from foosim.replay.requests import ANSWERS_KEPT, ARGUMENTS, Requests
-from foosim.replay.terminal import split_keys
+from foosim.runtime.keys import split_keys
 
 MS = 1_000_000
 TICK_NS = 2 * MS

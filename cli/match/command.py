@@ -1,0 +1,207 @@
+"""The command `foosim-match`: many games of two players, in several processes, and what they show."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import typer
+
+from foosim.analysis.new_file import check_absent, check_name, new_file
+from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
+from foosim.cli.run_command import with_options
+from foosim.common import units
+from foosim.common.errors import BadValue, Failed, read_at
+from foosim.common.json_text import encode_json
+from foosim.common.units import parse_ns
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.text.files import read_source_file
+from foosim.rehearsal.match.chart import picture
+from foosim.rehearsal.match.entrants import entrant, seats
+from foosim.rehearsal.match.figures import figures
+from foosim.rehearsal.match.game import Fixture, Game, Link, Played, play, sets_of
+from foosim.rehearsal.workers import in_processes
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, VersionOption, new_app, run_app
+
+TABLE: Final = Path("deploy/table.yaml")
+SIDES: Final = {"a": (0,), "b": (1,), "both": (0, 1)}
+"""Who of the two has the worse network."""
+CELLS_MAX: Final = 400
+
+app = new_app()
+
+
+@dataclass(frozen=True, slots=True)
+class MatchOptions:
+    """What a match is asked for; each field is an argument or option of the command."""
+
+    a: Annotated[str, typer.Argument(metavar="A", help="keeper, passive, striker, team, or module:Class.")]
+    b: Annotated[str, typer.Argument(metavar="B", help="The other player, likewise.")]
+    games: Annotated[int, typer.Option("--games", help="Number of games, with the seeds from --seed on.", min=1)] = 20
+    minutes: Annotated[float, typer.Option("--minutes", help="Simulated length of a game.", min=0.001, max=1000)] = 5.0
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the first game.", min=0)] = 1
+    keep_sides: Annotated[bool, typer.Option("--keep-sides", help="Do not change sides in every second game.")] = False
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", help="Number of processes; by default that of the processors.", min=1)
+    ] = None
+    deployment: Annotated[Path, typer.Option("--deployment", help="The deployment file to play.")] = TABLE
+    sets: Annotated[
+        tuple[str, ...],
+        typer.Option("--set", help="Change the deployment, e.g. --set table.walls.height='120 mm'; may be repeated."),
+    ] = ()
+    delay: Annotated[
+        str | None, typer.Option("--delay", help="Play over links with these delays, each way: 0,10,20,50ms.")
+    ] = None
+    loss: Annotated[str | None, typer.Option("--loss", help="Play over links that lose these shares: 0,5,10,20%.")] = (
+        None
+    )
+    worse_for: Annotated[
+        Literal["a", "b", "both"], typer.Option("--worse-for", help="Whose links have --delay and --loss.")
+    ] = "a"
+    drawing: Annotated[
+        Path | None, typer.Option("--picture", help="Draw points against delay and loss into NAME.svg.")
+    ] = None
+    captures: Annotated[
+        Path | None, typer.Option("--captures", metavar="FOLDER", help="Write a capture of each game here.")
+    ] = None
+
+
+@app.command()
+@with_options()
+def foosim_match(
+    options: MatchOptions,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
+    version: VersionOption = False,
+) -> None:
+    """Let two players play many games, and show who is better.
+
+    Each game is a rehearsal of the deployment with the classes A and B in the places of its two players, and with a
+    seed of its own; in every second game they change sides. Prints wins, points, and how often what is played with
+    left the field, with intervals of 95 %: Wilson's for the share of wins among decided games, Student's for points,
+    the score interval of a rate. `equals` is the probability that two equal players are so far apart (two-sided).
+
+    With --delay or --loss there is a row for each pair of both, of the same seeds: the links to and from A
+    (--worse-for) have that delay and loss in place of the deployed ones, B keeps its network. --picture draws the rows.
+
+    Ctrl-C ends the match with what has been played.
+
+    Exit codes: 0 done, 1 a player has failed, 2 bad input, 3 a capture exists or cannot be written, 130 Ctrl-C.
+    """
+    match = _checked(options)
+    jobs = min(options.jobs or os.cpu_count() or 1, len(match.games))
+    raise typer.Exit(_play(match, jobs, options.drawing, json))
+
+
+def _checked(options: MatchOptions) -> Match:
+    """Return the match that was asked for; raises Refused. Nothing has been played, and no file made."""
+    drawing, name = options.drawing, str(options.deployment)
+    if drawing is not None:
+        if options.delay is None and options.loss is None:
+            raise BadValue("--picture: there is nothing to draw without --delay or --loss", str(drawing))
+        check_name("--picture", drawing, "the picture", (".svg",))
+    entrants = entrant("A", options.a), entrant("B", options.b)
+    links = _links(options.delay, options.loss)
+    text = apply_sets(read_source_file(options.deployment), name, options.sets)
+    deployment = load_deployment(text, name)
+    first, second = seats(deployment, name)
+    ticks = max(1, round(options.minutes * 60e9 / deployment.tick_ns))
+    classes = entrants[0].path, entrants[1].path
+    fixture = Fixture(text, name, options.deployment.parent, classes, ticks, SIDES[options.worse_for])
+    games = [
+        Game(seed, number % 2 == 1 and not options.keep_sides, link, _capture(options.captures, seed, link))
+        for link in links
+        for number, seed in enumerate(range(options.seed, options.seed + options.games))
+    ]
+    for game in {(game.is_swapped, game.link): game for game in games}.values():
+        apply_sets(text, name, sets_of(fixture, game))
+    _make_room(options.captures, games)
+    return Match(entrants, fixture, tuple(games), deployment.tick_ns, (first, second), options.worse_for)
+
+
+def _play(match: Match, jobs: int, drawing: Path | None, json: bool) -> int:
+    """Play the games and show them; return the exit code."""
+    played: list[Played] = []
+    code = DONE
+    with closing(in_processes(partial(play, match.fixture), match.games, jobs, "the match")) as results:
+        try:
+            for game in results:
+                if game.failed:
+                    typer.echo(f"seed {game.seed}, {who(match, game)}: {game.failed}", err=True)
+                    code = REFUSED if game.refused else FAILED
+                    break
+                played.append(game)
+                typer.echo(line(match, game, len(played)), err=True)
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted after {len(played)} of {len(match.games)} games", err=True)
+            code = INTERRUPTED
+    cells = [(link, figures(list(games), match.tick_ns)) for link, games in groupby(played, key=lambda one: one.link)]
+    if drawing is not None and code == DONE:
+        drawn = [(link, found) for link, found in cells if link is not None]
+        with new_file(drawing) as part:
+            part.write_text(picture(drawn, match.labels, drawn_title(match)), encoding="utf-8")
+    if json:
+        typer.echo(encode_json(as_json(match, played, cells)).decode())
+    elif cells:
+        show(match, cells)
+    return code
+
+
+def _links(delay: str | None, loss: str | None) -> list[Link | None]:
+    """Return the networks of a match: for each delay each loss; None is the deployment's own."""
+    if delay is None and loss is None:
+        return [None]
+    delays = [0] if delay is None else _listed("--delay", delay, "ms", parse_ns)
+    losses = [0.0] if loss is None else _listed("--loss", loss, "%", _share)
+    if len(delays) * len(losses) > CELLS_MAX:
+        raise BadValue(f"--delay, --loss: more than {CELLS_MAX} pairs", len(delays) * len(losses))
+    return [Link(late_ns, lost) for late_ns in delays for lost in losses]
+
+
+def _listed(option: str, text: str, unit: str, read: Any) -> list[Any]:
+    """Return the values of `0,10,20ms`: the last one's unit counts for those without; `unit` where it has none."""
+    words = [word.strip() for word in text.split(",")]
+    if not all(words):
+        raise BadValue(f"{option}: a list with commas is needed, such as 0,10,20{unit}", text)
+    own = words[-1].lstrip("0123456789.").strip() or unit
+    values = [read_at(option, read, word if not word[-1].isdigit() else f"{word} {own}") for word in words]
+    if len(set(values)) != len(values):
+        raise BadValue(f"{option}: a value is there twice", text)
+    return values
+
+
+def _share(text: str) -> float:
+    value = float(units.parse(text, units.PROBABILITY))
+    if not 0.0 <= value < 1.0:
+        raise BadValue("out of range 0 % to below 100 %", text)
+    return value
+
+
+def _capture(folder: Path | None, seed: int, link: Link | None) -> Path | None:
+    if folder is None:
+        return None
+    network = "" if link is None else f"-{link.delay_ns / 1e6:g}ms-{100 * link.loss:g}pct"
+    return folder / f"seed-{seed}{network}.mcap"
+
+
+def _make_room(folder: Path | None, games: Iterable[Game]) -> None:
+    """Make the folder of captures; raises Existing for a capture that is there already."""
+    if folder is None:
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Failed(f"--captures: {folder}: cannot be made, {error.strerror or error}") from None
+    for game in games:
+        if game.capture is not None:
+            check_absent(game.capture)
+
+
+def main() -> None:
+    """The entry point of `foosim-match`."""
+    run_app(app, "foosim-match")

@@ -1,0 +1,47 @@
+"""Many rehearsals in several processes: seeds of the swarm, games of a match. One needs nothing of another."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import active_children, get_context
+from typing import TypeVar
+
+from foosim.common.errors import Failed
+from foosim.runtime.process import end_with
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_processes(
+    work: Callable[[Item], Result], items: Sequence[Item], jobs: int, what: str
+) -> Generator[Result, None, None]:
+    """Do some work for each item in `jobs` processes, and yield the results in the order of the items.
+
+    One job is this process. The processes end with the iterator, also amid an item. Raises Failed when one of them
+    was killed; `what` names it: `a process of WHAT was killed`.
+    """
+    if jobs == 1:
+        yield from map(work, items)
+        return
+    # Spawned: a fork would inherit the locks of this process's threads.
+    with ProcessPoolExecutor(jobs, get_context("spawn"), _begin, (os.getpid(),)) as pool:
+        pending = [pool.submit(work, item) for item in items]
+        try:
+            yield from (one.result() for one in pending)
+        except BaseException as error:  # Ctrl-C and a closed iterator, too: nobody waits for the rest any more
+            for process in active_children():
+                process.kill()
+            if isinstance(error, BrokenProcessPool):
+                raise Failed(f"a process of {what} was killed; fewer than --jobs {jobs} need less memory") from None
+            raise
+
+
+def _begin(parent: int) -> None:
+    """Begin a worker: Ctrl-C, which a terminal sends to all, is for the process that prints."""
+    end_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
