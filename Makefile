@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/laws -x'
 
-PACKAGES := analysis capture cli client common console deployment fitting launcher node players process protocol rehearsal replay runtime supervisor vhub world
+PACKAGES := analysis capture cli client common console deployment fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 N ?=

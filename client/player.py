@@ -97,109 +97,59 @@ class Newest:
             self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
 
 
-class PlayerLoop:
-    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
+class Acting:
+    """The player that a deployment declares under a name, made, and what it has heard: `act` is one turn of it."""
 
-    def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
-        self.core = core
-        self.newest = Newest({})
-        self._load = load
-        self._declaration: Declaration | None = None
-        self._player: Player | None = None
-        self._encoder: CommandEncoder | None = None
-        self._beat_ns = NEVER_NS
-        self._period_ns = 0
+    def __init__(
+        self, deployment: Deployment, name: str, load: Callable[[str], PlayerFactory] = load_player, tick: int = -1
+    ) -> None:
+        """`tick` is the newest tick that is known, for messages.
 
-    def step(self, now_ns: int) -> None:
-        """Advance: begin after the welcome, then act at each Go or period.
-
-        Raises PlayerError for a player that cannot be loaded, fails, or gives an invalid command.
+        Raises PlayerError for a name that is not declared, and for a player that cannot be loaded or made.
         """
-        core = self.core
-        if core.deployment is None or core.ended:
-            return
-        if self._player is None:
-            self._begin(core.deployment, now_ns)
-        if core.go is not None:
-            self.newest.take(core.go.packets)
-            self._say(core.go.tick, now_ns)
-        elif self._period_ns:
-            self.newest.take(core.arrivals)
-            core.arrivals.clear()
-            if now_ns >= self._beat_ns and not core.is_away:
-                self._say(max(core.tick, 0), now_ns)
-                self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
-
-    @property
-    def player(self) -> Player | None:
-        """The player that acts; None before the welcome."""
-        return self._player
-
-    def deadline_ns(self) -> int:
-        """When a free-running player acts next."""
-        return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
-
-    def _begin(self, deployment: Deployment, now_ns: int) -> None:
-        name = self.core.name
         if name not in deployment.players:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
-        declared = self._declaration = deployment.players[name]
-        self._player = self._make(deployment)
+        self.name = name
+        self.declared: Declaration = deployment.players[name]
+        self.hears = deployment.heard_by(name)
+        """The (endpoint, channel) that it subscribes to."""
+        self._deployment = deployment
+        self.player = self._make(load, tick)
         self._encoder = CommandEncoder(deployment)
-        pairs = deployment.heard_by(name)
-        self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in pairs})
-        if declared.lockstep:
-            period, offset = deployment.turns(declared)
-            self.core.join(period, pairs, offset, deployment.arrivals_of(name))
-        else:
-            self.core.join(0, pairs)
-            self._period_ns = int(NS_PER_S / declared.rate_hz)
-            self._beat_ns = now_ns + self._period_ns
+        self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in self.hears})
 
-    def _make(self, deployment: Deployment) -> Player:
+    def _make(self, load: Callable[[str], PlayerFactory], tick: int) -> Player:
         """Make the player that is declared."""
-        declared = self._declaration
-        assert declared is not None
-        factory = self._load(declared.class_)
+        factory = load(self.declared.class_)
         try:
-            return factory(deployment, declared.parameters)
+            return factory(self._deployment, self.declared.parameters)
         except Refused as error:
-            raise PlayerError(f"player {self.core.name}: {error}") from error
+            raise PlayerError(f"player {self.name}: {error}") from error
         except (KeyboardInterrupt, Unanswered):
             raise
         except BaseException as error:
-            when = f"at tick {self.core.tick}" if self.core.tick >= 0 else "before its first tick"
-            raise failed(f"{self.core.name} failed {when}", error, _module_of(declared)) from error
+            when = f"at tick {tick}" if tick >= 0 else "before its first tick"
+            raise failed(f"{self.name} failed {when}", error, _module_of(self.declared)) from error
 
-    def _say(self, tick: int, now_ns: int) -> None:
-        """Call the player and send its packets."""
-        core, packets = self.core, self._act(tick)
-        try:
-            if core.go is not None:
-                core.done(packets)
-            else:
-                core.send(packets, now_ns)
-        except PacketError as error:
-            raise PlayerError(f"{core.name} failed at tick {tick}: {error}") from error
+    def act(self, tick: int) -> list[Outgoing]:
+        """Call the player and check its packets and commands; commands are last, in the robots' name order.
 
-    def _act(self, tick: int) -> list[Outgoing]:
-        """Call the player and check its packets and commands; commands are last, in the robots' name order."""
-        assert self._player is not None and self._declaration is not None
-        where = f"{self.core.name} failed at tick {tick}"
+        Raises PlayerError for a player that fails, or gives an invalid command.
+        """
+        where = f"{self.name} failed at tick {tick}"
         try:
-            turn = self._player.act(tick, self.newest.samples)
+            turn = self.player.act(tick, self.newest.samples)
         except (KeyboardInterrupt, Unanswered):
             raise
         except BaseException as error:  # SystemExit, too: the run cannot continue without the player
-            raise failed(where, error, _module_of(self._declaration)) from error
+            raise failed(where, error, _module_of(self.declared)) from error
         if not isinstance(turn, Turn):
             turn = Turn(turn)
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
 
     def _packets(self, packets: object, where: str) -> list[Outgoing]:
         """Return the player's packets to others, and to its robots' channels."""
-        deployment, declared = self.core.deployment, self._declaration
-        assert deployment is not None and declared is not None
+        deployment, declared = self._deployment, self.declared
         if not isinstance(packets, Sequence) or not all(isinstance(packet, Outgoing) for packet in packets):
             raise PlayerError(f"{where}: a turn's packets are a {type(packets).__name__}, not a sequence of Outgoing")
         for packet in packets:
@@ -216,8 +166,7 @@ class PlayerLoop:
 
     def _commands(self, commands: object, where: str) -> list[Outgoing]:
         """Return a player's commands as packets, in the robots' name order."""
-        declared, encoder = self._declaration, self._encoder
-        assert declared is not None and encoder is not None
+        declared, encoder = self.declared, self._encoder
         if not isinstance(commands, Mapping):
             kind = type(commands).__name__
             raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to Commands")
@@ -232,6 +181,70 @@ class PlayerLoop:
             except Refused as error:
                 raise PlayerError(f"{where}: {error}") from error
         return packets
+
+
+class PlayerLoop:
+    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
+
+    def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
+        self.core = core
+        self.newest = Newest({})
+        self._load = load
+        self._acting: Acting | None = None
+        self._beat_ns = NEVER_NS
+        self._period_ns = 0
+
+    def step(self, now_ns: int) -> None:
+        """Advance: begin after the welcome, then act at each Go or period.
+
+        Raises PlayerError for a player that cannot be loaded, fails, or gives an invalid command.
+        """
+        core = self.core
+        if core.deployment is None or core.ended:
+            return
+        if self._acting is None:
+            self._begin(core.deployment, now_ns)
+        if core.go is not None:
+            self.newest.take(core.go.packets)
+            self._say(core.go.tick, now_ns)
+        elif self._period_ns:
+            self.newest.take(core.arrivals)
+            core.arrivals.clear()
+            if now_ns >= self._beat_ns and not core.is_away:
+                self._say(max(core.tick, 0), now_ns)
+                self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
+
+    @property
+    def player(self) -> Player | None:
+        """The player that acts; None before the welcome."""
+        return None if self._acting is None else self._acting.player
+
+    def deadline_ns(self) -> int:
+        """When a free-running player acts next."""
+        return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
+
+    def _begin(self, deployment: Deployment, now_ns: int) -> None:
+        acting = self._acting = Acting(deployment, self.core.name, self._load, self.core.tick)
+        self.newest, declared = acting.newest, acting.declared
+        if declared.lockstep:
+            period, offset = deployment.turns(declared)
+            self.core.join(period, acting.hears, offset, deployment.arrivals_of(acting.name))
+        else:
+            self.core.join(0, acting.hears)
+            self._period_ns = int(NS_PER_S / declared.rate_hz)
+            self._beat_ns = now_ns + self._period_ns
+
+    def _say(self, tick: int, now_ns: int) -> None:
+        """Call the player and send its packets."""
+        assert self._acting is not None
+        core, packets = self.core, self._acting.act(tick)
+        try:
+            if core.go is not None:
+                core.done(packets)
+            else:
+                core.send(packets, now_ns)
+        except PacketError as error:
+            raise PlayerError(f"{core.name} failed at tick {tick}: {error}") from error
 
 
 def _by_name(item: tuple[object, object]) -> str:

@@ -147,6 +147,11 @@ class Stepper:
             self._standing.wake_edited(frame, layout, numbers)
         return layout, numbers
 
+    @property
+    def waits(self) -> bool:
+        """Whether commands may wait in actuators for their tick."""
+        return bool(self._waiting)
+
     def deliver(
         self,
         packets: Sequence[Delivered],

@@ -157,6 +157,32 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
     assert len(lines) >= program.count("print(") >= 1
 
 
+@pytest.mark.parametrize(
+    ("name", "number", "shorter"),
+    [
+        ("docs/reference/learning.md", 0, {}),
+        ("docs/reference/learning.md", 1, {}),
+        ("docs/tutorials/learn_to_defend.md", 0, {"range(20)": "range(2)"}),
+        ("docs/tutorials/learn_to_defend.md", 1, {"GENERATIONS, SHOTS = 40, 16": "GENERATIONS, SHOTS = 1, 1"}),
+    ],
+)
+def test_the_code_of_learning_runs(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    number: int,
+    shorter: dict[str, str],
+) -> None:
+    """In a shorter form: fewer shots, and one generation."""
+    program = blocks(ROOT / name, "python")[number]
+    for written, run in shorter.items():
+        assert written in program
+        program = program.replace(written, run)
+    monkeypatch.chdir(ROOT)
+    exec(compile(program, name, "exec"), {"__name__": "__main__"})
+    assert len(capsys.readouterr().out.splitlines()) >= 1
+
+
 def test_a_players_declaration_is_valid() -> None:
     table = (ROOT / "deploy" / "table.yaml").read_text()
     classes = []

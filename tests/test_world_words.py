@@ -15,7 +15,7 @@ import pytest
 
 ROOT: Final = Path(__file__).parents[1]
 PACKAGES: Final = (
-    *("analysis", "capture", "cli", "client", "common", "console", "deployment", "launcher", "node"),
+    *("analysis", "capture", "cli", "client", "common", "console", "deployment", "launcher", "node", "painting"),
     *("process", "protocol", "rehearsal", "replay", "runtime", "supervisor", "vhub"),
 )
 ENDINGS: Final = {".py", ".js", ".ts", ".mjs", ".html", ".css"}

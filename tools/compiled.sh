@@ -24,8 +24,9 @@ rm -rf .venv-compiled
 # In a copy: what an earlier build left would be shipped, and nothing is left in this folder. Not the packages of npm that
 # an editor needs beside the page's sources: they are many, and nothing of them is shipped.
 mkdir .venv-compiled/source
+# Links are followed: a package has its deployment from deploy/ by one.
 # shellcheck disable=SC2086
-tar -cf - --exclude=node_modules --exclude=__pycache__ $folders $files | tar -xf - -C .venv-compiled/source
+tar -chf - --exclude=node_modules --exclude=__pycache__ $folders $files | tar -xf - -C .venv-compiled/source
 # How far it is goes to the terminal, all else to the log.
 (
     cd .venv-compiled/source

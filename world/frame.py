@@ -30,26 +30,49 @@ class Frame:
     """The world at the start of tick `tick`: `values` (float64, shape (layout.size,)) and outboxes by entity index."""
 
     def __init__(
-        self, tick: int, layout: Layout, values: NDArray[np.float64], outboxes: Mapping[int, bytes] | None = None
+        self,
+        tick: int,
+        layout: Layout,
+        values: NDArray[np.float64] | None,
+        outboxes: Mapping[int, bytes] | None = None,
+        *,
+        numbers: list[float] | None = None,
     ) -> None:
-        assert values.shape == (layout.size,), (values.shape, layout.size)
-        assert values.dtype == np.float64 and values.flags.c_contiguous
+        """Without `values`, the frame is of these `numbers`, which are then nobody else's.
+
+        Of both, what is not given is made when it is first asked for.
+        """
         self.tick = tick
         self.layout = layout
-        values.setflags(write=False)  # forms get it
-        self.values = values
+        self._values: NDArray[np.float64] | None = None
         self._numbers: list[float] | None = None
         self.outboxes: dict[int, bytes] = dict(sorted(outboxes.items())) if outboxes else {}
         self._digest = b""
+        if values is None:
+            assert numbers is not None and len(numbers) == layout.size, layout.size
+            self._numbers = numbers
+        else:
+            assert numbers is None
+            assert values.shape == (layout.size,), (values.shape, layout.size)
+            assert values.dtype == np.float64 and values.flags.c_contiguous
+            self.take(values)
 
     def take(self, values: NDArray[np.float64]) -> None:
         """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
-        values.setflags(write=False)
-        self.values, self._numbers, self._digest = values, None, b""
+        values.setflags(write=False)  # forms get it
+        self._values, self._numbers, self._digest = values, None, b""
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The values as an array that nobody may write to."""
+        if self._values is None:
+            self._values = np.array(self._numbers)
+            self._values.setflags(write=False)
+        return self._values
 
     @property
     def numbers(self) -> list[float]:
-        """The values as Python floats, made when they are first asked for; whoever edits copies the list first."""
+        """The values as Python floats; whoever edits copies the list first."""
         if self._numbers is None:
             self._numbers = self.values.tolist()
         return self._numbers

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from math import fsum, isfinite
+from struct import Struct
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
@@ -51,6 +52,7 @@ NO_TOUCHES: Final = TouchLog()
 BREAKING_THRESHOLD: Final = 0.02
 """As a share of a sphere's radius it is how far it may roll in a substep: more than the way after which it has
 lifted its last point of contact by as much as it falls, sqrt(2 g r) substeps."""
+_of_two_joints: Final = Struct("<4d").pack
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +181,8 @@ class BulletEngine:
         """Those that were touched in the tick."""
         self._logs: dict[str, tuple[float, float, float]] = {}
         self._touching: set[str] = set()
+        self._told: dict[str, bytes] = {}
+        """What the motors of each body with two joints were told last, to the bit: they follow it until told again."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -263,7 +267,7 @@ class BulletEngine:
         p.resetBasePositionAndOrientation(chain.body, self._parking[name], UPRIGHT, physicsClientId=client)
         for joint in chain.joints:
             p.resetJointState(chain.body, joint, 0.0, 0.0, physicsClientId=client)
-        self._motors_off(chain)
+        self._motors_off(name)
         p.changeDynamics(
             chain.body,
             -1,
@@ -282,7 +286,9 @@ class BulletEngine:
             physicsClientId=client,
         )
 
-    def _motors_off(self, chain: Chain) -> None:
+    def _motors_off(self, name: str) -> None:
+        chain = self._chains[name]
+        self._told.pop(name, None)
         p.setJointMotorControlArray(
             chain.body,
             chain.joints,
@@ -380,12 +386,18 @@ class BulletEngine:
                 if len(motors) == len(motors[0]) == len(motors[1]) == 2:  # takes a third of what zip does
                     (one, force), (other, torque) = motors
                     speeds, forces = (one, other), (force, torque)
+                    asked = _of_two_joints(one, other, force, torque)
                 elif any(len(motor) > 2 for motor in motors):
                     self._govern(name, chain, [Motor(*motor) for motor in motors])
                     continue
                 else:
                     speeds, forces = zip(*motors, strict=True)
-                drive(chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client)
+                    asked = b""
+                if not asked or self._told.get(name) != asked:
+                    drive(
+                        chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client
+                    )
+                    self._told[name] = asked
                 if 0.0 in forces:
                     self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
         self._idle.difference_update([entity.name for entity in entities])
@@ -396,6 +408,7 @@ class BulletEngine:
         Whether a free body can touch this one within the tick, or a joint come to its end, follows from the frame
         alone: it is the same whoever else is loaded.
         """
+        self._told.pop(name, None)
         forces: Sequence[float] = [motor.force for motor in motors]
         gains = [share_of(motor.slope, load, self._dt) for motor, load in zip(motors, chain.loads, strict=True)]
         if name in self._stops or self._may_be_touched(chain):
@@ -430,7 +443,7 @@ class BulletEngine:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""
         assert substeps == self._substeps, (substeps, self._substeps)
         for name in sorted(self._idle):  # else it would follow a command of an earlier tick
-            self._motors_off(self._chains[name])
+            self._motors_off(name)
             self._slack[name] = [place for _, _, _, place in self._chains[name].places]
         client = self._client
         governed, stops = list(self._governed.values()), list(self._stops.values())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -223,7 +223,7 @@ def test_a_node_that_is_asked_again_says_the_same_samples_and_measures_once(monk
     sensed: list[int] = []
     sense = Stepper.sense
 
-    def counted(self: Stepper, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
+    def counted(self: Stepper, frame: Frame, robots: Sequence[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         sensed.append(frame.tick)
         return sense(self, frame, robots)
 

@@ -60,6 +60,10 @@ class JointPositionActuator:
         """Return no bounds that are common to all joints: each has its own."""
         return {}
 
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Return the least and the greatest position of each joint."""
+        return tuple(zip(self._group.lows, self._group.highs, strict=True))
+
     def accept(self, command: JointPositions, view: WritableView) -> bool:
         """Take the set-points of all joints; one beyond its joint's limits refuses them."""
         return self._group.take(command.positions, self._group.lows, self._group.highs, view)

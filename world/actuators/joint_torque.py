@@ -37,6 +37,10 @@ class JointTorqueActuator:
         """Return no bounds that are common to all joints: each has its own."""
         return {}
 
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Return the least and the greatest effort of each joint."""
+        return tuple((-force, force) for force in self._group.forces)
+
     def accept(self, command: JointEfforts, view: WritableView) -> bool:
         """Take the efforts of all joints; one above its joint's greatest refuses them."""
         forces = self._group.forces

@@ -37,6 +37,10 @@ class JointVelocityActuator:
         """Return no bounds that are common to all joints: each has its own."""
         return {}
 
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Return the least and the greatest speed of each joint."""
+        return tuple((-speed, speed) for speed in self._group.speeds)
+
     def accept(self, command: JointVelocities, view: WritableView) -> bool:
         """Take the speeds of all joints; one above its joint's greatest refuses them."""
         speeds = self._group.speeds

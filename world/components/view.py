@@ -304,10 +304,11 @@ class Modifier(Protocol):
 class Actuator(Protocol):
     """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
 
-    A class may have two more methods: `unpowered()`, which returns what is asked of the motors of a robot without
-    power; where there is none, that is a speed of 0 with the force or acceleration of `command`. The static
-    `together(actuators)` returns an object whose `command(view)` gives what several ask, of robots that move by
-    kinematics, as an array of shape (actuators, motors, 2), with the same bits.
+    A class may have three more methods: `bounds()`, which returns the least and the greatest value of each number of a
+    command, where that is numbers whose fields have several each; `unpowered()`, which returns what is asked of the
+    motors of a robot without power; where there is none, that is a speed of 0 with the force or acceleration of
+    `command`. The static `together(actuators)` returns an object whose `command(view)` gives what several ask, of
+    robots that move by kinematics, as an array of shape (actuators, motors, 2), with the same bits.
     """
 
     def accept(self, command: Any, view: WritableView) -> bool:

@@ -1,0 +1,196 @@
+"""Readings and commands as vectors of numbers, for what learns: columns with names, units and limits.
+
+The columns are those of the declared sensors and actuators, in the order of (robot, channel), and within a channel
+those of its fields. Values are in SI units. Readings and commands that are not numbers, or not always as many, have no
+columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from math import inf, isfinite
+from struct import Struct
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.client.packets import Outgoing
+from foosim.client.player import Samples
+from foosim.common.errors import BadValue, UnknownName
+from foosim.deployment.schema import Deployment
+from foosim.protocol.messages import Received
+from foosim.world.components.fitted import FittedActuator, FittedSensor, actuators_of, sensors_of
+from foosim.world.forms.payloads import field_at
+from foosim.world.layout import build_layout
+
+Vector: TypeAlias = NDArray[np.float64]
+Pair: TypeAlias = tuple[str, str]
+"""A robot and a channel of it."""
+NEVER_S: Final = -1.0
+"""The age of a reading that has not come yet."""
+EVERYTHING: Final = ("*",)
+Bounds: TypeAlias = tuple[float, float]
+NO_BOUNDS: Final[Mapping[str, Bounds]] = {}
+
+
+class Column(NamedTuple):
+    """One number of a vector: whose it is, its field and unit, and the least and the greatest value."""
+
+    robot: str
+    channel: str
+    field: str
+    unit: str
+    low: float
+    high: float
+
+
+class _Part(NamedTuple):
+    """A channel's part of a vector."""
+
+    pair: Pair
+    fitted: Any
+    start: int
+    stop: int
+
+
+def numbers_in(one: FittedSensor | FittedActuator) -> int:
+    """Return how many numbers a reading or command has; 0 of one that is not numbers, or not always as many."""
+    made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
+    return len(made.bounds()) if not one.size and hasattr(made, "bounds") else one.size
+
+
+class _Table:
+    """The columns of some channels, and where each channel's are."""
+
+    def __init__(
+        self, fitted: Sequence[FittedSensor | FittedActuator], bounds: Mapping[str, Bounds] = NO_BOUNDS
+    ) -> None:
+        columns: list[Column] = []
+        self.parts: list[_Part] = []
+        for one in fitted:
+            made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
+            limits: Mapping[str, Bounds] = made.limits() if hasattr(made, "limits") else {}
+            each: Sequence[Bounds] = made.bounds() if hasattr(made, "bounds") else ()
+            start, size = len(columns), numbers_in(one)
+            for place in range(size):
+                field = field_at(one.codec.fields, size, place)
+                low, high = each[place] if each else limits.get(field.name, (-inf, inf))
+                name = f"{one.robot}/{one.channel}.{field.name}"
+                for least, most in [bounds[glob] for glob in bounds if fnmatchcase(name, glob)]:
+                    low, high = max(low, least), min(high, most)
+                columns.append(Column(one.robot, one.channel, field.name, field.unit, low, high))
+            self.parts.append(_Part((one.robot, one.channel), one, start, len(columns)))
+        self.columns = tuple(columns)
+        names = [f"{column.robot}/{column.channel}.{column.field}" for column in columns]
+        for glob, (least, most) in bounds.items():
+            if not any(fnmatchcase(name, glob) for name in names):
+                raise UnknownName("selects no robot/channel.field", glob, names)
+            if not least < most:
+                raise BadValue(f"bounds of {glob}: the first is below the second", (least, most))
+
+
+def chosen(pairs: Sequence[Pair], globs: Sequence[str]) -> list[Pair]:
+    """Return the (robot, channel) that globs of `robot/channel` select. Raises UnknownName for one that selects none.
+
+    `*` selects everything, also nothing.
+    """
+    names = {f"{robot}/{channel}": (robot, channel) for robot, channel in pairs}
+    for glob in globs:
+        if glob != "*" and not any(fnmatchcase(name, glob) for name in names):
+            raise UnknownName("selects no robot/channel", glob, names)
+    return [pair for name, pair in sorted(names.items()) if any(fnmatchcase(name, glob) for glob in globs)]
+
+
+class ReadingVector:
+    """Readings as a vector. With `ages`, the age in s of each channel's reading follows the readings: -1 before the
+    first one."""
+
+    def __init__(self, deployment: Deployment, pairs: Sequence[Pair], *, ages: bool = False) -> None:
+        """`pairs` are (robot, channel); those without columns are in `left_out`."""
+        layout = build_layout(deployment)
+        sensors = {
+            (name, one.channel): one
+            for name in sorted({name for name, _ in pairs if name in deployment.robots})
+            for one in sensors_of(deployment, layout, layout[name])
+        }
+        fitted = [sensors[pair] for pair in sorted(set(pairs)) if pair in sensors and numbers_in(sensors[pair])]
+        table = _Table(fitted)
+        self.pairs = tuple(part.pair for part in table.parts)
+        self.left_out = tuple(sorted(set(pairs) - set(self.pairs)))
+        aged = [Column(*pair, "age", "s", NEVER_S, inf) for pair in self.pairs] if ages else []
+        self.columns: tuple[Column, ...] = (*table.columns, *aged)
+        self.sizes = {part.pair: 8 * (part.stop - part.start) for part in table.parts}
+        """The bytes of a payload of each channel."""
+        self._codecs = [part.fitted.codec for part in table.parts]
+        self._nothing = [bytes(size) for size in self.sizes.values()]
+        self._ages = ages
+
+    def join(self, newest: Mapping[Pair, Received], now_ns: int) -> Vector:
+        """Return the vector of the newest packet of each channel, at a time (ns); 0 for what has not come."""
+        found = [newest.get(pair) for pair in self.pairs]
+        payloads = [nothing if one is None else one.payload for one, nothing in zip(found, self._nothing, strict=True)]
+        if not self._ages:
+            return np.frombuffer(b"".join(payloads)).copy()
+        ages = np.array([NEVER_S if one is None else (now_ns - one.sent_ns) * 1e-9 for one in found])
+        return np.concatenate((np.frombuffer(b"".join(payloads)), ages))
+
+    def of_samples(self, samples: Samples, now_ns: int) -> Vector:
+        """Return the vector of a player's samples, at a time (ns): equal to that of their payloads."""
+        newest = {}
+        for pair, codec in zip(self.pairs, self._codecs, strict=True):
+            sample = samples.get(pair)
+            if sample is not None:
+                payload = codec.encode(sample.value)
+                newest[pair] = Received(pair[0], sample.sequence, 0, pair[1], sample.sent_ns, sample.due_ns, payload)
+        return self.join(newest, now_ns)
+
+
+class CommandVector:
+    """Commands as a vector: one packet for each channel."""
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        robots: Sequence[str],
+        globs: Sequence[str] = EVERYTHING,
+        bounds: Mapping[str, Bounds] = NO_BOUNDS,
+    ) -> None:
+        """`globs` of `robot/channel` select among the actuators of these robots.
+
+        `bounds` are least and greatest values by globs of `robot/channel.field`, within the limits of the actuators.
+        Raises UnknownName for a glob that selects nothing, BadValue for bounds that are none.
+        """
+        layout = build_layout(deployment)
+        fitted = {
+            (name, one.channel): one
+            for name in sorted(set(robots))
+            for one in actuators_of(deployment, layout, layout[name])
+        }
+        table = _Table([fitted[pair] for pair in chosen([*fitted], globs) if numbers_in(fitted[pair])], bounds)
+        self.columns = table.columns
+        self._cuts = [(*part.pair, 8 * part.start, 8 * part.stop) for part in table.parts]
+        """The robot and channel of each packet, and its part of the vector's bytes."""
+        self._lows = [column.low for column in self.columns]
+        self._highs = [column.high for column in self.columns]
+        self._pack = Struct(f"<{len(self.columns)}d").pack
+
+    def packets(self, vector: Vector) -> list[Outgoing]:
+        """Return the commands of a vector as packets, in the order of (robot, channel).
+
+        Numbers beyond a column's limits are clipped to these. Raises BadValue for a vector of another shape, and for a
+        number that is not finite.
+        """
+        if vector.shape != (len(self.columns),):
+            raise BadValue(f"an action has {len(self.columns)} numbers, this one has the shape {vector.shape}")
+        numbers: list[float] = vector.tolist()
+        clipped = [
+            low if number < low else high if number > high else number
+            for number, low, high in zip(numbers, self._lows, self._highs, strict=True)
+        ]
+        if not all(map(isfinite, clipped)):
+            number, column = next(pair for pair in zip(clipped, self.columns, strict=True) if not isfinite(pair[0]))
+            raise BadValue(f"{column.field} of {column.robot} is not finite", number)
+        packed = self._pack(*clipped)  # as a codec packs numbers
+        return [Outgoing(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]

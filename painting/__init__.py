@@ -1,0 +1,1 @@
+"""Pictures of the world, made with numpy alone."""

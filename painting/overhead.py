@@ -1,0 +1,111 @@
+"""A frame from straight above, in parallel projection: a pure function of frame and scene, for any world.
+
+What is higher hides what is lower, by the greatest height of each shape. Boxes, spheres, cylinders and capsules have
+their exact outlines; a hull has that of its corners, a mesh that of its hull. What stands still is painted once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.painting.shapes import Shapes, View
+from foosim.world.frame import Frame
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import Entity, Layout
+from foosim.world.scene import ORIGIN, UPRIGHT, Body, Pose, Scene, Shape, enclosing, shape_box, swept_box
+
+Picture: TypeAlias = NDArray[np.uint8]
+Region: TypeAlias = tuple[float, float, float, float]
+"""The least x and y and the greatest x and y that are shown, in m."""
+BEYOND: Final = (24, 26, 30)
+"""What is painted where nothing is: dark grey."""
+STANDING_M: Final = 0.05
+"""Scenery that is lower is ground: it does not say what is shown."""
+MARGIN: Final = 1.02
+SIDE_M: Final = 10.0
+"""The side of what is shown of a world in which nothing stands."""
+
+
+class OverheadPainter:
+    """Paints the frames of one layout."""
+
+    def __init__(
+        self, scene: Scene, layout: Layout, pixels: tuple[int, int] = (320, 180), region: Region | None = None
+    ) -> None:
+        """`pixels` are width and height. `region` is shown whole; by default, what stands in the world is."""
+        width, height = pixels
+        low_x, low_y, high_x, high_y = _standing(scene) if region is None else region
+        scale = min(width / (high_x - low_x), height / (high_y - low_y))
+        left, top = (low_x + high_x) / 2 - width / 2 / scale, (low_y + high_y) / 2 + height / 2 / scale
+        self.view = View(width, height, scale, left, top)
+        self._moving: list[tuple[Body, Entity]] = []
+        moving: list[tuple[int, Shape]] = []
+        still: list[tuple[int, Shape]] = [(0, shape) for shape in scene.scenery]
+        poses: list[Pose] = [("", ORIGIN, UPRIGHT)]
+        links = 0
+        for name, body in scene.bodies.items():
+            if all(link.joint == "fixed" for link in body.links):
+                for number, link in enumerate(body.links, len(poses)):
+                    still += [(number, shape) for shape in link.shapes]
+                poses += forward_kinematics(body, layout[name], ())
+                continue
+            self._moving.append((body, layout[name]))
+            for number, link in enumerate(body.links, links):
+                moving += [(number, shape) for shape in link.shapes]
+            links += len(body.links)
+        self._shapes = Shapes(moving) if moving else None
+        self._ground: Picture = np.empty((height * width, 3), np.uint8)
+        self._ground[:] = BEYOND
+        self._heights = np.full(height * width, -np.inf, np.float32)
+        self._paint_still(still, poses)
+
+    def _paint_still(self, still: Sequence[tuple[int, Shape]], poses: Sequence[Pose]) -> None:
+        """Paint what stands still, one shape after the other, since sizes differ."""
+        found = [Shapes([one]).covered(poses, self.view) for one in still]
+        for one in sorted(found, key=lambda one: float(one.heights[0]) if len(one.heights) else 0.0):
+            self._ground[one.places] = one.colours
+            self._heights[one.places] = one.heights
+
+    def pixel(self, x: float, y: float) -> tuple[int, int]:
+        """Return column and row of the pixel that shows a place (m), whether it is within the picture or not."""
+        view = self.view
+        return floor((x - view.left) * view.scale), floor((view.top - y) * view.scale)
+
+    def paint(self, frame: Frame) -> Picture:
+        """Return the picture of a frame of the layout: uint8, of the shape (height, width, 3), red, green and blue.
+
+        The world's x is to the right, its y up.
+        """
+        picture = self._ground.copy()
+        if self._shapes is not None:
+            numbers = frame.numbers
+            poses: list[Pose] = []
+            for body, entity in self._moving:
+                poses += forward_kinematics(body, entity, numbers)
+            covered = self._shapes.covered(poses, self.view)
+            seen = covered.heights >= self._heights[covered.places]
+            picture[covered.places[seen]] = covered.colours[seen]
+        return picture.reshape(self.view.height, self.view.width, 3)
+
+
+def _standing(scene: Scene) -> Region:
+    """Return the region of what stands, with a margin: scenery above the ground, else bodies on fixed bases."""
+    boxes = [shape_box(shape) for shape in scene.scenery]
+    boxes = [box for box in boxes if box[1][2] > STANDING_M]
+    if not boxes:
+        boxes = [swept_box(body) for body in scene.bodies.values() if not body.is_free and _has_shapes(body)]
+    if not boxes:
+        return -SIDE_M / 2, -SIDE_M / 2, SIDE_M / 2, SIDE_M / 2
+    (low_x, low_y, _), (high_x, high_y, _) = enclosing(boxes)
+    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+    across, along = (max(side * MARGIN / 2, STANDING_M) for side in (high_x - low_x, high_y - low_y))
+    return x - across, y - along, x + across, y + along
+
+
+def _has_shapes(body: Body) -> bool:
+    return any(link.shapes for link in body.links)

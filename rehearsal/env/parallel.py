@@ -1,0 +1,97 @@
+"""A deployment as a PettingZoo `ParallelEnv`: each agent acts at each step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from foosim.client.vectors import Column
+from foosim.common.errors import UnknownName
+from foosim.deployment.schema import Deployment
+from foosim.rehearsal.env.episodes import Episodes
+from foosim.rehearsal.env.single import RENDER_MODES, check_render_mode
+from foosim.rehearsal.env.spaces import box_of
+from foosim.rehearsal.simulation import Simulation
+
+Actions = Mapping[str, NDArray[np.float64]]
+Infos = dict[str, dict[str, Any]]
+
+
+class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64]]):  # type: ignore[misc]
+    """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
+
+    `infos` have the tick and the simulated time (`tick`, `time_s`).
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"name": "foosim", "render_modes": RENDER_MODES, "is_parallelizable": True}
+
+    def __init__(
+        self, deployment: Deployment | str | Path, *, render_mode: str | None = None, **arguments: Any
+    ) -> None:
+        """The arguments are those of `parallel_env`."""
+        check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self._episodes = Episodes(deployment, **arguments)
+        self.possible_agents = list(self._episodes.agents)
+        self.agents: list[str] = []
+        of_all = {name: self._episodes.columns(name) for name in self.possible_agents}
+        self.observation_spaces = {name: box_of(columns[0]) for name, columns in of_all.items()}
+        self.action_spaces = {name: box_of(columns[1]) for name, columns in of_all.items()}
+
+    @property
+    def simulation(self) -> Simulation:
+        """What is stepped: the frame, the tick, the score."""
+        return self._episodes.simulation
+
+    def columns(self, agent: str) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+        """Return what the numbers of an agent's observations and actions are. Raises UnknownName."""
+        if agent not in self.possible_agents:
+            raise UnknownName("no agent", agent, self.possible_agents)
+        return self._episodes.columns(agent)
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """Return the space of an agent's observations."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Box:
+        """Return the space of an agent's actions."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[np.float64]], Infos]:
+        """Begin an episode. The option `start` is a frame to begin with: a `Start`, or `CAPTURE@12.5s`."""
+        found = self._episodes.reset(seed, options)
+        self.agents = list(self.possible_agents)
+        return found, self._infos()
+
+    def step(
+        self, actions: Actions
+    ) -> tuple[dict[str, NDArray[np.float64]], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Take an action of each agent; return observations, rewards, terminations, truncations and infos."""
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        found = self._episodes.step(actions)
+        agents = self.possible_agents
+        ends = dict.fromkeys(agents, found.is_over), dict.fromkeys(agents, found.is_cut)
+        if found.is_over or found.is_cut:
+            self.agents = []
+        return found.observations, found.rewards, *ends, self._infos()
+
+    def _infos(self) -> Infos:
+        simulation = self.simulation
+        return {name: {"tick": simulation.tick, "time_s": simulation.time_s} for name in self.possible_agents}
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the present frame from above, with `render_mode="rgb_array"`: uint8, (height, width, 3)."""
+        return self._episodes.paint() if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Free the engines."""
+        self._episodes.close()

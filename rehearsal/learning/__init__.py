@@ -1,0 +1,1 @@
+"""Training of the player that comes with foosim: a shot is defended."""
