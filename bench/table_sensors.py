@@ -1,8 +1,9 @@
 """The table with all sensors of its rods and its ball, in one process: what they cost, in multiples of b.
 
-A rehearsal on one node without a capture, on Bullet, with a player a team that hears what it subscribes to and sends
-nothing. A rehearsal does the same each time, so each tick has a least time over some repeats, and what else the machine
-does is left out; b, measured by turns with them, is had likewise. Figures are means over the ticks.
+A rehearsal on one node without a capture, on Bullet, with the passive player for each team, which hears what it
+subscribes to and sends nothing. A rehearsal does the same each time, so each tick has a least time over some repeats,
+and what else the machine does is left out; b, measured by turns with them, is had likewise. Figures are means over the
+ticks.
 """
 
 from __future__ import annotations
@@ -13,12 +14,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 from bench.bare_tick import BareTable
 from bench.runs import TABLE, BenchError
-from foosim.client.player import Samples, Turn
-from foosim.deployment.schema import Deployment
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.runtime.roles.loop import collect_seldom
@@ -30,19 +29,9 @@ OF_RODS: Final = ("encoder", "counts", "state", "current", "touch")
 OF_CAMERA: Final = ("ball", "exact", "tracked", "late")
 TEAMS: Final = ("red", "blue")
 LINES: Final = ("goal", "defence", "midfield", "attack")
+PASSIVE: Final = "foosim.players.football:Passive"
 WARM_TICKS: Final = 100
 REPEATS: Final = 7
-
-
-class Silent:
-    """A player that hears, and moves nothing."""
-
-    def __init__(self, deployment: Deployment, parameters: dict[str, Any]) -> None:
-        """Whatever it plays on."""
-
-    def act(self, tick: int, samples: Samples) -> Turn:
-        """Return no commands."""
-        return Turn({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +44,11 @@ class Sensed:
 
 
 def players(of_rods: Sequence[str], of_camera: Sequence[str]) -> str:
-    """Return the setting by which a silent player of each team hears these channels of its rods and of the camera."""
+    """Return the setting by which a passive player of each team hears these channels of its rods and of the camera."""
     made = {
         f"player-{team}": {
-            "class": f"{Silent.__module__}:{Silent.__qualname__}",
+            "class": PASSIVE,
+            "parameters": {"team": team},
             "rate": "100 Hz",
             "lockstep": True,
             "robots": {**{f"{team}.{line}": [*of_rods] for line in LINES}, "camera": [*of_camera]},

@@ -76,8 +76,7 @@ def check_certificates(plan: Plan) -> list[str]:
     started = [
         process
         for process in plan.processes.values()
-        if not {*process.roles} & {*elsewhere}
-        and all(deployment.launch_of(role) == "local" for role in process.roles)
+        if not {*process.roles} & {*elsewhere} and all(deployment.launch_of(role) == "local" for role in process.roles)
     ]
     everybody = [who for process in started for who in identity.of_process(process, deployment)]
     found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]

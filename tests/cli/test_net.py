@@ -49,6 +49,7 @@ def command(typed: Typed) -> Command:
 
 def text_of(**network: Any) -> str:
     content = yaml.safe_load(TABLE.read_text())
+    content["robots"]["camera"]["sensors"]["ball"]["modifiers"] = []  # it gives its first picture at tick 0
     content |= {"engine": "pure", "network": {**NETWORK, **network}, "scenery": {"wall": WALL}}
     return yaml.safe_dump(content)
 

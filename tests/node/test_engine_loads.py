@@ -19,6 +19,7 @@ from foosim.protocol.messages import Part
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
+from foosim.world.actuators.rod_position import PositionActuator
 from foosim.world.layout import Entity, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -62,7 +63,9 @@ def counted(nodes: int) -> tuple[Rehearsed, dict[str, list[set[str]]], dict[str,
             mine = loads.setdefault(name, [])
             solver._factory = lambda deployment, layout, mine=mine: Counting(deployment, layout, mine)
 
-    result = rehearse(TABLE.read_text(), TABLE.name, TICKS, nodes, SETS, Settings(observer=watch), prepare=prepare)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PositionActuator, "steady", False)  # a rod that stands would not be loaded
+        result = rehearse(TABLE.read_text(), TABLE.name, TICKS, nodes, SETS, Settings(observer=watch), prepare=prepare)
     assert result.json["ticks"] == TICKS
     return result, {name: mine[FINGERPRINT_TICKS:] for name, mine in loads.items()}, solved
 

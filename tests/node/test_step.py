@@ -35,11 +35,13 @@ REST: Final = (0.0, 0.0, 0.0)
 
 
 def in_play(layout: Layout = LAYOUT, tick: int = 7) -> Frame:
-    """A frame in which the ball rolls and a rod turns, so that nothing is zero by chance."""
+    """A frame in which the ball rolls and a rod turns, so that nothing is zero by chance; the match is over, so that no
+    clock counts."""
     numbers = initial_numbers(DEPLOYMENT, layout)
     for number, ball in enumerate(layout.of("ball")):
         place_ball(numbers, ball, (0.2 - 0.1 * number, 0.1, 0.0175), (-1.5, 0.3, 0.0))
     numbers[layout["red.goal"].offsets["joint_velocities"]] = 0.4
+    numbers[layout["world"].offsets["football.is_over"]] = 1.0
     return Frame(tick, layout, np.array(numbers))
 
 

@@ -195,8 +195,8 @@ def test_a_form_is_named_as_deployments_do() -> None:
 
 
 WRONG: Final = {
-    "encodr": "table.yaml uses no form called this (there are: ball, camera, encoder, football, gaussian_noise, "
-    "pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
+    "encodr": "table.yaml uses no form called this (there are: ball, camera, delay, encoder, football, "
+    "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
     "foosim.world.models.rod:Rot": "uses no form called this (there are: actuator rod_position, ",

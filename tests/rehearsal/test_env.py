@@ -126,11 +126,14 @@ def test_readings_and_commands_are_those_that_are_chosen() -> None:
         ("blue.goal", "spin", "rad"),
     ]
     seen, infos = env.reset(seed=1)
-    assert seen["player-blue"][3] == 0.0 and infos["player-blue"] == {"tick": 0, "time_s": 0.0}
+    assert seen["player-blue"][3] == -1.0 and infos["player-blue"] == {"tick": 0, "time_s": 0.0}
+    seen, *_ = env.step({})
+    assert seen["player-blue"][3] == 0.0, "the camera gives its first picture 10 ms late"
     env.close()
     late = parallel_env(TABLE, network=True, readings=["camera/*"], ages=True)
     seen, _ = late.reset(seed=1)
     assert seen["player-red"].tolist() == [0.0, 0.0, 0.0, -1.0], "nothing has come yet"
+    late.step({})
     seen, *_ = late.step({})
     assert 0.002 <= seen["player-red"][3] <= 0.01
     late.close()

@@ -127,7 +127,7 @@ def test_what_a_person_sees() -> None:
 
 
 def test_a_deployment_without_players_has_one_agent_who_commands_all() -> None:
-    with Simulation(TABLE, sets=["players={}"]) as simulation:
+    with Simulation(TABLE, sets=["players={}", "robots.camera.sensors.ball.modifiers=[]"]) as simulation:
         assert [*simulation.agents] == [LEARNER]
         assert len(simulation.step({"blue.attack": Command(0.01, 0.0)})) == 9
 

@@ -393,13 +393,14 @@ def altered_node(house: House, change: str, name: str, address: str) -> tuple[in
     return done.returncode, done.stderr
 
 
-def test_a_run_waits_for_a_node_that_is_started_by_hand_and_ends_in_order_when_a_required_one_is_lost(
-    house: House,
-) -> None:
-    up = house.up("--json", "--set", "nodes.blue.launch=manual", "--set", "nodes.red.required=true")
+def test_a_run_waits_for_what_is_started_by_hand_and_ends_in_order_when_a_required_node_is_lost(house: House) -> None:
+    by_hand = ("nodes.blue.launch=manual", "players.player-blue.launch=manual", "players.player-blue.process=null")
+    up = house.up("--json", *(f"--set={one}" for one in (*by_hand, "nodes.red.required=true")), players=True)
     line = house.read_until(up.stderr, "waiting for node blue; start it on its machine: ")
     command = line.split(": ", 1)[1].split()
     assert command[:4] == ["foosim-node", "--name", "blue", "--connect"]
+    line = house.read_until(up.stderr, "waiting for player player-blue; start it in a terminal of its own: ")
+    player = house.start(*line.split(": ", 1)[1].split())
     house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")
     other_cpu = "from foosim.node import main; main.library_fingerprint = lambda: bytes(32)"
     code, err = altered_node(house, other_cpu, "blue", command[4])
@@ -407,8 +408,9 @@ def test_a_run_waits_for_a_node_that_is_started_by_hand_and_ends_in_order_when_a
     blue = house.start(*command)
     house.ticking(5)
     house.kill("red")
-    code, _, err = house.end(blue)
-    assert code == 0, err
+    for ours in (blue, player):
+        code, _, err = house.end(ours)
+        assert code == 0, err
     code, out, err = house.end(up)
     assert code == 1 and f"the run has ended: lost red: {CLOSED}" in err, err
     content = last_json(out)

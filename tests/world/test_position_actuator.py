@@ -15,12 +15,13 @@ from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
 from foosim.world.actuators.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
-from foosim.world.assembly.world import initial_numbers
+from foosim.world.assembly.world import body_of, initial_numbers
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import View, WritableView
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
+from foosim.world.scene import load_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -111,7 +112,13 @@ def test_the_loop_is_proportional_and_limited(wants: tuple[float, float], positi
     numbers[at : at + 2] = position
     assert takes(Command(*wants), numbers)
     (slide, force), (spin, torque) = fitted().actuator.command(View(0, numbers))
-    assert (force, torque) == (DRIVE.slide.force, DRIVE.spin.torque)
+    rod = body_of(DEPLOYMENT, LAYOUT, ROD)
+    slid, spun = DRIVE.slide, DRIVE.spin
+    assert slid.acceleration is not None and spun.acceleration is not None
+    assert force == min(slid.force, slid.acceleration * load_of(rod, 0)) == slid.force
+    assert torque == min(spun.torque, spun.acceleration * load_of(rod, 1)) < spun.torque, (
+        "a rod with one figure is light"
+    )
     for speed, gain, limit, error in (
         (slide, DRIVE.slide.gain, DRIVE.slide.speed, wants[0] - position[0]),
         (spin, DRIVE.spin.gain, DRIVE.spin.speed, wants[1] - position[1]),

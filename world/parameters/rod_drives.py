@@ -14,9 +14,9 @@ from typing import Annotated
 from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
-from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting
 from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.moving.upright import made_model
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import load_of
 
@@ -81,7 +81,7 @@ class RodLimits:
     """
 
     def __init__(self, at: Mounting) -> None:
-        table, body = table_of(at.spec), body_at(at)
+        table, body = table_of(at.spec), made_model(at.spec, at.layout, at.robot).body()
         drive = table.drive
         self.loads = load_of(body, SLIDE), load_of(body, SPIN)
         """The mass (kg) and the moment of inertia (kg m2) that the motors accelerate."""
