@@ -8,11 +8,11 @@ from typing import ClassVar
 from msgspec import Struct
 
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import NewtonMetres, Newtons
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.parameters.rod_drives import RodLimits
+from foosim.world.parameters.rod_drives import RodLimits, RodSetPoint
 
 
 class RodForceSettings(ActuatorSettings):
@@ -27,38 +27,15 @@ class RodForce(Struct, frozen=True):
 
 
 @actuator("rod_force", RodForceSettings, RodForce, slots={"set_point": 2}, needs=("joint_positions",), kit="table")
-class ForceActuator:
+class ForceActuator(RodSetPoint):
     """Motors that give the force and the torque that they were told last, up to their greatest speeds."""
 
-    steady: ClassVar = True
-    """What it asks follows from the state of its rod alone."""
+    stirs: ClassVar = (0.1, 0.1)
 
     def __init__(self, settings: RodForceSettings, at: Mounting) -> None:
         limits = RodLimits(at)
-        self._set_point = at.slot("set_point")
+        super().__init__(at, limits.forces)
         self._speeds, self._forces = limits.speeds, limits.forces
-
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest force (N) and torque (N m) that are accepted."""
-        slide, spin = self._forces
-        return {"slide": (-slide, slide), "spin": (-spin, spin)}
-
-    def accept(self, command: RodForce, view: WritableView) -> bool:
-        """Take a force and a torque; what is out of its limits is refused."""
-        slide, spin = self._forces
-        if abs(command.slide) > slide or abs(command.spin) > spin:
-            return False
-        view.write(self._set_point, command.slide, command.spin)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Let the rod go."""
-        view.write(self._set_point, 0.0, 0.0)
-
-    def stir(self, view: WritableView) -> None:
-        """Push and turn, for the small run that tells engines apart."""
-        slide, spin = self._forces
-        view.write(self._set_point, 0.1 * slide, 0.1 * spin)
 
     def command(self, view: View) -> Motors:
         """Return the greatest speed in the direction of each effort, and the effort, of slide and spin, in SI units."""

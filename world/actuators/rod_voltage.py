@@ -7,16 +7,14 @@ table's computer sends to its amplifiers can be sent here.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from msgspec import Struct
 
 from foosim.world.components.entities import Motors
 from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Volts
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.rod_drives import RodLimits, RodVoltageSettings
+from foosim.world.parameters.rod_drives import RodLimits, RodSetPoint, RodVoltageSettings
 
 
 class RodVoltages(Struct, frozen=True):
@@ -29,16 +27,12 @@ class RodVoltages(Struct, frozen=True):
 @actuator(
     "rod_voltage", RodVoltageSettings, RodVoltages, slots={"set_point": 2}, needs=("joint_positions",), kit="table"
 )
-class VoltageActuator:
+class VoltageActuator(RodSetPoint):
     """Motors with the voltages that they were told last; a dead time is the modifier `delay`."""
-
-    steady: ClassVar = True
-    """What it asks follows from the state of its rod alone."""
 
     def __init__(self, settings: RodVoltageSettings, at: Mounting) -> None:
         slide, spin = settings.slide, settings.spin
-        self._set_point = at.slot("set_point")
-        self._volts = slide.voltage, spin.voltage
+        super().__init__(at, (slide.voltage, spin.voltage))
         self._emf = slide.back_emf, spin.back_emf
         along, around = settings.constants
         self._forces = along * slide.current, around * spin.current
@@ -53,28 +47,6 @@ class VoltageActuator:
             if voltage / emf > most:
                 what = f"{voltage / emf:g} {unit} without a load, more than table.drive.{axis}.speed, {most:g} {unit}"
                 raise Misfit((axis, "voltage"), what, f"{voltage:g} V")
-
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest voltages that are accepted."""
-        slide, spin = self._volts
-        return {"slide": (-slide, slide), "spin": (-spin, spin)}
-
-    def accept(self, command: RodVoltages, view: WritableView) -> bool:
-        """Take voltages; those that are out of their limits are refused."""
-        slide, spin = self._volts
-        if abs(command.slide) > slide or abs(command.spin) > spin:
-            return False
-        view.write(self._set_point, command.slide, command.spin)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Short the motors, which brakes them."""
-        view.write(self._set_point, 0.0, 0.0)
-
-    def stir(self, view: WritableView) -> None:
-        """Slide and turn, for the small run that tells engines apart."""
-        slide, spin = self._volts
-        view.write(self._set_point, 0.1 * slide, 0.5 * spin)
 
     def command(self, view: View) -> Motors:
         """Return of slide and spin, in SI units: the speed without a load, the force of the greatest current, and by

@@ -9,12 +9,12 @@ the speed by b = k_t k_e / R, to 0 at u / k_e.
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated
+from typing import Annotated, ClassVar, Protocol
 
 from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
-from foosim.world.components.view import Mounting
+from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.upright import made_model
 from foosim.world.parameters.table import table_of
@@ -92,3 +92,47 @@ class RodLimits:
             min(drive.slide.force, self.loads[SLIDE] * most[SLIDE]),
             min(drive.spin.torque, self.loads[SPIN] * most[SPIN]),
         )
+
+
+class RodCommand(Protocol):
+    """A command of two numbers, one for each motor of a rod."""
+
+    @property
+    def slide(self) -> float: ...
+
+    @property
+    def spin(self) -> float: ...
+
+
+class RodSetPoint:
+    """What the last command asked of a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
+
+    steady: ClassVar = True
+    """What it asks follows from the state of its rod alone."""
+    stirs: ClassVar = (0.1, 0.5)
+    """Shares of the bounds that `stir` asks for."""
+
+    def __init__(self, at: Mounting, bounds: tuple[float, float]) -> None:
+        """`bounds` are the greatest numbers of slide and spin in either direction, in the units of the command."""
+        self._set_point, self._bounds = at.slot("set_point"), bounds
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest numbers that are accepted."""
+        slide, spin = self._bounds
+        return {"slide": (-slide, slide), "spin": (-spin, spin)}
+
+    def accept(self, command: RodCommand, view: WritableView) -> bool:
+        """Take both numbers; what is out of its bounds is refused."""
+        slide, spin = self._bounds
+        if abs(command.slide) > slide or abs(command.spin) > spin:
+            return False
+        view.write(self._set_point, command.slide, command.spin)
+        return True
+
+    def hold(self, view: WritableView) -> None:
+        """Ask for nothing: a speed of 0, no force, or motors that are shorted, which brakes them."""
+        view.write(self._set_point, 0.0, 0.0)
+
+    def stir(self, view: WritableView) -> None:
+        """Slide and turn, for the small run that tells engines apart."""
+        view.write(self._set_point, *[share * most for share, most in zip(self.stirs, self._bounds, strict=True)])
