@@ -79,10 +79,10 @@ class Hand:
         self._waiting = waiting
         self._shots = Shots(rod)
 
-    def move(self, sight: Sight, now_s: float, goal: tuple[float, float], reach_s: float) -> Command:
-        """Return the rod's next command."""
+    def move(self, sight: Sight, arrives_s: float, goal: tuple[float, float]) -> Command:
+        """Return the rod's next command, which is there at `arrives_s`."""
         ball = self.rod.stopped(sight)
-        return self._shots.strike(ball, sight, now_s, goal, reach_s) or self._wait(ball)
+        return self._shots.strike(ball, sight, arrives_s, goal) or self._wait(ball)
 
     def _wait(self, ball: View) -> Command:
         rod = self.rod
@@ -109,9 +109,15 @@ class Playing:
         sight = self._senses.see(tick, samples)
         if sight is None:
             return {}
-        now_s, reach_s = tick * self._tick_ns * 1e-9, self._senses.reach_ns * 1e-9
+        arrives = tick + self._senses.reach_ticks
         goal = (self._goal_u, self._aim(tick))
-        return {hand.rod.name: hand.move(sight, now_s, goal, reach_s) for hand in self._hands if hand.rod.seen}
+        commands: dict[str, Command] = {}
+        for hand in self._hands:
+            if hand.rod.seen:
+                command = hand.move(sight, arrives * self._tick_ns * 1e-9, goal)
+                hand.rod.tell(command, arrives)
+                commands[hand.rod.name] = command
+        return commands
 
     def _aim(self, tick: int) -> float:
         """Return the y at which shots aim in this quarter of a second: a keyed draw, so that nobody can tell."""

@@ -11,15 +11,16 @@ from typing import Final, NamedTuple
 
 from foosim.deployment.schema import Deployment
 from foosim.players.table.ball_filter import Ball, Room, moved, room_of
+from foosim.players.table.motors import Motion, Motors
 from foosim.world.actuators.rod_position import Command
+from foosim.world.components.entities import mounting_of
+from foosim.world.layout import Layout
 from foosim.world.models.rod import RodRobot, figure_ys
+from foosim.world.parameters.rod_drives import RodLimits
 from foosim.world.parameters.table import table_of
 from foosim.world.sensors.encoder import RodPosition
 
 TURN: Final = 2.0 * pi
-SPIN_UP: Final = 6e3
-"""rad/s2 with which the heaviest rod begins to turn: 2 N m on 3e-4 kg m2."""
-STEP_S: Final = 0.001
 SWING_S_MAX: Final = 0.1
 CLEAR_M: Final = 0.004
 """Beyond this distance beside or behind a ball a foot does not touch it: what noise and delay leave uncertain."""
@@ -67,9 +68,13 @@ class Sight(NamedTuple):
 
 
 class Rod:
-    """One rod of a player: its state, its geometry, and its possible movements."""
+    """One rod of a player: its state, its geometry, and its possible movements.
 
-    def __init__(self, deployment: Deployment, name: str, robot: RodRobot, side: float) -> None:
+    `slide` (m), `swing` (rad) and `turning` (rad/s) are those of its newest reading, or of the tick that was foreseen
+    since.
+    """
+
+    def __init__(self, deployment: Deployment, layout: Layout, robot: RodRobot, name: str, side: float) -> None:
         table = table_of(deployment)
         line = table.lines[robot.line]
         self.name = name
@@ -78,6 +83,7 @@ class Rod:
         """x of its axis, in the team's view."""
         self.slide = 0.0
         self.swing = 0.0
+        self.turning = 0.0
         self.seen = False
         self.foot_y = table.rod.foot.width / 2
         self.ball_radius = table.ball.radius
@@ -91,15 +97,25 @@ class Rod:
         """How far a lying ball's centre is below the axis."""
         self._foot_radius = table.rod.foot_radius
         self._foot_x = table.rod.foot.length / 2
-        self._spin_speed = table.drive.spin.speed
+        self._motors = Motors(table.drive, RodLimits(mounting_of(deployment, layout, layout[name])), deployment.tick_ns)
         self.reach = hypot(self._foot_radius, self._foot_x) + table.ball.radius
         """From the axis to the centre of a ball that a turning foot just touches."""
 
-    def see(self, position: RodPosition) -> None:
-        """Take a reading of its encoder."""
+    def see(self, position: RodPosition, tick: int) -> None:
+        """Take a reading of its encoder, of a tick."""
         self.seen = True
-        self.slide = position.slide
-        self.swing = -self._side * position.spin
+        self._motors.see(tick, position.slide, position.spin)
+        self.foresee(tick)
+
+    def foresee(self, tick: int) -> None:
+        """Set its state to that of a tick to come, by what it was told."""
+        slide, spin = self._motors.at(tick)
+        self.slide = slide.at
+        self.swing, self.turning = -self._side * spin.at, -self._side * spin.speed
+
+    def tell(self, command: Command, tick: int) -> None:
+        """Note that a command was sent which moves it from a tick on."""
+        self._motors.tell(tick, command.slide, command.spin)
 
     def command(self, slide: float, swing: float) -> Command:
         """Return the command for a slide and a swing in the team's view."""
@@ -115,6 +131,10 @@ class Rod:
             if cost < best_cost:
                 best, best_cost = slide, cost
         return best
+
+    def reaches(self, y: float) -> bool:
+        """Whether its stroke brings a figure to `y`."""
+        return any(abs(y - figure) <= self.half_stroke for figure in self._figures)
 
     def contact(self, ahead: float) -> float | None:
         """Return the swing at which the front of a foot meets a ball that lies `ahead` of the axis (m).
@@ -132,14 +152,9 @@ class Rod:
         between = (edge * edge + distance * distance - self.ball_radius * self.ball_radius) / (2.0 * edge * distance)
         return angle - acos(min(between, 1.0)) - atan2(self._foot_x, self._foot_radius)
 
-    def swing_s(self, start: float, contact: float, speed: float) -> float:
+    def swing_s(self, start: Motion, contact: float, speed: float) -> float:
         """Return how long a foot takes from `start` to `contact` (rad), which it passes at `speed` (rad/s)."""
-        aim, swing, turning, time_s = contact + speed / self.spin_gain, start, 0.0, 0.0
-        while swing < contact and time_s < SWING_S_MAX:
-            turning = min(turning + SPIN_UP * STEP_S, self.spin_gain * (aim - swing), self._spin_speed)
-            swing += turning * STEP_S
-            time_s += STEP_S
-        return time_s
+        return self._motors.spin.reaches_s(start, contact, contact + speed / self.spin_gain, SWING_S_MAX)
 
     def within_turn(self) -> float:
         """Return its swing within half a turn of feet down."""

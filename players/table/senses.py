@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import TYPE_CHECKING, Any, Final
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.table.ball_filter import Ball, BallTrack
 from foosim.players.table.rod import Rod, Sight, View
+from foosim.world.layout import build_layout
 from foosim.world.models.rod import RodRobot
 from foosim.world.modifiers.delay import delay_ns
 from foosim.world.parameters.table import TEAMS, LineName
@@ -41,8 +43,9 @@ def side_of(team: str) -> float:
 
 def rods_of(deployment: Deployment, team: str, lines: Sequence[LineName]) -> list[Rod]:
     """Return the rods of some lines of a team, in the order of the lines."""
+    layout = build_layout(deployment)
     rods = {
-        robot.line: Rod(deployment, name, robot, side_of(team))
+        robot.line: Rod(deployment, layout, robot, name, side_of(team))
         for name, robot in sorted(deployment.robots.items())
         if isinstance(robot, RodRobot) and robot.team == team
     }
@@ -75,12 +78,9 @@ class Senses:
     def see(self, tick: int, samples: Samples) -> Sight | None:
         """Return the ball, as it will be when a command that is sent now reaches a rod; None before it was seen.
 
-        A command is taken to be on its way for as long as pictures are, and for the tick that it waits for.
+        The rods that were heard are set to that tick, too. A command is taken to be on its way for as long as pictures
+        are.
         """
-        for pair, rod in self._encoders.items():
-            sample = samples.get(pair)
-            if sample is not None and isinstance(sample.value, RodPosition):
-                rod.see(sample.value)
         for pair, latency_ns in self._cameras.items():
             sample = samples.get(pair)
             if sample is not None and isinstance(sample.value, BallPosition):
@@ -90,17 +90,25 @@ class Senses:
                     self._newest_ns = sample.sent_ns
                     self._link_ns += share * (late_ns - self._link_ns)
                 self._track.take(sample.sent_ns - latency_ns, sample.value)
+        self._see_rods(tick, samples)
         if not self._track.known:
             return None
         track = self._track
-        ball = self._view(track.at(tick * self._tick_ns + int(self.reach_ns)))
+        ball = self._view(track.at((tick + self.reach_ticks) * self._tick_ns))
         return Sight(ball, self._view(track.ball), track.is_steady, track.height)
+
+    def _see_rods(self, tick: int, samples: Samples) -> None:
+        for pair, rod in self._encoders.items():
+            sample = samples.get(pair)
+            if sample is not None and isinstance(sample.value, RodPosition):
+                rod.see(sample.value, sample.sent_ns // self._tick_ns)
+                rod.foresee(tick + self.reach_ticks)
 
     def _view(self, ball: Ball) -> View:
         x, y, vx, vy, z = ball
         return View(self._side * x, y, self._side * vx, vy, z)
 
     @property
-    def reach_ns(self) -> float:
-        """How long a command takes to a rod."""
-        return self._link_ns + self._tick_ns
+    def reach_ticks(self) -> int:
+        """After how many ticks a command moves a rod: in the first one that begins when it is there."""
+        return max(ceil(self._link_ns / self._tick_ns), 1)

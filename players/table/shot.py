@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import atan2, sin
 from typing import Final
 
+from foosim.players.table.motors import Motion
 from foosim.players.table.rod import TURN, Rod, Sight, View
 from foosim.world.actuators.rod_position import Command
 
@@ -54,15 +55,13 @@ class Shots:
         self._through = 0.0
         self._command = rod.command(0.0, 0.0)
 
-    def strike(
-        self, ball: View, sight: Sight, now_s: float, goal: tuple[float, float], reach_s: float
-    ) -> Command | None:
+    def strike(self, ball: View, sight: Sight, arrives_s: float, goal: tuple[float, float]) -> Command | None:
         """Return the next move of a shot at `goal` (u, y), or None when there is nothing to strike.
 
-        `ball` is as it is when a command reaches the rod, which takes `reach_s`.
+        `ball` and the rod are as they are when the command is there, at `arrives_s`.
         """
         rod = self._rod
-        if self._end_s > now_s and rod.swing < self._through:
+        if self._end_s > arrives_s and rod.swing < self._through:
             return self._command
         self._end_s = -1.0
         if sight.height > HIGH_M or not -COMES_FAST < ball.vu < LEAVES_FAST:
@@ -76,12 +75,18 @@ class Shots:
             if found is None or not REACH_M[0] < ahead < REACH_M[1]:
                 return self._await(ball)
             contact, speed = found, _speed(ahead)
-            met = ball.later(rod.swing_s(min(swing, contact - LEAST), contact, speed), rod.room)
-        slide = rod.slide_to(met.y - self._offset(met, goal))
+            start = Motion(swing, rod.turning) if swing < contact - LEAST else Motion(contact - LEAST, 0.0)
+            met = ball.later(rod.swing_s(start, contact, speed), rod.room)
+        y = met.y - self._offset(met, goal)
+        if not rod.reaches(y):
+            y = met.y
+            if not rod.reaches(y):
+                return None
+        slide = rod.slide_to(y)
         is_ready = -2.6 < swing < contact - LEAST
         is_aligned = abs(slide - rod.slide) < ALIGNED_M
         if is_ready and is_aligned and sight.is_steady and not _gets_better(ball.u - rod.u, ball.vu):
-            self._end_s = now_s + reach_s + KICK_S
+            self._end_s = arrives_s + KICK_S
             lap = rod.swing - swing
             self._through = lap + contact + THROUGH
             self._command = rod.command(slide, lap + contact + speed / rod.spin_gain)

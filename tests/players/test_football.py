@@ -152,7 +152,7 @@ def test_two_teams_play_through_the_network() -> None:
 def rod(line: str = "attack", slide: float = 0.0, swing: float = 0.0) -> Rod:
     """A rod of red, which a player has seen."""
     (found,) = rods_of(DEPLOYMENT, "red", [line])  # type: ignore[list-item]
-    found.see(RodPosition(slide, -swing))
+    found.see(RodPosition(slide, -swing), 0)
     return found
 
 
@@ -217,7 +217,7 @@ def strike(
     held = rod(swing=swing)
     ball = View(held.u + ahead, 0.0, vu, 0.0, RADIUS)
     sight = Sight(ball, ball, is_steady, height)
-    return Shots(held).strike(ball, sight, 1.0, (held.u + 1.0, 0.0), 0.003)
+    return Shots(held).strike(ball, sight, 1.0, (held.u + 1.0, 0.0))
 
 
 def speed_at_contact(command: Command | None, ahead: float) -> float:
@@ -245,6 +245,15 @@ def test_a_full_shot_does_not_climb_the_wall() -> None:
     assert RADIUS + up * up / (2 * table.gravity) < table.walls.height
 
 
+def test_a_ball_that_no_figure_can_stand_beside_is_not_struck() -> None:
+    """One at the side wall, where the goalkeeper's stroke ends before."""
+    held = rod("goal", swing=-0.8, slide=LINES["goal"].half_stroke)
+    for y, is_struck in ((held.half_stroke, True), (held.half_stroke + 0.05, False)):
+        ball = View(held.u + 0.025, y, 0.0, 0.0, RADIUS)
+        command = Shots(held).strike(ball, Sight(ball, ball, True, RADIUS), 1.0, (held.u + 1.0, y))
+        assert (command is not None) == is_struck, y
+
+
 @pytest.mark.parametrize(
     "why", [{"is_steady": False}, {"height": 0.04}, {"vu": -4.0}, {"vu": 3.0}, {"swing": 0.3}, {"ahead": 0.09}]
 )
@@ -265,7 +274,7 @@ def test_the_ball_is_where_it_will_be_when_a_command_arrives() -> None:
         sample = Sample("camera", "ball", turn, sent_ns, sent_ns + link_ns, ball)
         sight = senses.see((sent_ns + link_ns) // DEPLOYMENT.tick_ns, {("camera", "ball"): sample})
     assert sight is not None and sight.is_steady
-    arrives_s = (80_000_000 + link_ns + link_ns + DEPLOYMENT.tick_ns) * 1e-9
+    arrives_s = (80_000_000 + link_ns + link_ns) * 1e-9
     assert sight.ball.u == pytest.approx(-3.0 * arrives_s, abs=1e-6), "blue attacks along -x"
     assert sight.ball.vu == pytest.approx(-3.0)
 
