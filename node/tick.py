@@ -239,8 +239,8 @@ class Stepper:
                 if numbers[entity.offsets["quarantined"]] != 0.0:
                     _clear_results(entity, numbers)
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
-        if work.start and not self._by_island:
-            bodies = self._standing.awake(bodies, self._alone, numbers, work.start)
+        if not self._by_island:
+            bodies = self._standing.awake(bodies, self._alone, numbers, work.start or numbers)
         return bodies, is_partial
 
     def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 from typing import Any, Final
@@ -15,7 +16,9 @@ from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
+from foosim.world.assembly.standing import Standing
 from foosim.world.frame import Frame
+from foosim.world.layout import Entity
 from foosim.world.robot_packets import Delivered
 from tests.placing import place_ball
 
@@ -30,6 +33,13 @@ DRIVES: Final = {
 }
 
 
+class Awake(Standing):
+    """Lets everything be solved, always."""
+
+    def awake(self, bodies: Sequence[Entity], *_: object) -> list[Entity]:
+        return list(bodies)
+
+
 class Node:
     """One node that computes the whole table; without `rests` it solves everything, always."""
 
@@ -37,8 +47,11 @@ class Node:
         sets = [f"engine={engine}", *(f"robots.{rod}.actuators={{m: {{kind: {kind}}}}}" for rod in RODS), "players={}"]
         self.deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
         self.frame = initial_frame(self.deployment)
-        self.layout, self.rests = self.frame.layout, rests
+        self.layout = self.frame.layout
         self.stepper = Stepper(self.deployment, self.layout)
+        if not rests:
+            world = self.stepper.world
+            self.stepper._standing = Awake(self.layout, world.actuators, world.ruled)
         self.engine = make_engine(self.deployment, self.layout)
         owners = {robot.name: "n" for robot in self.layout.robots}
         self.assignment = Assignment(self.layout, table_reach_of(self.deployment, self.layout), ["n"], owners)
@@ -52,7 +65,7 @@ class Node:
         start = numbers.copy()
         self.stepper.deliver(packets, share.solved, numbers, self.frame.tick, start)
         islands = tuple(tuple(layout.entities[index] for index in island) for island in share.islands)
-        work = Work(self.frame.tick, layout, islands, share.solved, numbers, {}, start if self.rests else [])
+        work = Work(self.frame.tick, layout, islands, share.solved, numbers, {}, start if packets else [])
         self.solved += len(self.stepper._awake(work)[0])
         self.stepper.solve(self.engine, work)
         self.frame = Frame(self.frame.tick + 1, layout, np.array(numbers), {})
