@@ -30,7 +30,7 @@ class DueSensors:
     """
 
     def __init__(self, robots: Sequence[Entity], sensors: Mapping[str, Sequence[FittedSensor]]) -> None:
-        self.robots = list(robots)
+        self.robots = robots
         self._sensors = [tuple(sensors[robot.name]) for robot in robots]
         self._down = [robot.offsets["down"] for robot in robots]
         everyone = [one for its in self._sensors for one in its]

@@ -119,7 +119,7 @@ class Stepper:
         That is numbers of the next frame, by place. Raises ComponentError.
         """
         tick, numbers = frame.tick, frame.numbers
-        if self._due.robots != robots:
+        if self._due.robots is not robots and self._due.robots != robots:
             self._due = DueSensors(robots, self._sensors)
         turn = self._due.at(tick, numbers)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from math import inf, nan
 from pathlib import Path
 from typing import Any, Final
@@ -12,13 +13,14 @@ import pytest
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
+from foosim.node.due_sensors import DueSensors
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, check_edits
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout, build_layout
+from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
 from tests.placing import place_ball
@@ -62,6 +64,27 @@ def delivered(destination: str, payload: bytes = b"", channel: str = "position",
 
 def command(slide: float, spin: float) -> bytes:
     return struct.pack("<2d", slide, spin)
+
+
+# --- what robots send ------------------------------------------------------------------------------------------------
+
+
+def test_who_measures_is_worked_out_once_for_robots_that_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From tick to tick the robots of a node are the same tuple; others are worked out anew."""
+    stepper, frame = Stepper(DEPLOYMENT, LAYOUT), in_play(tick=5)
+    made: list[Sequence[Entity]] = []
+
+    class Counted(DueSensors):
+        def __init__(self, robots: Sequence[Entity], sensors: Any) -> None:
+            made.append(robots)
+            super().__init__(robots, sensors)
+
+    monkeypatch.setattr("foosim.node.tick.DueSensors", Counted)
+    first, _ = stepper.sense(frame, LAYOUT.robots)
+    again, _ = stepper.sense(frame, LAYOUT.robots)
+    assert again == first and len(made) == 1
+    fewer, _ = stepper.sense(frame, LAYOUT.robots[:2])
+    assert [packet.robot for packet in fewer] == [robot.name for robot in LAYOUT.robots[:2]] and len(made) == 2
 
 
 # --- what an order does ----------------------------------------------------------------------------------------------
