@@ -18,10 +18,12 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.changes import changed
 from foosim.rehearsal.check.differences import (
+    Asking,
     Frames,
     Readings,
     Senses,
     alone_and_together,
+    asked_alone_and_together,
     first_difference,
     first_other_reading,
 )
@@ -129,6 +131,7 @@ class ComponentCheck:
         readings = Readings()
         try:
             yield from alone_and_together(senses, alone, readings)
+            yield from asked_alone_and_together(Asking(self.text, self.name, self.files), alone)
         except ComponentError as error:
             self.has_failed = True
             yield str(error)

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Final
 
 from foosim.deployment.loader import load_deployment
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.assembly.world import World, asked_together
+from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.view import SensingView
+from foosim.world.components.view import SensingView, View, called
 from foosim.world.components.watching import ReadOnly
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity
+from foosim.world.layout import Entity, Layout
+
+NAMED_MAX: Final = 4
+"""Actuators that a message about several names."""
 
 
 @dataclass
@@ -117,6 +122,46 @@ def alone_and_together(senses: Senses, frames: Sequence[Frame], readings: Readin
                 told.add(label)
                 yield f"{label} gives another reading alone than with others, at tick {frame.tick}"
     yield from readings.bad()
+
+
+class Asking:
+    """The actuators of a deployment that can be asked together, fitted to the layouts of its frames."""
+
+    def __init__(self, text: str, name: str, files: Mapping[str, bytes]) -> None:
+        self._deployment = load_deployment(text, name).with_assets(files)
+        self._groups: dict[bytes, list[list[FittedActuator]]] = {}
+
+    def groups(self, layout: Layout) -> list[list[FittedActuator]]:
+        """Return them by motion and class, in the order of their robots."""
+        if layout.digest not in self._groups:
+            found: dict[tuple[str, str], list[FittedActuator]] = {}
+            for index, actuators in sorted(World(self._deployment, layout).actuators.items()):
+                motion = layout.entities[index].kind.motion
+                for one in actuators:
+                    kind = type(one.actuator)
+                    if motion and hasattr(kind, "together"):
+                        found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
+            self._groups[layout.digest] = list(found.values())
+        return self._groups[layout.digest]
+
+
+def asked_alone_and_together(asking: Asking, frames: Sequence[Frame]) -> Iterator[str]:
+    """Yield the actuators that ask for something else together than alone. Raises ComponentError."""
+    told: set[str] = set()
+    for frame in frames:
+        view = View(frame.tick, ReadOnly(frame.numbers))
+        for group in asking.groups(frame.layout):
+            actuators = [one.actuator for one in group]
+            made: Any = type(actuators[0])
+            what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in group[:NAMED_MAX])}"
+            together = called(what, "", frame.tick, made.together, actuators)
+            asked = asked_together(what, together, len(group), view)
+            for one, its in zip(group, asked.tolist(), strict=True):
+                label = f"actuator {one.channel} of {one.robot}"
+                alone = called(label, "", frame.tick, one.actuator.command, view)
+                if its != [list(motor) for motor in alone] and label not in told:
+                    told.add(label)
+                    yield f"{label} asks for something else alone than with others, at tick {frame.tick}"
 
 
 def _label(one: FittedSensor) -> str:

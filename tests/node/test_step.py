@@ -74,12 +74,11 @@ def test_who_measures_is_worked_out_once_for_robots_that_stay(monkeypatch: pytes
     stepper, frame = Stepper(DEPLOYMENT, LAYOUT), in_play(tick=5)
     made: list[Sequence[Entity]] = []
 
-    class Counted(DueSensors):
-        def __init__(self, robots: Sequence[Entity], sensors: Any) -> None:
-            made.append(robots)
-            super().__init__(robots, sensors)
+    def counted(robots: Sequence[Entity], sensors: Any) -> DueSensors:
+        made.append(robots)
+        return DueSensors(robots, sensors)
 
-    monkeypatch.setattr("foosim.node.tick.DueSensors", Counted)
+    monkeypatch.setattr("foosim.node.tick.DueSensors", counted)
     first, _ = stepper.sense(frame, LAYOUT.robots)
     again, _ = stepper.sense(frame, LAYOUT.robots)
     assert again == first and len(made) == 1

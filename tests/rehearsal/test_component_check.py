@@ -10,9 +10,10 @@ import sys
 from contextlib import suppress
 from importlib import invalidate_caches
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
+from numpy.typing import NDArray
 
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
@@ -21,6 +22,9 @@ from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, 
 from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
+from foosim.world.components.view import View
+from foosim.world.moving.asked import MotionsAsked
+from tests.kinematic_yard import yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 120
@@ -184,6 +188,26 @@ class Together:
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, more])
     found = list(broken_laws(text, TABLE.name, TICKS))
     assert any("sensor own of red.attack gives another reading alone than with others" in line for line in found)
+
+
+def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three robots, which a run asks one after the other."""
+    right = MotionsAsked.command
+
+    def wrong(self: MotionsAsked, view: View) -> NDArray[Any]:
+        asked = right(self, view)
+        asked[-1, 0, 0] += 1e-9 * len(asked)
+        return asked
+
+    robots = {f"r{n}": {"model": "differential_drive", "at": {"x": f"{n} m"}} for n in range(3)}
+    text = yard_text(robots)
+    assert list(broken_laws(text, "yard.yaml", 3)) == []
+    monkeypatch.setattr(MotionsAsked, "command", wrong)
+    (found,) = broken_laws(text, "yard.yaml", 3)
+    assert found == "actuator motion of r2 asks for something else alone than with others, at tick 1"
+    monkeypatch.setattr(MotionsAsked, "command", lambda self, view: right(self, view)[1:])
+    (found,) = broken_laws(text, "yard.yaml", 3)
+    assert "actuators motion of r0, motion of r1, motion of r2" in found and "of the shape (3, motors, 2)" in found
 
 
 def test_a_form_is_named_as_deployments_do() -> None:

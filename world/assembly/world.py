@@ -356,7 +356,11 @@ class World:
             return
         view, asking = SolvingView(tick, start, numbers, values), View(tick, numbers, start=start)
         for name, moved, together in self._moving.groups:
-            asked: Any = self.motors(moved, asking) if together is None else _asked(name, together, moved, asking)
+            asked: Any = (
+                self.motors(moved, asking)
+                if together is None
+                else asked_together(f"actuators of the motion {name}", together, len(moved), asking)
+            )
             try:
                 self._motions[name].move(moved, asked, view)
             except BaseException as error:
@@ -543,15 +547,18 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
     return motions
 
 
-def _asked(motion: str, together: Any, entities: Sequence[Entity], view: View) -> NDArray[np.float64]:
-    """Return what the actuators of several entities ask of their motors at once. Raises ComponentError."""
+def asked_together(what: str, together: Any, count: int, view: View) -> NDArray[np.float64]:
+    """Return what the actuators of so many entities ask of their motors at once, of shape (entities, motors, 2).
+
+    `what` names them, for errors. Raises ComponentError.
+    """
     try:
         asked = together.command(view)
-        if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (len(entities), 2):
+        if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (count, 2):
             return asked
-        raise WrongResult(together.command, f"an array of float64 of the shape ({len(entities)}, motors, 2)", asked)
+        raise WrongResult(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
     except BaseException as error:
-        raise component_error(f"actuators of the motion {motion}", "", view.tick, error) from error
+        raise component_error(what, "", view.tick, error) from error
 
 
 def _without_power(one: FittedActuator, view: View) -> Motors:
