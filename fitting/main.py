@@ -14,7 +14,7 @@ from typing import Annotated, Final
 
 import typer
 
-from foosim.common.errors import Failed
+from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
@@ -71,17 +71,17 @@ def fit_command(
     # Before scipy is imported. The matrices are small: threads would wait for each other longer than they compute.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if out is not None and out.exists():
-        raise BadTracks(f"{out} exists, and is never overwritten")
+        raise BadValue(f"--out {out}: it exists, and is never overwritten")
+    if out is not None and not out.parent.is_dir():
+        raise BadValue(f"--out {out}: there is no folder {out.parent}")
     spec = load_deployment(apply_sets(read_source_file(table), str(table), sets or ()), str(table))
     if TABLE not in spec.kits:
-        raise BadTracks(f"{table}: a deployment without a table section")
+        raise BadValue(f"--table {table}: a deployment without a table section")
     own = table_of(spec)
     if own.strips is not None:
-        raise BadTracks(
-            f"{table}: table.strips: rebounds from walls with strips are not modelled; measure without them"
-        )
+        raise BadValue(f"{table}: table.strips: rebounds from walls with strips are not modelled; measure without them")
     field, first = _field(own), _first(own)
-    tracks, notes = usable([track for path in files for track in _read(path)], field, own.ramps.leg, own.goal.width)
+    tracks, notes = usable([track for path in files for track in _read(path)], field, own.ramps.leg, own.goal)
     for note in notes:
         print(note, file=sys.stderr)
     found = fit([track.rows for track in tracks], field, first)
@@ -108,7 +108,7 @@ def _read(path: Path) -> list[Track]:
     if len(raw) > BYTES_MAX:
         raise BadTracks(f"{path}: more than {BYTES_MAX} bytes")
     try:
-        return read_tracks(raw.decode(), str(path))
+        return read_tracks(raw.decode("utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise BadTracks(f"{path}:{line}: not UTF-8") from None

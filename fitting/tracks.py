@@ -21,6 +21,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue, Refused, show
 from foosim.common.names import nearest_name
 from foosim.fitting.motion import Array, Field
+from foosim.world.parameters.table import Goal
 
 TRACK: Final = "track"
 QUANTITIES: Final = {"time": units.TIME, "x": units.LENGTH, "y": units.LENGTH}
@@ -42,10 +43,12 @@ class BadTracks(Refused):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A track: what it is called in messages, and its rows of time (s), x and y (m)."""
+    """A track: what it is called in messages, its file, its rows of time (s), x and y (m), and the line of each."""
 
     name: str
+    file: str
     rows: Array
+    lines: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,7 @@ def read_tracks(text: str, name: str) -> list[Track]:
     lines = csv.reader(io.StringIO(text), strict=True)
     problems: list[str] = []
     found: dict[str, list[tuple[float, float, float]]] = {}
+    numbers: dict[str, list[int]] = {}
     try:
         header = next(lines, None)
         if not header:
@@ -77,6 +81,7 @@ def read_tracks(text: str, name: str) -> list[Track]:
                 if rows and values[0] <= rows[-1][0]:
                     problems.append(f"{at}:{columns['time'].index + 1}: time is not later than on the line before")
                 rows.append(values)
+                numbers.setdefault(key, []).append(lines.line_num)
             if len(problems) >= PROBLEMS_MAX:
                 break
     except csv.Error as error:
@@ -85,7 +90,7 @@ def read_tracks(text: str, name: str) -> list[Track]:
         problems.append(f"{name}: a header, and no measured places below it")
     if problems:
         raise BadTracks("\n".join(problems))
-    return [Track(key, np.array(rows)) for key, rows in found.items()]
+    return [Track(key, name, np.array(rows), tuple(numbers[key])) for key, rows in found.items()]
 
 
 def _columns(header: Sequence[str], name: str) -> tuple[dict[str, _Column], int | None]:
@@ -94,15 +99,17 @@ def _columns(header: Sequence[str], name: str) -> tuple[dict[str, _Column], int 
     track = None
     problems = []
     for index, text in enumerate(header):
-        match = _HEADER.fullmatch(text.lstrip("\ufeff").lower())
+        match = _HEADER.fullmatch(text.lower())
         if match is None:
             continue
         quantity = ALIASES.get(match[1], match[1])
         unit = match[2] or match[3]
-        if quantity == TRACK:
+        at = f"{name}:1:{index + 1}"
+        if quantity in found or (quantity == TRACK and track is not None):
+            problems.append(f"{at}: a second column of {quantity}, {show(text)}")
+        elif quantity == TRACK:
             track = index
         elif quantity in QUANTITIES:
-            at = f"{name}:1:{index + 1}"
             try:
                 found[quantity] = _Column(index, _factor(quantity, unit))
             except BadValue as bad:
@@ -111,7 +118,8 @@ def _columns(header: Sequence[str], name: str) -> tuple[dict[str, _Column], int 
     missing = [quantity for quantity in QUANTITIES if quantity not in found]
     if missing:
         have = ", ".join(map(show, header[:12]))
-        problems.append(f"{name}:1: no column {' and none '.join(missing)} (there are: {have})")
+        written = ", ".join(f"{quantity}_{_example(quantity)}" for quantity in missing)
+        problems.append(f"{name}:1: no column of {', '.join(missing)}, as {written} (there are: {have})")
     if problems:
         raise BadTracks("\n".join(problems))
     return found, track
@@ -121,7 +129,7 @@ def _factor(quantity: str, unit: str | None) -> float:
     """Return what a unit is in SI units. Raises BadValue."""
     dimension = QUANTITIES[quantity]
     if unit is None:
-        example = "s" if quantity == "time" else "mm"
+        example = _example(quantity)
         raise BadValue(f"{quantity} has no unit: write {quantity} [{example}] or {quantity}_{example}")
     if unit not in dimension.units:
         nearest = nearest_name(unit, dimension.units)
@@ -129,6 +137,10 @@ def _factor(quantity: str, unit: str | None) -> float:
         raise BadValue(f"no unit of {quantity} (there are: {valid})", unit, nearest and repr(nearest))
     size = dimension.units[unit]
     return float(size) / 1e9 if quantity == "time" else float(size)
+
+
+def _example(quantity: str) -> str:
+    return "s" if quantity == "time" else "mm"
 
 
 def _values(
@@ -152,33 +164,30 @@ def _values(
     return by_name["time"], by_name["x"], by_name["y"]
 
 
-def usable(tracks: Sequence[Track], field: Field, ramps: float, goal: float) -> tuple[list[Track], list[str]]:
+def usable(tracks: Sequence[Track], field: Field, ramps: float, goal: Goal) -> tuple[list[Track], list[str]]:
     """Return the parts of tracks that are over the level floor, and what was left out, in words.
 
-    A track ends where it comes over a corner ramp (a right triangle with legs of `ramps`) or to a goal, `goal` wide.
-    Raises BadTracks where a place is off the field, or nothing is left.
+    A track ends where it comes over a corner ramp (a right triangle with legs of `ramps`, m) or to a goal. Raises
+    BadTracks where a place before that is off the field, a track is there twice, or nothing is left.
     """
-    kept, notes = [], []
+    kept: list[Track] = []
+    notes = []
     for track in tracks:
-        x, y = np.abs(track.rows[:, 1]), np.abs(track.rows[:, 2])
-        beyond = (x > field.x + 3 * field.radius) | (y > field.y + field.radius)
-        if beyond.any():
-            row = int(np.argmax(beyond))
-            place = ", ".join(f"{value * 1e3:.0f} mm" for value in track.rows[row, 1:])
-            raise BadTracks(
-                f"{track.name}: point {row + 1} is off the field ({place}; |x| is up to {field.x * 1e3:.1f} mm and "
-                f"|y| up to {field.y * 1e3:.1f} mm): the origin is in the middle, and units are those of the header"
-            )
-        to_corner = (field.x + field.radius - x) + (field.y + field.radius - y)
-        left = (to_corner < ramps + field.radius) | ((x > field.x - field.radius) & (y < goal / 2))
-        count = int(np.argmax(left)) if left.any() else len(track.rows)
+        count = _count_on_floor(track, field, ramps, goal)
+        is_cut = count < len(track.rows)
         if count < POINTS_MIN:
-            why = "before a ramp or a goal" if left.any() else "in all"
+            why = "before a ramp or a goal" if is_cut else "in all"
             notes.append(f"{track.name}: left out, {count} points {why}, at least {POINTS_MIN} are needed")
             continue
-        if count < len(track.rows):
-            notes.append(f"{track.name}: used up to point {count}, where it comes to a ramp or a goal")
-        kept.append(Track(track.name, track.rows[:count]))
+        if is_cut:
+            notes.append(
+                f"{track.name}: used up to line {track.lines[count - 1]}, then the ball comes to a ramp or a goal"
+            )
+        rows = track.rows[:count]
+        for other in kept:
+            if np.array_equal(other.rows, rows):
+                raise BadTracks(f"{track.name} and {other.name} are the same track: it would count twice")
+        kept.append(Track(track.name, track.file, rows, track.lines[:count]))
     if not kept:
         raise BadTracks("\n".join([*notes, "no track is long enough"]))
     points = sum(len(track.rows) for track in kept)
@@ -187,3 +196,25 @@ def usable(tracks: Sequence[Track], field: Field, ramps: float, goal: float) -> 
             f"{len(kept)} tracks of {points} points, at most {TRACKS_MAX} and {POINTS_MAX} are fitted at once"
         )
     return kept, notes
+
+
+def _count_on_floor(track: Track, field: Field, ramps: float, goal: Goal) -> int:
+    """Return how many points a track has before a ramp or a goal. Raises BadTracks for one off the field up to there.
+
+    A ball may be in the pocket of a goal, and, by the noise of a camera, beyond a wall by its radius.
+    """
+    x, y = np.abs(track.rows[:, 1]), np.abs(track.rows[:, 2])
+    is_before_goal = y < goal.width / 2
+    to_corner = (field.x + field.radius - x) + (field.y + field.radius - y)
+    left = (to_corner < ramps + field.radius) | ((x > field.x - field.radius) & is_before_goal)
+    count = int(np.argmax(left)) if left.any() else len(track.rows)
+    depth = np.where(is_before_goal, goal.depth, 0.0)
+    beyond = (x > field.x + depth + field.radius) | (y > field.y + field.radius)
+    if beyond[: count + 1].any():
+        row = int(np.argmax(beyond))
+        place = ", ".join(f"{value * 1e3:.0f} mm" for value in track.rows[row, 1:])
+        raise BadTracks(
+            f"{track.file}:{track.lines[row]}: off the field ({place}; |x| is up to {field.x * 1e3:.1f} mm and "
+            f"|y| up to {field.y * 1e3:.1f} mm): the origin is in the middle, and units are those of the header"
+        )
+    return count

@@ -183,7 +183,9 @@ def test_without_a_rebound_nothing_is_said_of_walls(typed: Typed, tmp_path: Path
     (floor,) = yaml.safe_load(out.read_text())["table"]["surfaces"].items()
     assert floor[0] == "floor" and floor[1]["friction"] == pytest.approx(0.3, rel=0.05)
     again = run(typed, file, "--table", TABLE, "--out", out)
-    assert again.code == 2 and again.err == f"{out} exists, and is never overwritten\n"
+    assert again.code == 2 and again.err == f"--out {out}: it exists, and is never overwritten\n"
+    beside = run(typed, file, "--table", TABLE, "--out", tmp_path / "none" / "fitted.yaml")
+    assert beside.code == 2 and beside.err.endswith(f": there is no folder {tmp_path / 'none'}\n")
 
 
 def test_what_tracks_do_not_tell_is_left_out(typed: Typed, tmp_path: Path) -> None:
@@ -213,9 +215,11 @@ HEAD: Final = "time_s,x_mm,y_mm\n"
     ("text", "told"),
     [
         ("", "a.csv:1:1: no header with the columns time, x and y, each with its unit"),
-        ("time_s,x_mm\n", "a.csv:1: no column y (there are: 'time_s', 'x_mm')"),
+        ("time_s,x_mm\n", "a.csv:1: no column of y, as y_mm (there are: 'time_s', 'x_mm')"),
         ("time,x_mm,y_mm\n", "a.csv:1:1: time has no unit: write time [s] or time_s"),
         ("time_s,x [m],y [mn]\n", "a.csv:1:3: no unit of y (there are: m, cm, mm, um, km), 'mn', nearest is 'm'"),
+        ("time_s,x_mm,x [m],y_mm\n", "a.csv:1:3: a second column of x, 'x [m]'"),
+        ("track,time_s,x_mm,y_mm,track\n", "a.csv:1:5: a second column of track, 'track'"),
         (HEAD, "a.csv: a header, and no measured places below it"),
         (HEAD + "0,1,2\n0.1,1,two\n", "a.csv:3:3: y is no number, 'two'"),
         (HEAD + "0,1,2\n0.1,inf,2\n", "a.csv:3:2: x is no number, 'inf'"),
@@ -244,13 +248,34 @@ def test_tracks_end_at_ramps_and_goals_and_short_ones_are_left_out() -> None:
     rows = "".join(f"{number / 100},{300 + 8 * number},{200 + 3 * number}\n" for number in range(30))
     still = "".join(f"{number / 100},0,0\n" for number in range(30))
     into, whole = read_tracks(HEAD + rows, "into.csv"), read_tracks(HEAD + still, "whole.csv")
-    kept, notes = usable([*into, *whole], field, table.ramps.leg, table.goal.width)
+    kept, notes = usable([*into, *whole], field, table.ramps.leg, table.goal)
     assert [track.name for track in kept] == ["whole.csv"]
     assert notes == ["into.csv: left out, 18 points before a ramp or a goal, at least 20 are needed"]
     with pytest.raises(BadTracks, match="no track is long enough"):
-        usable(into, field, table.ramps.leg, table.goal.width)
-    with pytest.raises(BadTracks, match=r"far.csv: point 1 is off the field \(700 mm, 0 mm; \|x\| is up to 582.5 mm"):
-        usable(read_tracks(HEAD + "0,700,0\n", "far.csv"), field, table.ramps.leg, table.goal.width)
+        usable(into, field, table.ramps.leg, table.goal)
+    with pytest.raises(BadTracks, match=r"^far.csv:3: off the field \(-700 mm, 9 mm; \|x\| is up to 582.5 mm"):
+        usable(read_tracks(HEAD + "0,500,9\n1,-700,9\n", "far.csv"), field, table.ramps.leg, table.goal)
+    with pytest.raises(BadTracks, match=r"^whole\.csv and whole\.csv are the same track: it would count twice$"):
+        usable([*whole, *whole], field, table.ramps.leg, table.goal)
+
+
+def test_a_goal_ends_a_track_and_what_is_behind_it_does_not_matter() -> None:
+    """In the pocket, then in somebody's hand."""
+    table = table_of(load_deployment(TABLE.read_text(), "table.yaml"))
+    rolls = "".join(f"{number / 100},{300 + 12 * number},20\n" for number in range(29))
+    tracks = read_tracks(HEAD + rolls + "1,660,30\n2,900,900\n", "goal.csv")
+    (kept,), notes = usable(tracks, field_of(table), table.ramps.leg, table.goal)
+    assert kept.rows[-1, 1] == pytest.approx(0.564) and kept.lines[-1] == 24
+    assert notes == ["goal.csv: used up to line 24, then the ball comes to a ramp or a goal"]
+
+
+def test_a_file_of_another_system_is_read(typed: Typed, tmp_path: Path) -> None:
+    """With a byte-order mark, quotes, and CRLF."""
+    file = tmp_path / "tracks.csv"
+    file.write_bytes(b'\xef\xbb\xbf"time_s","x_mm","y_mm"\r\n0,"1",2\r\n1,900,2\r\n')
+    assert f"{file}:3: off the field (900 mm, 2 mm;" in run(typed, file, "--table", TABLE).err
+    file.write_bytes(b"time_s,x_mm,y_mm\n0,1,\xff\n")
+    assert run(typed, file, "--table", TABLE).err == f"{file}:2: not UTF-8\n"
 
 
 @pytest.mark.parametrize(
