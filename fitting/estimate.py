@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from math import sqrt
+from typing import Any, Final
 
 import numpy as np
 
 from foosim.common.errors import Failed
+from foosim.common.keyed_random import draw_key, draw_words, gaussian
 from foosim.fitting.motion import Array, Field, Motion, Pairs, Start, motion
 
 STARTS: Final = len(Start._fields)
@@ -33,6 +35,19 @@ SCALES: Final = Pairs(2e-4, 0.1, 0.1, 0.1)
 HELD_M: Final = 0.003
 """On the way there a surface that is SCALES beside where it began counts as much as a place that is this far off: what
 so short a track does not tell stays."""
+WALLS: Final = 0.05
+"""The fit begins with no more friction at walls: where that is enough to stop the slip, more of it changes nothing, and
+no derivative leads back."""
+ROLLS: Final = (0.9, 0.1)
+"""In the starts that the fit begins with balls roll so much, and the better one of two fits counts: where a ball begins
+to roll, and whether a rebound stops its slip, gives the squares several minima."""
+HOPS: Final = (2, 10)
+"""From the best fit so many more begin beside it, about HOP standard errors off, where other minima are: the most while
+residuals are more than SCATTER times what the measured places scatter by."""
+SCATTER: Final = 1.1
+HOP: Final = 4.0
+HOP_MOST: Final = Start(0.003, 0.003, 0.05, 0.05, 0.3)
+"""A standard error is at most that, and of surfaces at most SCALES."""
 TRIES_MAX: Final = 60
 SLOW: Final = 0.1
 """m/s: what comes to a wall more slowly may as well have been lost in the noise."""
@@ -60,12 +75,15 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What was fitted, by field of `Pairs`; the standard deviation of the residuals (m), points, rebounds at walls."""
+    """What was fitted, by field of `Pairs`; the standard deviation of the residuals (m), points, rebounds at walls; the
+    root of the mean square of each track's residuals (m); whether the fit came to an end."""
 
     pairs: dict[str, Fitted]
     noise: float
     points: int
     rebounds: int
+    of_tracks: tuple[float, ...]
+    is_converged: bool
 
 
 def fit(tracks: Sequence[Array], field: Field, first: Pairs) -> Result:
@@ -74,59 +92,92 @@ def fit(tracks: Sequence[Array], field: Field, first: Pairs) -> Result:
     The rows of a track are time (s), x and y (m). Where no track comes back from a wall nothing of walls is fitted.
     Raises NoLeastSquares.
     """
-    try:
-        from scipy.optimize import least_squares
-        from scipy.stats import t as students
-    except ImportError:
-        raise NoLeastSquares("the fit needs scipy, which is not installed: pip install 'foosim[fit]'") from None
-    first = first._replace(bounce=_bounce(tracks, field) or first.bounce)
+    first = first._replace(bounce=_bounce(tracks, field) or first.bounce, walls=min(first.walls, WALLS))
     names = Pairs._fields if rebounds(tracks, field) else ("rolling", "floor")
-    vector: Array | None = None
-    longest = max(float(track[-1, 0] - track[0, 0]) for track in tracks)
-    for horizon in (*(one for one in HORIZONS_S if one < longest), longest):
-        problem = _Problem([_upto(track, horizon) for track in tracks], field, first, names, horizon < longest)
-        best = least_squares(
-            problem.residuals,
-            problem.begin(first) if vector is None else vector,
-            problem.derivatives,
-            bounds=problem.bounds,
-            x_scale="jac",
-            ftol=1e-7,
-            xtol=1e-7,
-            max_nfev=TRIES_MAX,
-        )
-        vector = problem.within(best.x)
-    count = 2 * sum(len(track) for track in tracks)
-    free = count - len(best.x)
-    variance = 2.0 * best.cost / free
-    spread = _spread(best.jac) * variance
-    factor = float(students.ppf(0.5 + CONFIDENCE / 2.0, free))
+    problem = _Problem(tracks, field, first, names)
+    fits = (problem.solve(_begin(tracks, field, first, names, rolls)) for rolls in ROLLS)
+    scatter = sqrt(sum(len(track) * scatter_of(track) ** 2 for track in tracks) / sum(map(len, tracks)))
+    best = _hop(problem, min(fits, key=_cost), scatter)
+    from scipy.special import stdtrit
+
+    factor = float(stdtrit(len(best.fun) - len(best.x), 0.5 + CONFIDENCE / 2.0))
     pairs = {
-        name: Fitted(float(best.x[place]), factor * float(np.sqrt(spread[place]))) for place, name in enumerate(names)
+        name: Fitted(float(value), factor * float(error))
+        for name, value, error in zip(names, best.x, _errors(best), strict=False)
     }
     met = sum(len(one.rebounds) for one in problem.motions(best.x))
-    return Result(pairs, float(np.sqrt(variance)), count // 2, met)
+    return Result(pairs, _noise(best), len(best.fun) // 2, met, problem.rms(best.fun), best.status > 0)
 
 
-def _spread(jac: Array) -> Array:
-    """Return the diagonal of the inverse of J^T J; infinite for what nothing tells."""
+def _begin(tracks: Sequence[Array], field: Field, first: Pairs, names: Sequence[str], rolls: float) -> Array:
+    """Return the vector to begin the fit of whole tracks with, from fits of ever more of each."""
+    surfaces = [getattr(first, name) for name in names]
+    vector = np.array(surfaces + [value for track in tracks for value in guess(track, rolls)])
+    longest = max(float(track[-1, 0] - track[0, 0]) for track in tracks)
+    for horizon in HORIZONS_S:
+        if horizon < longest:
+            shorter = [_upto(track, horizon) for track in tracks]
+            vector = _Problem(shorter, field, first, names, is_held=True).solve(vector).x
+    return vector
+
+
+def _hop(problem: _Problem, best: Any, scatter: float) -> Any:
+    """Return the best of a fit and those that begin beside it."""
+    key = draw_key(0, "fit", "hop")
+    least, most = HOPS
+    for hop in range(most):
+        if hop >= least and _noise(best) <= SCATTER * scatter:
+            break
+        drawn = np.array([gaussian(draw_words(key, hop, place)[0]) for place in range(len(best.x))])
+        beside = best.x + HOP * np.minimum(_errors(best), problem.hop_most) * drawn
+        best = min(best, problem.solve(beside), key=_cost)
+    return best
+
+
+def _cost(found: Any) -> float:
+    return float(found.cost)
+
+
+def _noise(found: Any) -> float:
+    """Return the standard deviation of the residuals (m)."""
+    return sqrt(2.0 * found.cost / (len(found.fun) - len(found.x)))
+
+
+def _errors(found: Any) -> Array:
+    """Return the standard errors of what was fitted, infinite for what nothing tells.
+
+    They are the roots of the diagonal of the inverse of J^T J, times the variance of the residuals.
+    """
+    jac = found.jac
     scale = np.sqrt((jac * jac).sum(axis=0))
-    scale[scale == 0.0] = np.inf
+    is_told = scale > 0.0
+    scale[~is_told] = 1.0
     _, singular, rows = np.linalg.svd(jac / scale, full_matrices=False)
-    singular[singular < 1e-10 * singular[0]] = 1e-10 * singular[0]
-    inverse: Array = ((rows / singular[:, None]) ** 2).sum(axis=0) / scale**2
-    inverse[~np.isfinite(scale)] = np.inf
-    return inverse
+    singular = np.maximum(singular, 1e-10 * singular[0])
+    errors: Array = _noise(found) * np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / scale
+    errors[~is_told] = np.inf
+    return errors
 
 
-def guess(track: Array) -> Start:
-    """Return a start from the first points of a track, by straight lines: one that rolls."""
+def guess(track: Array, rolls: float) -> Start:
+    """Return a start from the first points of a track, by straight lines, of a ball that rolls so much."""
     first = track[:BEGINNING]
     time = first[:, 0] - first[0, 0]
     middle = time - time.mean()
     speeds = (first[:, 1:] * middle[:, None]).sum(axis=0) / (middle * middle).sum()
     x, y = first[:, 1:].mean(axis=0) - speeds * time.mean()
-    return Start(float(x), float(y), float(speeds[0]), float(speeds[1]), 0.9)
+    return Start(float(x), float(y), float(speeds[0]), float(speeds[1]), rolls)
+
+
+def scatter_of(track: Array) -> float:
+    """Return by how much the places of a track scatter (m), from each one's distance from the line of its neighbours.
+
+    It is the median, as a standard deviation (0.6745 of it), so that rebounds and lost pictures do not count.
+    """
+    time, place = track[:, 0], track[:, 1:]
+    later = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+    aside = place[1:-1] - (1.0 - later) * place[:-2] - later * place[2:]
+    return float(np.median(np.abs(aside) / np.sqrt(1.0 + later**2 + (1.0 - later) ** 2))) / 0.6745
 
 
 def _upto(track: Array, horizon: float) -> Array:
@@ -170,7 +221,7 @@ class _Problem:
     """
 
     def __init__(
-        self, tracks: Sequence[Array], field: Field, first: Pairs, names: Sequence[str], is_held: bool
+        self, tracks: Sequence[Array], field: Field, first: Pairs, names: Sequence[str], *, is_held: bool = False
     ) -> None:
         self._tracks, self._field, self._first, self._names = tracks, field, first, names
         self._held = len(names) if is_held else 0
@@ -179,13 +230,26 @@ class _Problem:
         low = [getattr(LEAST, name) for name in names] + [least for least, _ in starts]
         high = [getattr(MOST, name) for name in names] + [most for _, most in starts]
         self.bounds = (low, high)
+        self.hop_most = np.array([*(getattr(SCALES, name) for name in names), *HOP_MOST * len(tracks)])
 
-    def begin(self, pairs: Pairs) -> Array:
-        """Return the vector to begin with."""
-        surfaces = [getattr(pairs, name) for name in self._names]
-        return self.within(np.array(surfaces + [value for track in self._tracks for value in guess(track)]))
+    def solve(self, vector: Array) -> Any:
+        """Return what scipy finds that begins with this vector. Raises NoLeastSquares."""
+        try:
+            from scipy.optimize import least_squares
+        except ImportError:
+            raise NoLeastSquares("the fit needs scipy, which is not installed: pip install 'foosim[fit]'") from None
+        return least_squares(
+            self.residuals,
+            self._within(vector),
+            self.derivatives,
+            bounds=self.bounds,
+            x_scale="jac",
+            ftol=1e-7,
+            xtol=1e-7,
+            max_nfev=TRIES_MAX,
+        )
 
-    def within(self, vector: Array) -> Array:
+    def _within(self, vector: Array) -> Array:
         """Return a vector that is not on a bound, where the solver cannot begin."""
         low, high = np.array(self.bounds)
         edge = 1e-6 * (high - low)
@@ -218,6 +282,11 @@ class _Problem:
             for one, times, track in zip(self.motions(vector), self._times, self._tracks, strict=True)
         ]
         return np.concatenate([*beside, np.array(held)])
+
+    def rms(self, residuals: Array) -> tuple[float, ...]:
+        """Return the root of the mean square of the residuals of each track (m)."""
+        ends = np.cumsum([2 * len(track) for track in self._tracks])
+        return tuple(float(np.sqrt((one * one).mean())) for one in np.split(residuals, ends[:-1]))
 
     def derivatives(self, vector: Array) -> Array:
         """Return the derivatives of the residuals, by central differences: a start matters to its own track alone."""

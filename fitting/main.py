@@ -18,7 +18,7 @@ from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.fitting.estimate import Fitted, Result, fit
+from foosim.fitting.estimate import Fitted, Result, fit, scatter_of
 from foosim.fitting.motion import Field, Pairs
 from foosim.fitting.tracks import BadTracks, Track, read_tracks, usable
 from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
@@ -27,6 +27,10 @@ from foosim.world.parameters.table import TABLE, Table, table_of
 app = new_app()
 
 BYTES_MAX: Final = 100_000_000
+DOUBTED: Final = 2.0
+DOUBTED_M: Final = 0.002
+"""A track is doubted whose residuals are more than DOUBTED times the scatter of its points and so many metres, by which
+the motion itself may be wrong after several rebounds."""
 WRITTEN: Final = {
     "floor": ("floor", "friction", 1.0, ""),
     "rolling": ("floor", "rolling_friction", 1e3, " mm"),
@@ -64,9 +68,9 @@ def fit_command(
     header (`time [s]` or `time_s`), in the table's frame of reference. A column `track` tells several tracks of a file
     apart. A track is used up to where the ball comes over a corner ramp or before a goal.
 
-    The YAML has what the tracks tell, each value with half of its interval of 95 % confidence; it merges into
-    `table.surfaces`. What they do not tell is left out, and said. An existing file is not overwritten. It needs scipy:
-    pip install 'foosim[fit]'.
+    The YAML has what the tracks tell, each value with half of its interval of 95 % confidence; a deployment whose table
+    is a preset includes it. What they do not tell is left out, and said. An existing file is not overwritten. It needs
+    scipy: pip install 'foosim[fit]'.
     """
     # Before scipy is imported. The matrices are small: threads would wait for each other longer than they compute.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -85,7 +89,7 @@ def fit_command(
     for note in notes:
         print(note, file=sys.stderr)
     found = fit([track.rows for track in tracks], field, first)
-    for line in _unknown(found):
+    for line in (*_doubts(found, tracks), *_unknown(found)):
         print(line, file=sys.stderr)
     text = encode_json(_as_json(found, tracks)).decode() + "\n" if json else "\n".join(_yaml(found, tracks)) + "\n"
     if out is None:
@@ -125,6 +129,19 @@ def _first(table: Table) -> Pairs:
     return Pairs(
         surfaces.floor.rolling_friction, surfaces.floor.friction, surfaces.walls.restitution, surfaces.walls.friction
     )
+
+
+def _doubts(found: Result, tracks: list[Track]) -> Iterator[str]:
+    """Yield what says that intervals do not hold."""
+    if not found.is_converged:
+        yield "the fit did not come to an end: values and intervals may be wrong; more or longer tracks tell more"
+    for track, residuals in zip(tracks, found.of_tracks, strict=True):
+        scatter = scatter_of(track.rows)
+        if residuals > DOUBTED * scatter + DOUBTED_M:
+            yield (
+                f"{track.name}: residuals of {residuals * 1e3:.1f} mm, its points scatter by {scatter * 1e3:.1f} mm: "
+                "the ball met something, the table is another, or it is several tracks; intervals do not hold"
+            )
 
 
 def _unknown(found: Result) -> Iterator[str]:
@@ -173,6 +190,7 @@ def _as_json(found: Result, tracks: list[Track]) -> dict[str, object]:
     return {
         "surfaces": surfaces,
         "residuals_m": found.noise,
+        "is_converged": found.is_converged,
         "points": found.points,
         "tracks": len(tracks),
         "rebounds": found.rebounds,
