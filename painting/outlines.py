@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, floor
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,29 +19,28 @@ Places: TypeAlias = NDArray[np.intp]
 """Pixels by row * width + column."""
 
 
+EDGE: Final = 1e-9
+"""What is so little beyond the edge of a triangle, as a share of it, is covered: neighbours leave no gap."""
+
+
 class Windows:
     """Windows of one size around some middles, (n, 2): the distances of their pixels' middles from these, and which
-    pixels they are."""
+    pixels they are. They are moved into the picture, and none is larger, however close what it shows is."""
 
     def __init__(self, middles: Numbers, half: Numbers, width: int, height: int) -> None:
         """`half` is half of the size of a window in x and y."""
-        columns, rows = ceil(2 * float(half[0])) + 1, ceil(2 * float(half[1])) + 1
-        left = np.floor(middles[:, 0] - half[0]).astype(np.intp)
-        top = np.floor(middles[:, 1] - half[1]).astype(np.intp)
+        columns = min(ceil(2 * float(half[0])) + 1, width)
+        rows = min(ceil(2 * float(half[1])) + 1, height)
+        left = np.clip(np.floor(middles[:, 0] - half[0]), 0, width - columns).astype(np.intp)
+        top = np.clip(np.floor(middles[:, 1] - half[1]), 0, height - rows).astype(np.intp)
         self._column = left[:, None] + np.arange(columns)
         self._row = top[:, None] + np.arange(rows)
         self.dx: Numbers = (self._column + 0.5 - middles[:, :1])[:, None, :]
         self.dy: Numbers = (self._row + 0.5 - middles[:, 1:])[:, :, None]
-        inside_x = (self._column >= 0) & (self._column < width)
-        inside_y = (self._row >= 0) & (self._row < height)
         self._width = width
-        self._is_whole = bool(inside_x.all() and inside_y.all())
-        self._inside = None if self._is_whole else inside_y[:, :, None] & inside_x[:, None, :]
 
     def places(self, covered: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Places]:
         """Return the covered pixels of the picture: whose each is, and which it is."""
-        if self._inside is not None:
-            covered = covered & self._inside
         which, row, column = covered.nonzero()
         return which, self._row[which, row] * self._width + self._column[which, column]
 
@@ -94,6 +93,35 @@ def covered_by_corners(corners: Numbers, width: int, height: int) -> Places:
         covered &= (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0
     row, column = covered.nonzero()
     return (row + top) * width + column + left
+
+
+def surface_of(
+    corners: Numbers, triangles: NDArray[np.int32], width: int, height: int
+) -> tuple[Places, NDArray[np.float64]]:
+    """Return the pixels that triangles (m, 3) cover, and the height of the highest triangle at the middle of each.
+
+    `corners`, (n, 3), are in pixels and heights, m.
+    """
+    heights = np.full((height, width), -np.inf)
+    size = (width, height)
+    of_each = corners[triangles]
+    first = np.clip(np.ceil(of_each[:, :, :2].min(axis=1) - 0.5), 0, size).astype(np.intp)
+    end = np.clip(np.floor(of_each[:, :, :2].max(axis=1) - 0.5) + 1.0, 0, size).astype(np.intp)
+    for one in np.flatnonzero((first < end).all(axis=1)):
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = of_each[one].tolist()
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) < EDGE:
+            continue  # upright, or without an area
+        (left, top), (right, bottom) = first[one].tolist(), end[one].tolist()
+        x, y = np.arange(left, right) + 0.5 - ax, (np.arange(top, bottom) + 0.5 - ay)[:, None]
+        of_b = (x * (cy - ay) - y * (cx - ax)) / area
+        of_c = (y * (bx - ax) - x * (by - ay)) / area
+        is_covered = (of_b >= -EDGE) & (of_c >= -EDGE) & (of_b + of_c <= 1.0 + EDGE)
+        found = np.where(is_covered, az + of_b * (bz - az) + of_c * (cz - az), -np.inf)
+        window = heights[top:bottom, left:right]
+        np.maximum(window, found, out=window)
+    places = np.flatnonzero(heights > -np.inf)
+    return places, heights.ravel()[places]
 
 
 def hull_of(corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

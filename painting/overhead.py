@@ -1,19 +1,21 @@
 """A frame from straight above, in parallel projection: a pure function of frame and scene, for any world.
 
-What is higher hides what is lower, by the greatest height of each shape. Boxes, spheres, cylinders and capsules have
-their exact outlines; a hull has that of its corners, a mesh that of its hull. What stands still is painted once.
+What is higher hides what is lower: of boxes, hulls and meshes that stand still by the height at each pixel, so that
+what is on a slope, or in a hall that is one mesh, is seen; of all else by the greatest height of each shape. Outlines
+are exact, but that of a mesh that moves is that of its hull. What stands still is painted once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor
+from math import floor, inf
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.painting.shapes import Shapes, View
+from foosim.common.errors import BadValue
+from foosim.painting.shapes import Shapes, View, covered_by_surface
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
@@ -22,6 +24,7 @@ from foosim.world.scene import ORIGIN, UPRIGHT, Body, Pose, Scene, Shape, enclos
 Picture: TypeAlias = NDArray[np.uint8]
 Region: TypeAlias = tuple[float, float, float, float]
 """The least x and y and the greatest x and y that are shown, in m."""
+PIXELS_MAX: Final = 8192
 BEYOND: Final = (24, 26, 30)
 """What is painted where nothing is: dark grey."""
 STANDING_M: Final = 0.05
@@ -37,9 +40,16 @@ class OverheadPainter:
     def __init__(
         self, scene: Scene, layout: Layout, pixels: tuple[int, int] = (320, 180), region: Region | None = None
     ) -> None:
-        """`pixels` are width and height. `region` is shown whole; by default, what stands in the world is."""
+        """`pixels` are width and height. `region` is shown whole; by default, what stands in the world is.
+
+        Raises BadValue for pixels or a region that are none.
+        """
         width, height = pixels
+        if not (1 <= width <= PIXELS_MAX and 1 <= height <= PIXELS_MAX):
+            raise BadValue(f"pixels: width and height from 1 to {PIXELS_MAX} are needed", f"{width} x {height}")
         low_x, low_y, high_x, high_y = _standing(scene) if region is None else region
+        if not (-inf < low_x < high_x < inf and -inf < low_y < high_y < inf):
+            raise BadValue("region: the least x and y, then greater ones are needed", str(region))
         scale = min(width / (high_x - low_x), height / (high_y - low_y))
         left, top = (low_x + high_x) / 2 - width / 2 / scale, (low_y + high_y) / 2 + height / 2 / scale
         self.view = View(width, height, scale, left, top)
@@ -65,11 +75,14 @@ class OverheadPainter:
         self._paint_still(still, poses)
 
     def _paint_still(self, still: Sequence[tuple[int, Shape]], poses: Sequence[Pose]) -> None:
-        """Paint what stands still, one shape after the other, since sizes differ."""
-        found = [Shapes([one]).covered(poses, self.view) for one in still]
-        for one in sorted(found, key=lambda one: float(one.heights[0]) if len(one.heights) else 0.0):
-            self._ground[one.places] = one.colours
-            self._heights[one.places] = one.heights
+        """Paint what stands still, one shape after the other; of places at one height the later counts."""
+        for number, shape in still:
+            one = covered_by_surface(shape, poses[number], self.view)
+            if one is None:
+                one = Shapes([(number, shape)]).covered(poses, self.view)
+            seen = one.heights >= self._heights[one.places]
+            self._ground[one.places[seen]] = one.colours[seen]
+            self._heights[one.places[seen]] = one.heights[seen]
 
     def pixel(self, x: float, y: float) -> tuple[int, int]:
         """Return column and row of the pixel that shows a place (m), whether it is within the picture or not."""

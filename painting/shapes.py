@@ -16,6 +16,7 @@ from foosim.painting.outlines import (
     covered_by_boxes,
     covered_by_corners,
     covered_by_rounds,
+    surface_of,
 )
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Cylinder, Hull, Pose, Shape, Sphere, rotate
@@ -34,6 +35,19 @@ class View(NamedTuple):
     scale: float
     left: float
     top: float
+
+
+BOX_CORNERS: Final = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+BOX_TRIANGLES: Final = np.array(
+    [
+        triangle
+        for a, b, c, d in ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+        for triangle in ((a, b, c), (a, c, d))
+    ],
+    np.int32,
+)
+LEVEL_DIGITS: Final = 6
+"""Heights of faces are rounded to so many digits of a metre: those at one level are at one height."""
 
 
 class Covered(NamedTuple):
@@ -65,11 +79,14 @@ class Shapes:
             -1, 3, 3
         )
         """The axes of each shape in the frame of its link."""
-        colours = np.array([shape.colour[:3] for _, shape in shapes]).reshape(-1, 3)
-        self._colours: Colours = np.rint(WHITE * np.clip(colours, 0.0, 1.0)).astype(np.uint8)
+        self._colours = _colours([shape for _, shape in shapes])
         self._boxes = _grouped(shapes, _box_size)
         self._rounds = _grouped(shapes, _round_size)
-        self._corners = [(number, _corners(shape)) for number, (_, shape) in enumerate(shapes) if _corners(shape).size]
+        self._corners = [
+            (number, _faces(shape)[0])
+            for number, (_, shape) in enumerate(shapes)
+            if isinstance(shape.geometry, Mesh | Hull)
+        ]
 
     def covered(self, poses: Sequence[Pose], view: View) -> Covered:
         """Return what the shapes cover, with their links at these poses."""
@@ -141,7 +158,7 @@ def _take(
 
 def _in_order(which: NDArray[np.intp], places: Places, tops: Numbers, colours: Colours) -> Covered:
     """Return pixels by the heights of their shapes, and at one height by the shapes' numbers."""
-    rank = np.empty(len(tops), np.uint16)
+    rank = np.empty(len(tops), np.min_scalar_type(len(tops)))  # the smaller, the faster it is sorted
     rank[np.argsort(tops, kind="stable")] = np.arange(len(tops))
     order = np.argsort(rank[which], kind="stable")
     which = which[order]
@@ -187,12 +204,41 @@ def _round_size(shape: Shape) -> tuple[float, float, float] | None:
     return None
 
 
-def _corners(shape: Shape) -> Numbers:
-    """Return the corners of a hull or a mesh in the frame of its link, (n, 3); none of another shape."""
+def covered_by_surface(shape: Shape, pose: Pose, view: View) -> Covered | None:
+    """Return what a shape whose link is at this pose covers, with the height of its surface at each pixel.
+
+    None of what is round.
+    """
+    corners, triangles = _faces(shape)
+    if not len(triangles):
+        return None
+    _, position, turned = pose
+    placed = _rotated(np.broadcast_to(np.array(turned), (len(corners), 4)), corners) + np.array(position)
+    seen = (placed - (view.left, view.top, 0.0)) * (view.scale, -view.scale, 1.0)
+    places, heights = surface_of(seen, triangles, view.width, view.height)
+    colours = np.broadcast_to(_colours([shape])[0], (len(places), 3))
+    return Covered(places, np.round(heights, LEVEL_DIGITS).astype(np.float32), colours)
+
+
+def _colours(shapes: Sequence[Shape]) -> Colours:
+    colours = np.array([shape.colour[:3] for shape in shapes]).reshape(-1, 3)
+    rounded: Colours = np.rint(WHITE * np.clip(colours, 0.0, 1.0)).astype(np.uint8)
+    return rounded
+
+
+def _faces(shape: Shape) -> tuple[Numbers, NDArray[np.int32]]:
+    """Return the corners of a box, a hull or a mesh in the frame of its link, (n, 3), and its triangles, (m, 3).
+
+    What is round has none.
+    """
     geometry = shape.geometry
-    mesh = geometry if isinstance(geometry, Mesh) else geometry.mesh if isinstance(geometry, Hull) else None
-    if mesh is None:
-        return np.empty((0, 3))
-    turned = np.broadcast_to(np.array(shape.orientation), (len(mesh.vertices), 4))
-    corners: Numbers = _rotated(turned, mesh.vertices) + np.array(shape.position)
-    return corners
+    triangles = BOX_TRIANGLES
+    if isinstance(geometry, Box):
+        vertices = BOX_CORNERS * geometry.half
+    elif isinstance(geometry, Mesh | Hull):
+        mesh = geometry if isinstance(geometry, Mesh) else geometry.mesh
+        vertices, triangles = mesh.vertices, mesh.triangles
+    else:
+        return np.empty((0, 3)), np.empty((0, 3), np.int32)
+    turned = np.broadcast_to(np.array(shape.orientation), (len(vertices), 4))
+    return _rotated(turned, vertices) + np.array(shape.position), triangles
