@@ -286,6 +286,15 @@ def test_tracks_end_at_ramps_and_goals_and_short_ones_are_left_out() -> None:
         usable([*whole, *whole], field, table.ramps.leg, table.goal)
 
 
+def test_more_tracks_than_are_fitted_in_minutes_are_refused() -> None:
+    table = table_of(load_deployment(TABLE.read_text(), "table.yaml"))
+    rows = "".join(f"{of},{number / 100},{of},0\n" for of in range(51) for number in range(20))
+    tracks = read_tracks("track," + HEAD + rows, "many.csv")
+    with pytest.raises(BadTracks, match=r"^51 tracks of 1020 points, at most 50 and 20000 are fitted at once$"):
+        usable(tracks, field_of(table), table.ramps.leg, table.goal)
+    assert len(usable(tracks[:50], field_of(table), table.ramps.leg, table.goal)[0]) == 50
+
+
 def test_a_goal_ends_a_track_and_what_is_behind_it_does_not_matter() -> None:
     """In the pocket, then in somebody's hand."""
     table = table_of(load_deployment(TABLE.read_text(), "table.yaml"))
