@@ -17,7 +17,7 @@ import gymnasium
 import numpy as np
 
 from bench.bare_tick import BareTable
-from foosim.players.learning.exercises import DEFEND
+from foosim.players.learning.exercises import PLAYER
 from foosim.players.learning.table_rewards import Goals
 from foosim.rehearsal.env import TABLE, FoosimEnv, FoosimParallelEnv, parallel_env
 
@@ -27,7 +27,7 @@ BARE_TICKS: Final = 5
 SWAY: Final = {"*/position.spin": (-3.0, 3.0)}
 TURNS: Final = 5
 PROCESSES: Final = 2
-MADE: Final = partial(FoosimEnv, DEFEND.file, sets=DEFEND.sets)
+MADE: Final = partial(FoosimEnv, TABLE, sets=(PLAYER,))
 """One agent, and no other player."""
 
 

@@ -67,6 +67,9 @@ class _Table:
     def __init__(
         self, fitted: Sequence[FittedSensor | FittedActuator], bounds: Mapping[str, Bounds] = NO_BOUNDS
     ) -> None:
+        for glob, (least, most) in bounds.items():
+            if not least < most:
+                raise BadValue(f"bounds of {glob}: the first is below the second", str((least, most)))
         columns: list[Column] = []
         self.parts: list[_Part] = []
         for one in fitted:
@@ -78,17 +81,18 @@ class _Table:
                 field = field_at(one.codec.fields, size, place)
                 low, high = each[place] if each else limits.get(field.name, (-inf, inf))
                 name = f"{one.robot}/{one.channel}.{field.name}"
-                for least, most in [bounds[glob] for glob in bounds if fnmatchcase(name, glob)]:
-                    low, high = max(low, least), min(high, most)
+                for glob, (least, most) in bounds.items():
+                    if fnmatchcase(name, glob):
+                        if not max(low, least) < min(high, most):
+                            raise BadValue(f"bounds of {glob}: {name} has {low:g} to {high:g}", str((least, most)))
+                        low, high = max(low, least), min(high, most)
                 columns.append(Column(one.robot, one.channel, field.name, field.unit, low, high))
             self.parts.append(_Part((one.robot, one.channel), one, start, len(columns)))
         self.columns = tuple(columns)
         names = [f"{column.robot}/{column.channel}.{column.field}" for column in columns]
-        for glob, (least, most) in bounds.items():
+        for glob in bounds:
             if not any(fnmatchcase(name, glob) for name in names):
                 raise UnknownName("selects no robot/channel.field", glob, names)
-            if not least < most:
-                raise BadValue(f"bounds of {glob}: the first is below the second", (least, most))
 
 
 def chosen(pairs: Sequence[Pair], globs: Sequence[str]) -> list[Pair]:
@@ -185,12 +189,12 @@ class CommandVector:
         if vector.shape != (len(self.columns),):
             raise BadValue(f"an action has {len(self.columns)} numbers, this one has the shape {vector.shape}")
         numbers: list[float] = vector.tolist()
+        if not all(map(isfinite, numbers)):
+            number, column = next(pair for pair in zip(numbers, self.columns, strict=True) if not isfinite(pair[0]))
+            raise BadValue(f"{column.field} of {column.robot} is not finite", number)
         clipped = [
             low if number < low else high if number > high else number
             for number, low, high in zip(numbers, self._lows, self._highs, strict=True)
         ]
-        if not all(map(isfinite, clipped)):
-            number, column = next(pair for pair in zip(clipped, self.columns, strict=True) if not isfinite(pair[0]))
-            raise BadValue(f"{column.field} of {column.robot} is not finite", number)
         packed = self._pack(*clipped)  # as a codec packs numbers
         return [Outgoing(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]

@@ -137,7 +137,9 @@ class Resident:
         return sent
 
 
-def _frame(deployment: Deployment, start: Start | str | None) -> Frame:
+def _frame(deployment: Deployment, start: Start | Frame | str | None) -> Frame:
+    if isinstance(start, Frame):
+        return start
     return first_frame(deployment, read_branch(start, deployment).start if isinstance(start, str) else start)
 
 
@@ -155,15 +157,15 @@ class Simulation:
         network: bool = False,
         period: int = 1,
         sets: Sequence[str] = (),
-        start: Start | str | None = None,
+        start: Start | Frame | str | None = None,
         seed: int | None = None,
     ) -> None:
         """`deployment` is one that was loaded, or a file, of which `sets` change values as `--set` does.
 
         `agents` are players that the caller speaks for. With `network`, packets go through the network that the
         deployment declares; without, readings arrive at once and commands, too. The network hands readings to agents
-        every `period` ticks. `start` is the frame to begin with: a `Start`, or `CAPTURE@12.5s`. `seed` is another one
-        than the deployment's.
+        every `period` ticks. `start` is the frame to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`. `seed` is
+        another one than the deployment's.
 
         Raises DeploymentError, AssetError, UnknownName for an agent that is none, BadValue for a start that does not
         fit, PlayerError for a player that cannot be made.
@@ -195,16 +197,16 @@ class Simulation:
 
     # --- beginning ---------------------------------------------------------------------------------------------------
 
-    def reset(self, start: Start | str | Frame | None = None, seed: int | None = None) -> Frame:
+    def reset(self, start: Start | Frame | str | None = None, seed: int | None = None) -> Frame:
         """Begin anew with the first frame, or another one; the network is empty, and players have no memory.
 
         `seed` is that of all draws of the world, its network and its players; None: the deployment's.
         """
         deployment = self._seeded(seed)
-        self._begin(deployment, start if isinstance(start, Frame) else _frame(deployment, start))
+        self._begin(deployment, _frame(deployment, start))
         return self.frame
 
-    def start_frame(self, start: Start | str | None = None, seed: int | None = None) -> Frame:
+    def start_frame(self, start: Start | Frame | str | None = None, seed: int | None = None) -> Frame:
         """Return the frame that `reset` would begin with. It raises as that does."""
         return _frame(self._seeded(seed), start)
 
@@ -213,14 +215,14 @@ class Simulation:
 
     def _begin(self, deployment: Deployment, frame: Frame) -> None:
         self.deployment = deployment
+        names = [name for name in sorted(deployment.players) if name not in self.agents]
+        self._residents = {name: Resident(deployment, name) for name in names}  # first: one may be refused
         if self._world is None:
             self._world = SteppedWorld(deployment, frame)
         else:
             self._world.begin(deployment, frame)
         for agent in self.agents.values():
             agent.begin()
-        names = [name for name in sorted(deployment.players) if name not in self.agents]
-        self._residents = {name: Resident(deployment, name) for name in names}
         joining = [
             Joining(name, self.period, agent.hears, frame.tick % self.period) for name, agent in self.agents.items()
         ]

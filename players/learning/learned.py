@@ -43,7 +43,10 @@ class Learned:
         for key in parameters:
             if key != WEIGHTS:
                 raise UnknownName("unknown parameter", key, [WEIGHTS])
-        file = read_policy(Path(parameters.get(WEIGHTS, SHIPPED)))
+        path = parameters.get(WEIGHTS, SHIPPED)
+        if not isinstance(path, str | Path):
+            raise BadValue(f"{WEIGHTS}: not the path of a file", path)
+        file = read_policy(Path(path))
         robots = sorted(deployment.robots)
         pairs = [(robot, channel) for robot in robots for channel in deployment.robots[robot].sensors]
         self._readings = ReadingVector(deployment, chosen(pairs, file.readings), ages=True)

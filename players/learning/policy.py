@@ -1,16 +1,17 @@
-"""A learned policy: from what was read to what is commanded, by one hidden layer of a network.
+"""A learned policy: from what was read to what is commanded, by a network with one hidden layer.
 
-What is read is known as old as it is: each reading is carried on to the present by its rate of change. All arithmetic
-is + - * / in numpy, element by element, so that it has equal bits everywhere.
+Each reading is carried on to the present by its rate of change and its age. Inputs are these readings, their rates and
+1. Commands see the hidden units and the inputs themselves. All arithmetic is + - * / in numpy, element by element, so
+that it has equal bits everywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from foosim.client.vectors import NEVER_S, Bounds, Column
@@ -25,21 +26,36 @@ RATE_MAX: Final = 20.0
 """A rate (1/s, in the reading's unit) above this is that of what was put elsewhere."""
 
 
+Scale: TypeAlias = Annotated[float, Meta(gt=0)]
+
+
 class PolicyFile(Struct, frozen=True, forbid_unknown_fields=True):
     """A policy as its file has it: what it reads and commands, and its weights.
 
     `readings` and `commands` are globs of `robot/channel`, `bounds` are of `robot/channel.field`, as an environment
     takes them; `columns` are the readings by name that it uses, with what each and its rate are divided by, `moves` the
-    commands by name that it gives: others stay in the middle of their bounds.
+    commands by name that it gives: others stay in the middle of their bounds. `hidden` is the number of hidden units.
+    `weights` are those of the hidden units, one after the other, then those of the moves; none are zeros.
     """
 
     readings: list[str]
     commands: list[str]
     bounds: dict[str, Bounds]
-    columns: dict[str, tuple[float, float]]
+    columns: dict[str, tuple[Scale, Scale]]
     moves: list[str]
-    hidden: int
+    hidden: Annotated[int, Meta(ge=0)]
     weights: list[float] = []
+
+    @property
+    def shapes(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """The weights of the hidden units, (hidden, inputs), and of the moves, (moves, hidden + inputs)."""
+        inputs = 2 * len(self.columns) + 1
+        return (self.hidden, inputs), (len(self.moves), self.hidden + inputs)
+
+    @property
+    def size(self) -> int:
+        """The number of weights."""
+        return sum(rows * columns for rows, columns in self.shapes)
 
 
 def column_name(column: Column) -> str:
@@ -69,22 +85,20 @@ class Policy:
         self._rate_scale = np.array([1.0 / rate for _, rate in file.columns.values()])
         low, high = np.array([one.low for one in commands]), np.array([one.high for one in commands])
         self._middle, self._half = (low + high) / 2, (high - low) / 2
-        inputs = 2 * len(file.columns) + 1
-        self._sizes = (file.hidden, inputs), (len(file.moves), file.hidden + 1)
-        self.size = sum(rows * columns for rows, columns in self._sizes)
-        """The number of weights."""
-        self._first, self._second = (np.zeros(size) for size in self._sizes)
-        self.set_weights(file.weights or [0.0] * self.size)
+        self._file = file
+        self._first, self._second = (np.zeros(shape) for shape in file.shapes)
+        self.set_weights(file.weights or [0.0] * file.size)
         self._time = self._value = self._rate = np.zeros(0)
         self.begin()
 
     def set_weights(self, weights: Sequence[float] | Numbers) -> None:
         """Take other weights, (size,). Raises BadValue for another number of them, or one that is not finite."""
         numbers = np.asarray(weights, np.float64)
-        if numbers.shape != (self.size,) or not np.isfinite(numbers).all():
-            raise BadValue(f"a policy of this shape has {self.size} finite weights", numbers.size)
-        cut = self._sizes[0][0] * self._sizes[0][1]
-        self._first, self._second = numbers[:cut].reshape(self._sizes[0]), numbers[cut:].reshape(self._sizes[1])
+        size, (of_hidden, of_moves) = self._file.size, self._file.shapes
+        if numbers.shape != (size,) or not np.isfinite(numbers).all():
+            raise BadValue(f"a policy of this shape has {size} finite weights", numbers.size)
+        cut = of_hidden[0] * of_hidden[1]
+        self._first, self._second = numbers[:cut].reshape(of_hidden), numbers[cut:].reshape(of_moves)
 
     def begin(self) -> None:
         """Forget what was read."""
@@ -110,7 +124,7 @@ class Policy:
         )
         present = self._value + rate * np.where(has_come, age, 0.0)
         inputs = np.concatenate((present * self._scale, rate * self._rate_scale, (1.0,)))
-        hidden = np.concatenate((_squashed((self._first * inputs).sum(axis=1)), (1.0,)))
+        hidden = np.concatenate((_squashed((self._first * inputs).sum(axis=1)), inputs))
         commands: Numbers = self._middle.copy()
         commands[self._moves] += self._half[self._moves] * _squashed((self._second * hidden).sum(axis=1))
         return commands

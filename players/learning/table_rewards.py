@@ -97,7 +97,8 @@ class DefendShot:
         """Speeds are the least and the greatest, in m/s. The ball starts `start_x` m from the field's middle on the
         defenders' side, at most `start_y` m beside it.
 
-        Raises BadValue for an agent that does not command the rods of one team, and for agents of two teams.
+        Raises BadValue for these if no such shot can be made, for an agent that does not command the rods of one team,
+        and for agents of two teams.
         """
         self._teams = teams_of(deployment, robots)
         if len(set(self._teams.values())) != 1:
@@ -109,6 +110,16 @@ class DefendShot:
         self._deployment, self._speed = deployment, speed
         self._start = start_x, start_y
         self._goal_x, self._radius = table.field.length / 2, table.ball.radius
+        if not STILL_SPEED < speed[0] <= speed[1] <= table.ball.speed_limit:
+            raise BadValue(
+                f"speeds of a shot rise from above {STILL_SPEED} to {table.ball.speed_limit:g} m/s", str(speed)
+            )
+        for what, value, most in (
+            ("start_x", start_x, self._goal_x - self._radius),
+            ("start_y", start_y, table.field.width / 2 - self._radius),
+        ):
+            if not 0.0 <= value <= most:
+                raise BadValue(f"{what} of a shot is 0 to {most:g} m", value)
         self._goal_y = table.goal.width / 2 - table.ball.radius
         self._ticks = round(SHOT_S * 1e9 / deployment.tick_ns)
         commanded = {robot for its in robots.values() for robot in its}

@@ -11,17 +11,20 @@ from numpy.typing import NDArray
 
 from foosim.capture.start_frame import read_branch
 from foosim.client.vectors import EVERYTHING, Column, CommandVector, ReadingVector, Vector, chosen
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.limits import COUNTER_MAX
 from foosim.deployment.schema import Deployment
 from foosim.painting.overhead import OverheadPainter
 from foosim.rehearsal.env.reward import Nothing, Reward, RewardFactory
 from foosim.rehearsal.simulation import Agent, Simulation, read_for_stepping
+from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.start import Start
 
 PIXELS: Final = (320, 180)
+PIXELS_MAX: Final = 8192
+"""The widest and the highest picture."""
 START: Final = "start"
 """The option of `reset` that names a frame to begin with."""
 
@@ -50,7 +53,7 @@ class Episodes:
         network: bool = False,
         reward: RewardFactory = Nothing,
         seconds: float | None = None,
-        start: Start | str | None = None,
+        start: Start | Frame | str | None = None,
         readings: Sequence[str] = EVERYTHING,
         commands: Sequence[str] = EVERYTHING,
         bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -61,7 +64,16 @@ class Episodes:
         """Raises DeploymentError, UnknownName and BadValue for arguments that are not valid; see `parallel_env`."""
         if not isinstance(deployment, Deployment):
             deployment = read_for_stepping(deployment, sets)
+        elif sets:
+            raise BadValue("a loaded deployment takes no sets, its file does", list(sets))
+        if agents is not None and not agents:
+            raise BadValue("an environment has one agent or more", list(agents))
+        if seconds is not None and not seconds > 0.0:
+            raise BadValue("seconds of an episode are more than 0", seconds)
+        if not all(0 < side <= PIXELS_MAX for side in pixels):
+            raise BadValue(f"pixels are a width and a height, each of 1 to {PIXELS_MAX}", str(pixels))
         self.ticks = _ticks(rate_hz, deployment.tick_ns)
+        self.rate_hz = rate_hz
         self._start = read_branch(start, deployment).start if isinstance(start, str) else start
         self.simulation = Simulation(deployment, agents=agents, network=network, period=self.ticks, start=self._start)
         simulation = self.simulation
@@ -69,10 +81,14 @@ class Episodes:
         self.agents = tuple(simulation.agents)
         self._steps_max = None if seconds is None else max(1, round(seconds * rate_hz))
         self.vectors: dict[str, tuple[ReadingVector, CommandVector]] = {}
-        for name, agent in simulation.agents.items():
-            self.vectors[name] = _vectors(declared, agent, readings, commands, bounds or {}, ages)
-        robots = {name: _commanded(vectors[1]) for name, vectors in self.vectors.items()}
-        self._reward: Reward = reward(declared, robots)
+        try:
+            for name, agent in simulation.agents.items():
+                self.vectors[name] = _vectors(declared, agent, readings, commands, bounds or {}, ages)
+            robots = {name: _commanded(vectors[1]) for name, vectors in self.vectors.items()}
+            self._reward: Reward = reward(declared, robots)
+        except BaseException:
+            simulation.close()
+            raise
         self._seed: int | None = None
         self._episode = self._steps = 0
         self._pixels = pixels
@@ -89,8 +105,11 @@ class Episodes:
 
         A seed begins a row of episodes: that of the first is the seed itself, those of further ones follow from it.
         Without one ever, the first has the deployment's. The option `start` is the frame to begin with, instead of that
-        of the environment; without a seed, draws are then those of the deployment's.
+        of the environment; without a seed, draws are then the deployment's. Other options are nobody's: the check of
+        PettingZoo gives one. Raises BadValue for a seed that is none, and as `Simulation.reset` does.
         """
+        if seed is not None and not 0 <= seed <= COUNTER_MAX:
+            raise BadValue(f"a seed is 0 to {COUNTER_MAX}", seed)
         if seed is not None:
             self._seed, self._episode = int(seed), 0
         start = (options or {}).get(START, self._start)
@@ -114,11 +133,14 @@ class Episodes:
         """Take the actions of agents, compute the time to the next ones, and return what that led to.
 
         An agent without an action sends nothing: its robots keep their last commands. Raises BadValue for an action of
-        another shape or with a number that is not finite.
+        another shape or with a number that is not finite, UnknownName for one of no agent.
         """
         assert self.is_running, "reset begins an episode"
         simulation = self.simulation
         before = simulation.frame
+        for name in actions:
+            if name not in self.vectors:
+                raise UnknownName("an action of no agent", name, self.agents)
         packets = {
             name: self.vectors[name][1].packets(np.asarray(action, np.float64)) for name, action in actions.items()
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -26,10 +26,15 @@ Infos = dict[str, dict[str, Any]]
 class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64]]):  # type: ignore[misc]
     """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
 
-    `infos` have the tick and the simulated time (`tick`, `time_s`).
+    `infos` have the tick and the simulated time (`tick`, `time_s`). `metadata["render_fps"]` of an environment is the
+    rate at which its agents act.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"name": "foosim", "render_modes": RENDER_MODES, "is_parallelizable": True}
+    metadata: dict[str, Any] = {  # noqa: RUF012  # as PettingZoo declares it
+        "name": "foosim",
+        "render_modes": RENDER_MODES,
+        "is_parallelizable": True,
+    }
 
     def __init__(
         self, deployment: Deployment | str | Path, *, render_mode: str | None = None, **arguments: Any
@@ -38,6 +43,7 @@ class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._episodes = Episodes(deployment, **arguments)
+        self.metadata = {**self.metadata, "render_fps": self._episodes.rate_hz}
         self.possible_agents = list(self._episodes.agents)
         self.agents: list[str] = []
         of_all = {name: self._episodes.columns(name) for name in self.possible_agents}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import gymnasium
 import numpy as np
@@ -18,8 +18,6 @@ from foosim.rehearsal.env.spaces import box_of
 from foosim.rehearsal.simulation import Simulation, agents_of, read_for_stepping
 
 RENDER_MODES: Final = ["rgb_array"]
-FPS: Final = 100
-"""Steps a second of simulated time, at the rate that is the default."""
 
 
 def check_render_mode(mode: str | None) -> None:
@@ -29,9 +27,12 @@ def check_render_mode(mode: str | None) -> None:
 
 
 class FoosimEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
-    """One agent of a deployment. `info` has the tick and the simulated time (`tick`, `time_s`)."""
+    """One agent of a deployment. `info` has the tick and the simulated time (`tick`, `time_s`).
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": FPS}  # type: ignore[misc]
+    `metadata["render_fps"]` of an environment is the rate at which its agent acts.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": RENDER_MODES}  # noqa: RUF012  # as Gymnasium declares it
 
     def __init__(
         self,
@@ -48,6 +49,7 @@ class FoosimEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._episodes = _episodes(deployment, agent, arguments)
+        self.metadata = {**self.metadata, "render_fps": self._episodes.rate_hz}
         (self._agent,) = self._episodes.agents
         readings, commands = self._episodes.columns(self._agent)
         self.observation_space: spaces.Box = box_of(readings)  # type: ignore[assignment]

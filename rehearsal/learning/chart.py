@@ -21,8 +21,18 @@ class Point(NamedTuple):
     error: float
 
 
-def curve_svg(title: str, x_title: str, y_title: str, points: Sequence[Point]) -> str:
-    """Return a curve with bars of twice the standard error to either side, as the text of an SVG."""
+class Level(NamedTuple):
+    """A share of 0 to 1 that does not depend on x, and what it is of."""
+
+    name: str
+    share: float
+
+
+def curve_svg(title: str, x_title: str, y_title: str, points: Sequence[Point], level: Level | None = None) -> str:
+    """Return a curve with bars of twice the standard error to either side, as the text of an SVG.
+
+    A level is a dashed line across it.
+    """
     x_max = max(point.x for point in points) or 1.0
     across, along = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
@@ -45,6 +55,12 @@ def curve_svg(title: str, x_title: str, y_title: str, points: Sequence[Point]) -
             f'<line x1="{LEFT:.0f}" x2="{WIDTH - RIGHT:.0f}" y1="{at}" y2="{at}" stroke="#ddd"/>',
             f'<text x="{LEFT - 8:.0f}" y="{at}" dy="4" text-anchor="end">{100 * share:.0f} %</text>',
             f'<text x="{x_of(tick)}" y="{HEIGHT - BOTTOM + 18:.0f}" text-anchor="middle">{tick:,.6g}</text>',
+        ]
+    if level is not None:
+        at, right = y_of(level.share), WIDTH - RIGHT
+        lines += [
+            f'<line x1="{LEFT:.0f}" x2="{right:.0f}" y1="{at}" y2="{at}" stroke="#b4541f" stroke-dasharray="6 4"/>',
+            f'<text x="{right - 4:.0f}" y="{at}" dy="-5" text-anchor="end" fill="#b4541f">{escape(level.name)}</text>',
         ]
     path = " ".join(f"{x_of(point.x)},{y_of(point.share)}" for point in points)
     lines.append(f'<polyline points="{path}" fill="none" stroke="#1f6fb4" stroke-width="2"/>')

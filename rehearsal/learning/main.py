@@ -6,6 +6,7 @@ A shell over `learning.training` and `learning.shots`.
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -13,10 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import msgspec
 import typer
 
-from foosim.common.errors import BadValue, Failed
+from foosim.common.errors import BadValue, Failed, read_at
 from foosim.common.json_text import encode_json
 from foosim.common.units import NS_PER_S, parse_ns
-from foosim.rehearsal.learning.chart import Point, curve_svg
+from foosim.rehearsal.learning.chart import Level, Point, curve_svg
 from foosim.runtime.command import VersionOption, new_app, run_app
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ app = new_app()
 LIBRARIES: Final = ("cma", "gymnasium", "pettingzoo")
 """Those of the extra."""
 FIRST_SHOT: Final = 2_000_000
-"""The seed of the first shot that `delays` counts: training learns from others, and tests by others."""
+"""The seed of the first shot that `delays` counts: training learns from others, chooses and tests by others."""
 MS_PER_S: Final = 1e3
 
 
@@ -44,28 +45,37 @@ def foosim_learn(version: VersionOption = False) -> None:
 @app.command()
 def train(
     weights: Annotated[Path, typer.Argument(metavar="FILE", help="The policy is written here, as JSON.")],
-    minutes: Annotated[float, typer.Option(help="Wall time after which no generation is begun.", min=0.0)] = 10.0,
-    generations: Annotated[int, typer.Option(help="Number of generations at the most.", min=1)] = 20,
+    minutes: Annotated[float, typer.Option(help="Wall time, after at least one generation.", min=0.0)] = 10.0,
+    generations: Annotated[int, typer.Option(help="Number of generations at the most.", min=1)] = 12,
     seed: Annotated[int, typer.Option(help="Of the shots and the policies that are tried.", min=1)] = 1,
     jobs: Annotated[int, typer.Option(help="Number of processes; it changes no result.", min=1)] = 2,
     picture: Annotated[Path | None, typer.Option(help="The curve is written here, as SVG.")] = None,
 ) -> None:
-    """Train a keeper by CMA-ES, and test it on shots that it does not learn from."""
+    """Train a keeper by CMA-ES, and test it on shots that it does not learn from.
+
+    Ctrl-C ends it; then nothing is written.
+    """
     training = _training()
     _check_folders(weights, picture)
+
+    def report(measured: Measured) -> None:
+        shots = f"{measured.shots} shots" if measured.generation else "untrained"
+        print(f"generation {measured.generation}: saves {100 * measured.saved:.0f} % ({shots})", flush=True)
+
+    effort = training.EFFORT
     end_s = time.monotonic() + 60.0 * minutes
-
-    def report(tested: Measured) -> None:
-        shots = f"{tested.shots} shots" if tested.generation else "untrained"
-        print(f"generation {tested.generation}: saves {100 * tested.saved:.0f} % ({shots})", flush=True)
-
-    trained = training.train(generations, seed, jobs, report=report, goes_on=lambda: time.monotonic() < end_s)
+    trained = training.train(generations, seed, jobs, effort=effort, report=report, end_s=end_s)
     _write(weights, msgspec.json.format(msgspec.json.encode(trained.file), indent=1) + b"\n")
+    print(
+        f"kept: generation {trained.kept.generation}, by {effort.choices} other shots; "
+        f"it saves {100 * trained.kept.saved:.0f} %, who follows the ball {100 * trained.by_hand:.0f} %"
+    )
     if picture is not None:
         points = [
-            Point(float(one.shots), one.saved, training.error_of(one.saved, training.TESTS)) for one in trained.curve
+            Point(float(one.shots), one.saved, training.error_of(one.saved, effort.tests)) for one in trained.curve
         ]
-        chart = curve_svg("Learning to defend a shot", "shots learned from", "shots saved", points)
+        level = Level("follows the ball", trained.by_hand)
+        chart = curve_svg("Learning to defend a shot", "shots learned from", "shots saved", points, level)
         _write(picture, chart.encode())
 
 
@@ -92,12 +102,10 @@ def delays(
 
     points = []
     for delay_ns in _times(delay):
-        there = Network(DEFEND, delay_ns * MS_PER_S / NS_PER_S, weights)
-        try:
+        delay_ms = delay_ns * MS_PER_S / NS_PER_S
+        with closing(Network(DEFEND, delay_ms, weights)) as there:
             saved = sum(there.wins(range(FIRST_SHOT, FIRST_SHOT + shots))) / shots
-        finally:
-            there.close()
-        points.append(Point(delay_ns * MS_PER_S / NS_PER_S, saved, training.error_of(saved, shots)))
+        points.append(Point(delay_ms, saved, training.error_of(saved, shots)))
         if not json:
             error = 200 * points[-1].error
             print(f"{points[-1].x:g} ms: saves {100 * saved:.1f} % of {shots} shots (+- {error:.1f})", flush=True)
@@ -120,10 +128,7 @@ def _training() -> Any:
 
 def _times(text: str) -> list[int]:
     """Return the times in ns of a list such as `0 ms, 10 ms`. Raises BadValue."""
-    try:
-        return [parse_ns(part.strip()) for part in text.split(",")]
-    except BadValue as error:
-        raise BadValue(f"--delay: {error.problem}", error.value, error.nearest) from None
+    return [read_at("--delay", parse_ns, part.strip()) for part in text.split(",")]
 
 
 def _check_folders(*paths: Path | None) -> None:

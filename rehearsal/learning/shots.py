@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from foosim.client.vectors import Vector
 from foosim.players.learning.exercises import Exercise
-from foosim.players.learning.policy import Policy, PolicyFile
+from foosim.players.learning.learned import Learned
+from foosim.players.learning.policy import Policy
 from foosim.rehearsal.env.episodes import Episodes
 from foosim.rehearsal.simulation import Simulation, read_for_stepping
 
-
-def size_of(file: PolicyFile) -> int:
-    """Return how many weights a policy has."""
-    return file.hidden * (2 * len(file.columns) + 1) + len(file.moves) * (file.hidden + 1)
+Act: TypeAlias = Callable[[Vector, float], Vector]
+"""From an observation and the time (s) to an action."""
 
 
 class Range:
@@ -23,7 +24,7 @@ class Range:
     def __init__(self, exercise: Exercise) -> None:
         """Raises as `Episodes` does."""
         file = exercise.untrained
-        self._agent = exercise.agent
+        self._exercise = exercise
         self._episodes = Episodes(
             exercise.file,
             agents=[exercise.agent],
@@ -35,19 +36,23 @@ class Range:
             ages=True,
             sets=exercise.sets,
         )
-        self._policy = Policy(file, *self._episodes.columns(self._agent))
+        self._policy = Policy(file, *self._episodes.columns(exercise.agent))
 
     def wins(self, weights: Sequence[float] | Vector, seeds: Sequence[int]) -> list[bool]:
         """Return for each try, by its seed, whether its last step was worth more than nothing with these weights."""
         self._policy.set_weights(weights)
-        return [self._wins(seed) for seed in seeds]
+        return [self._wins(self._policy.act, seed) for seed in seeds]
 
-    def _wins(self, seed: int) -> bool:
-        episodes, policy, agent = self._episodes, self._policy, self._agent
-        policy.begin()
+    def wins_by_hand(self, seeds: Sequence[int]) -> list[bool]:
+        """Return the same of the exercise's controller that was written by hand."""
+        return [self._wins(lambda vector, _: self._exercise.by_hand(vector), seed) for seed in seeds]
+
+    def _wins(self, act: Act, seed: int) -> bool:
+        episodes, agent = self._episodes, self._exercise.agent
+        self._policy.begin()
         vector = episodes.reset(seed, None)[agent]
         while True:
-            found = episodes.step({agent: policy.act(vector, episodes.simulation.time_s)})
+            found = episodes.step({agent: act(vector, episodes.simulation.time_s)})
             if found.is_over:
                 return found.rewards[agent] > 0.0
             vector = found.observations[agent]
@@ -61,10 +66,15 @@ class Network:
     """An exercise over the emulated network, at which the player acts by itself, as in a run."""
 
     def __init__(self, exercise: Exercise, delay_ms: float, weights: Path | None = None) -> None:
-        """`delay_ms` is that of each packet, one way. `weights` is the policy's file, by default what was shipped."""
+        """`delay_ms` is that of each packet, one way. `weights` is the policy's file, by default what was shipped.
+
+        Raises BadValue and UnknownName for a policy that does not fit.
+        """
         links = f"network={{links: [{{id: delayed, from: '*', to: '*', delay: {delay_ms:g} ms}}]}}"
-        chosen = [] if weights is None else [f"players.{exercise.agent}.parameters={{weights: '{weights.absolute()}'}}"]
-        deployment = read_for_stepping(exercise.file, [*exercise.sets, links, *chosen])
+        chosen = {} if weights is None else {"weights": str(weights.absolute())}
+        sets = [*exercise.sets, links, f"players.{exercise.agent}.parameters={json.dumps(chosen)}"]
+        deployment = read_for_stepping(exercise.file, sets)
+        Learned(deployment, chosen)  # refused here, a policy is bad input; amid a simulation it is a player that failed
         self._agent = exercise.agent
         self._simulation = Simulation(deployment, agents=[], network=True)
         self._reward = exercise.reward(deployment, {exercise.agent: exercise.robots})

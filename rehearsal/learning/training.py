@@ -1,15 +1,18 @@
 """Training of a policy by CMA-ES: each generation's policies meet the same shots, and the strategy learns from ranks.
 
-The shots, the policies and so the result follow from the seed, on any number of processes.
+The mean of each generation's policies meets two more sets of shots. One decides which mean is kept, the curve
+shows what is saved of the other, so the choice does not flatter the curve. All follows from the seed, on any number of
+processes.
 """
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable, Sequence
-from math import sqrt
-from multiprocessing import get_context
-from typing import Any, Final, NamedTuple
+from functools import partial
+from math import inf, sqrt
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from msgspec.structs import replace
@@ -17,26 +20,40 @@ from msgspec.structs import replace
 from foosim.client.vectors import Vector
 from foosim.players.learning.exercises import DEFEND, Exercise
 from foosim.players.learning.policy import PolicyFile
-from foosim.rehearsal.learning.shots import Range, size_of
+from foosim.rehearsal.learning.shots import Range
+from foosim.rehearsal.workers import Workers
 
-POLICIES: Final = 12
-"""Policies of a generation."""
-SHOTS: Final = 40
-"""Shots at each of them."""
-TESTS: Final = 150
-"""Shots that are not learned from."""
-FIRST_TEST: Final = 1_000_000
-"""The seed of the first of these: no generation gets there."""
-TEST_EVERY: Final = 2
-"""Generations from one test to the next."""
-SEEDS_OF_A_RUN: Final = 10_000_000
-"""Runs of training by different seeds meet different shots."""
-STEP: Final = 0.5
+STEP: Final = 0.3
 """The first standard deviation of weights."""
+SEEDS_OF_A_RUN: Final = 10_000_000
+"""Runs of training by different seeds learn from different shots."""
+FIRST_TEST: Final = 1_000_000
+"""The seed of the first shot that a curve shows: no run learns from it, the first begins at SEEDS_OF_A_RUN."""
+FIRST_CHOICE: Final = 1_500_000
+"""The seed of the first shot that decides which mean is kept; none learns from it, either."""
+PIECE: Final = 20
+"""Shots that a process takes at once."""
+
+
+class Effort(NamedTuple):
+    """What training costs."""
+
+    policies: int = 12
+    """Policies of a generation."""
+    shots: int = 40
+    """Shots at each of them."""
+    choices: int = 60
+    """Shots at a mean that decide whether it is kept."""
+    tests: int = 120
+    """Shots at a mean that the curve shows."""
+
+
+EFFORT: Final = Effort()
+"""That of the command."""
 
 
 class Measured(NamedTuple):
-    """What the mean of a generation saves of the test's shots: `generation` and `shots` (learned from) until then."""
+    """What the mean of a generation saves of the test's shots, and how many shots were learned from until then."""
 
     generation: int
     shots: int
@@ -44,53 +61,116 @@ class Measured(NamedTuple):
 
 
 class Trained(NamedTuple):
-    """The policy that saved most of the test's shots, and how that came."""
+    """What training has made. The curve begins with the untrained policy, which stands still, at generation 0."""
 
     file: PolicyFile
+    """The policy that is kept."""
+    kept: Measured
+    """When it was measured, and what it saves."""
     curve: list[Measured]
+    by_hand: float
+    """What the exercise's controller saves of the same shots that was written by hand."""
 
 
-_range: Range | None = None
-"""That of a process that evaluates policies."""
+Row: TypeAlias = tuple[Vector | None, range]
+"""The weights of a policy, and the seeds of the shots at it. Without weights it is the exercise's controller that was
+written by hand."""
+Shares: TypeAlias = Callable[[Sequence[Row]], list[float]]
+"""Returns which share of its shots each row's policy saves."""
 
 
-def _begin(exercise: Exercise) -> None:
-    global _range  # noqa: PLW0603  # one for each process: it has an engine
-    _range = Range(exercise)
+class Pace:
+    """Tells whether a generation would end before a time (s of `now_s`), by the longest one so far."""
+
+    def __init__(self, end_s: float, now_s: Callable[[], float]) -> None:
+        self._end_s, self._now_s = end_s, now_s
+        self._longest_s, self._last_s = 0.0, now_s()
+
+    def has_time(self) -> bool:
+        """Whether one more would. It is called after each generation."""
+        now_s = self._now_s()
+        self._longest_s, self._last_s = max(self._longest_s, now_s - self._last_s), now_s
+        return now_s + self._longest_s <= self._end_s
 
 
-def _saved(task: tuple[Vector, range]) -> float:
-    """Return the share of shots, by their seeds, that a policy saves."""
-    assert _range is not None
-    weights, seeds = task
-    return sum(_range.wins(weights, seeds)) / len(seeds)
+_ranges: dict[str, Range] = {}
+"""Those of this process, by the exercise: a range has an engine."""
+
+
+def _saved(exercise: Exercise, row: Row) -> int:
+    """Return how many shots are saved."""
+    key = repr(exercise)
+    if key not in _ranges:
+        _ranges[key] = Range(exercise)
+    weights, seeds = row
+    return sum(_ranges[key].wins_by_hand(seeds) if weights is None else _ranges[key].wins(weights, seeds))
 
 
 class _Evaluation:
     """Evaluates policies on some processes, or in this one."""
 
     def __init__(self, exercise: Exercise, jobs: int) -> None:
-        self.jobs = max(1, jobs)
-        self._pool = get_context("spawn").Pool(jobs, _begin, (exercise,)) if jobs > 1 else None
-        if self._pool is None:
-            _begin(exercise)
+        self._exercise = exercise
+        self._workers = Workers(jobs, "the training")
 
-    def shares(self, tasks: Sequence[tuple[Vector, range]]) -> list[float]:
-        """Return what each policy saves of its shots."""
-        return [*map(_saved, tasks)] if self._pool is None else self._pool.map(_saved, tasks, chunksize=1)
-
-    def test(self, weights: Vector, shots: int) -> float:
-        """Return what a policy saves of shots that are not learned from."""
-        parts = [part for part in np.array_split(np.arange(FIRST_TEST, FIRST_TEST + shots), self.jobs) if len(part)]
-        shares = self.shares([(weights, range(int(part[0]), int(part[-1]) + 1)) for part in parts])
-        return sum(share * len(part) for share, part in zip(shares, parts, strict=True)) / shots
+    def shares(self, rows: Sequence[Row]) -> list[float]:
+        """Return which share of its shots each row's policy saves."""
+        pieces = [
+            (number, (weights, seeds[at : at + PIECE]))
+            for number, (weights, seeds) in enumerate(rows)
+            for at in range(0, len(seeds), PIECE)
+        ]
+        counts = self._workers.results(partial(_saved, self._exercise), [piece for _, piece in pieces])
+        saved = [0] * len(rows)
+        for (number, _), count in zip(pieces, counts, strict=True):
+            saved[number] += count
+        return [count / len(seeds) for count, (_, seeds) in zip(saved, rows, strict=True)]
 
     def close(self) -> None:
-        """End the processes."""
-        if self._pool is not None:
-            self._pool.terminate()
-        elif _range is not None:
-            _range.close()
+        """End the processes, or free the engine."""
+        self._workers.close()
+        for there in _ranges.values():
+            there.close()
+        _ranges.clear()
+
+
+class Best(NamedTuple):
+    """The weights that are kept, when they were measured, and the curve."""
+
+    weights: Vector
+    kept: Measured
+    curve: list[Measured]
+
+
+def learn(
+    shares: Shares,
+    size: int,
+    generations: int,
+    seed: int,
+    effort: Effort,
+    report: Callable[[Measured], None],
+    pace: Pace,
+) -> Best:
+    """Learn `size` weights, beginning with zeros, for some generations: at least one, and more while there is time."""
+    tests = range(FIRST_TEST, FIRST_TEST + effort.tests)
+    choices = range(FIRST_CHOICE, FIRST_CHOICE + effort.choices)
+    strategy = _strategy(size, seed, effort)
+    curve: list[Measured] = []
+    most, best = -1.0, np.zeros(size)
+    for generation in range(generations + 1):
+        if generation > 0:
+            first = seed * SEEDS_OF_A_RUN + generation * effort.shots
+            policies: list[Vector] = strategy.ask()
+            found = shares([(policy, range(first, first + effort.shots)) for policy in policies])
+            strategy.tell(policies, [-share for share in found])
+        saved, chosen = shares([(strategy.mean, tests), (strategy.mean, choices)])
+        curve.append(Measured(generation, generation * effort.policies * effort.shots, saved))
+        report(curve[-1])
+        if chosen >= most:  # of equals the later one
+            most, best, kept = chosen, strategy.mean.copy(), curve[-1]
+        if not pace.has_time() and generation > 0:
+            break
+    return Best(best, kept, curve)
 
 
 def train(
@@ -99,48 +179,31 @@ def train(
     jobs: int = 2,
     exercise: Exercise = DEFEND,
     *,
-    shots: int = SHOTS,
-    tests: int = TESTS,
-    report: Callable[[Measured], None] = lambda tested: None,
-    goes_on: Callable[[], bool] = lambda: True,
+    effort: Effort = EFFORT,
+    report: Callable[[Measured], None] = lambda measured: None,
+    end_s: float = inf,
 ) -> Trained:
-    """Train for some generations, or until `goes_on` says no; `report` gets each test.
+    """Train for some generations, at least one, so that training ends before a time of `time.monotonic`.
 
-    The curve begins with the untrained policy, at generation 0. `jobs` are processes.
+    `jobs` are processes; `report` gets each point of the curve. Raises Failed when a process was killed.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it says that it cannot draw without matplotlib, and is not asked to
-        from cma import CMAEvolutionStrategy
-
-    size = size_of(exercise.untrained)
-    strategy: Any = CMAEvolutionStrategy(np.zeros(size), STEP, {"seed": seed + 1, "popsize": POLICIES, "verbose": -9})
+    pace = Pace(end_s, time.monotonic)
     evaluation = _Evaluation(exercise, jobs)
-    curve: list[Measured] = []
-    best = np.zeros(size)
-
-    def test(generation: int, mean: Vector) -> None:
-        nonlocal best
-        saved = evaluation.test(mean, tests)
-        if saved >= max((one.saved for one in curve), default=0.0):
-            best = mean.copy()
-        curve.append(Measured(generation, generation * POLICIES * shots, saved))
-        report(curve[-1])
-
     try:
-        test(0, best)
-        for generation in range(1, generations + 1):
-            first = seed * SEEDS_OF_A_RUN + generation * shots
-            policies: list[Vector] = strategy.ask()
-            shares = evaluation.shares([(policy, range(first, first + shots)) for policy in policies])
-            strategy.tell(policies, [-share for share in shares])
-            is_last = generation == generations or not goes_on()
-            if generation % TEST_EVERY == 0 or is_last:
-                test(generation, strategy.mean)
-            if is_last:
-                break
+        (by_hand,) = evaluation.shares([(None, range(FIRST_TEST, FIRST_TEST + effort.tests))])
+        found = learn(evaluation.shares, exercise.untrained.size, generations, seed, effort, report, pace)
     finally:
         evaluation.close()
-    return Trained(replace(exercise.untrained, weights=best.tolist()), curve)
+    file = replace(exercise.untrained, weights=found.weights.tolist())
+    return Trained(file, found.kept, found.curve, by_hand)
+
+
+def _strategy(size: int, seed: int, effort: Effort) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # cma says that it cannot draw without matplotlib, and is not asked to
+        from cma import CMAEvolutionStrategy
+    options = {"seed": seed + 1, "popsize": effort.policies, "verbose": -9}
+    return CMAEvolutionStrategy(np.zeros(size), STEP, options)
 
 
 def error_of(saved: float, shots: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import inf
 from pathlib import Path
 from typing import Any, Final
@@ -31,13 +32,12 @@ SHAPE: Final = PolicyFile(
     moves=["red.goal/position.slide"],
     hidden=1,
 )
-OF_VALUE, OF_RATE, OF_ONE = 0, 1, 2
-"""The first three weights; then the hidden unit's, and one."""
 
 
 def policy(**weights: float) -> Policy:
+    """Return a policy with weights: those of the hidden unit, then those of the slide."""
     made = Policy(SHAPE, [*READS, AGE], [SLIDE, SPIN])
-    names = ("value", "rate", "one", "hidden", "last")
+    names = ("value", "rate", "one", "hidden", "straight", "straight_rate", "last")
     made.set_weights([weights.get(name, 0.0) for name in names])
     return made
 
@@ -47,10 +47,20 @@ def squashed(number: float) -> float:
 
 
 def test_it_has_the_weights_of_one_hidden_layer() -> None:
-    assert policy().size == 5
+    assert SHAPE.size == 7
     found = policy(value=2.0, one=0.5, hidden=3.0, last=-1.0).act(np.array([9.0, 0.25, 0.0]), 1.0)
     assert found[0] == pytest.approx(0.1 * squashed(3.0 * squashed(2.0 * 0.25 + 0.5) - 1.0), abs=1e-15)
     assert found[1] == 1.0, "what it does not move stays in the middle of its bounds"
+
+
+def test_what_it_moves_sees_the_inputs_beside_the_hidden_units() -> None:
+    made = policy(straight=2.0, straight_rate=0.5)
+    assert made.act(np.array([9.0, 0.25, 0.0]), 1.0)[0] == pytest.approx(0.1 * squashed(2.0 * 0.25), abs=1e-15)
+    found = made.act(np.array([9.0, 0.26, 0.0]), 1.01)
+    assert found[0] == pytest.approx(0.1 * squashed(2.0 * 0.26 + 0.5 * 1.0 / 10.0), abs=1e-9)
+    linear = Policy(replace(SHAPE, hidden=0), [*READS, AGE], [SLIDE, SPIN])
+    linear.set_weights([2.0, 0.0, 1.0])
+    assert linear.act(np.array([9.0, 0.25, 0.0]), 1.0)[0] == pytest.approx(0.1 * squashed(1.5), abs=1e-15)
 
 
 def test_a_reading_is_carried_on_by_its_rate_to_the_present() -> None:
@@ -77,8 +87,8 @@ def test_a_reading_that_has_not_come_and_one_put_elsewhere_have_no_rate() -> Non
     [
         ({"columns": {"camera/ball.w": (1.0, 1.0)}}, UnknownName, "uses what is not read.*camera/ball.x"),
         ({"moves": ["red.goal/position.slip"]}, UnknownName, "moves what is not commanded.*red.goal/position.slide"),
-        ({"weights": [1.0]}, BadValue, "has 5 finite weights, 1"),
-        ({"weights": [float("nan")] * 5}, BadValue, "has 5 finite weights"),
+        ({"weights": [1.0]}, BadValue, "has 7 finite weights, 1"),
+        ({"weights": [float("nan")] * 7}, BadValue, "has 7 finite weights"),
     ],
 )
 def test_policies_that_do_not_fit(change: dict[str, Any], error: type[Exception], words: str) -> None:
@@ -91,17 +101,24 @@ def test_files_that_are_no_policies(tmp_path: Path) -> None:
     with pytest.raises(BadValue, match=r"a policy that cannot be read: No such file"):
         Learned(deployment, {"weights": str(tmp_path / "none.json")})
     path = tmp_path / "policy.json"
-    path.write_text('{"readings": 3}')
-    with pytest.raises(BadValue, match=r"no policy: Expected `array`"):
-        Learned(deployment, {"weights": str(path)})
+    shape = msgspec.to_builtins(SHAPE)
+    for change, words in (
+        ({"readings": 3}, r"no policy: Expected `array`"),
+        ({"hidden": -1}, r"no policy: Expected `int` >= 0"),
+        ({"columns": {"camera/ball.y": (0.0, 1.0)}}, r"no policy: Expected `float` > 0"),
+    ):
+        path.write_text(json.dumps(shape | change))
+        with pytest.raises(BadValue, match=words):
+            Learned(deployment, {"weights": str(path)})
+    with pytest.raises(BadValue, match=r"weights: not the path of a file, 3"):
+        Learned(deployment, {"weights": 3})
     with pytest.raises(UnknownName, match=r"unknown parameter.*weights"):
         Learned(deployment, {"weight": ""})
 
 
 def test_the_player_of_a_run_does_what_the_policy_did_in_training(tmp_path: Path) -> None:
     """Without a network between: the same frames, bit for bit, over shots that it saves and does not."""
-    size = 6 * 5 + 7
-    weights = [round(float(np.sin(3.0 * number)), 3) for number in range(size)]
+    weights = [round(float(np.sin(3.0 * number)), 3) for number in range(DEFEND.untrained.size)]
     file = replace(DEFEND.untrained, weights=weights)
     path = tmp_path / "policy.json"
     path.write_bytes(msgspec.json.encode(file))

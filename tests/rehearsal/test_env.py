@@ -14,6 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
+from foosim.capture.start_frame import BadBranch
 from foosim.common.errors import BadValue, UnknownName
 from foosim.players.learning.exercises import ENVIRONMENTS
 from foosim.players.learning.table_rewards import DefendShot, Goals, score_of, with_ball
@@ -27,6 +28,9 @@ DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 TABLE: Final = DEPLOY / "table.yaml"
 WAIT: Final = "table.rules.kickoff_delay=20 ms"
 CALM: Final = {"*/position.spin": (-2.0, 2.0)}
+
+
+SHOT: Final[dict[str, Any]] = {"agents": ["player-red"]}
 
 
 def played(env: FoosimParallelEnv, steps: int, seed: int | None, **options: Any) -> list[bytes]:
@@ -148,8 +152,15 @@ def test_readings_and_commands_are_those_that_are_chosen() -> None:
         ({"commands": ["red.*/force"]}, UnknownName, "selects no robot/channel"),
         ({"bounds": {"*.spim": (0.0, 1.0)}}, UnknownName, "selects no robot/channel.field"),
         ({"bounds": {"*.spin": (1.0, 1.0)}}, BadValue, "the first is below the second"),
+        ({"bounds": {"*.slide": (1.0, 2.0)}}, BadValue, "blue.attack/position.slide has -0.1185 to 0.1185"),
+        ({"agents": []}, BadValue, "one agent or more"),
+        ({"seconds": 0.0}, BadValue, "more than 0, 0"),
+        ({"pixels": (320, 0)}, BadValue, "a width and a height"),
+        ({"start": "none.mcap@1s"}, BadBranch, "none.mcap: cannot be read"),
         ({"render_mode": "human"}, BadValue, "no render mode"),
         ({"reward": DefendShot}, BadValue, "defended by one team"),
+        (SHOT | {"reward": partial(DefendShot, speed=(3.0, 2.0))}, BadValue, "rise from above 0.05 to 40 m/s"),
+        (SHOT | {"reward": partial(DefendShot, start_x=0.6)}, BadValue, "start_x of a shot is 0 to 0.5825 m, 0.6"),
     ],
 )
 def test_arguments_that_are_not_valid(arguments: dict[str, Any], error: type[Exception], words: str) -> None:
@@ -157,13 +168,25 @@ def test_arguments_that_are_not_valid(arguments: dict[str, Any], error: type[Exc
         parallel_env(TABLE, **arguments)
 
 
-def test_actions_that_are_not_valid() -> None:
-    env = FoosimEnv(TABLE, "player-red", commands=["red.goal/*"])
+def test_actions_seeds_and_sets_that_are_not_valid() -> None:
+    deployment = read_for_stepping(TABLE)
+    with pytest.raises(BadValue, match=r"a loaded deployment takes no sets"):
+        parallel_env(deployment, sets=["seed=2"])
+    together = parallel_env(deployment)
+    with pytest.raises(BadValue, match=r"a seed is 0 to .*, -1"):
+        together.reset(seed=-1)
+    together.reset(seed=2**63 - 1)
+    with pytest.raises(UnknownName, match=r"an action of no agent.*player-red"):
+        together.step({"red": np.zeros(8)})
+    together.close()
+    env = FoosimEnv(deployment, "player-red", commands=["red.goal/*"])
     env.reset(seed=1)
     with pytest.raises(BadValue, match=r"an action has 2 numbers"):
         env.step(np.zeros(3))
     with pytest.raises(BadValue, match=r"slide of red.goal is not finite"):
         env.step(np.array([np.nan, 0.0]))
+    with pytest.raises(BadValue, match=r"spin of red.goal is not finite, inf"):
+        env.step(np.array([0.0, np.inf]))
     env.step(np.array([9.0, 0.0]))
     assert env.simulation.tick == PERIOD, "what is beyond the limits is clipped"
     env.close()
@@ -237,6 +260,7 @@ def test_an_episode_is_cut_after_its_time() -> None:
 
 def test_a_picture_of_the_frame() -> None:
     env = gymnasium.make("foosim.rehearsal.env:foosim/Table-v0", render_mode="rgb_array", pixels=(160, 90))
+    assert env.metadata["render_fps"] == 100.0
     env.reset(seed=1)
     picture: Any = env.render()
     assert picture.shape == (90, 160, 3) and picture.dtype == np.uint8
