@@ -79,16 +79,15 @@ def test_nothing_is_tested_or_chosen_by_a_shot_that_was_learned_from() -> None:
 
 
 def test_the_mean_that_is_kept_is_chosen_by_other_shots_than_those_of_the_curve() -> None:
-    """Here later means save more and more of the test's shots, and less and less of those that choose."""
-    turn = 0
+    """Here each mean saves more of the test's shots than the one before; those that choose like the second one best."""
+    liked = iter([0.5, 0.9, 0.6, 0.7, 0.2])
+    saved = iter([0.1, 0.2, 0.3, 0.4, 0.6])
 
     def shares(rows: Sequence[Row]) -> list[float]:
-        nonlocal turn
-        turn += len(rows) == 2
-        return [0.1 * turn, 1.0 - 0.1 * turn] if len(rows) == 2 else [*map(float, range(len(rows)))]
+        return [next(saved), next(liked)] if len(rows) == 2 else [*map(float, range(len(rows)))]
 
     found = learned(shares, 4)
-    assert found.kept.generation == 0 and [one.saved for one in found.curve] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5])
+    assert found.kept == (1, 60, 0.2) and [one.saved for one in found.curve] == [0.1, 0.2, 0.3, 0.4, 0.6]
 
 
 def test_training_ends_before_its_time_with_one_generation_at_least() -> None:
@@ -101,7 +100,7 @@ def test_training_ends_before_its_time_with_one_generation_at_least() -> None:
 
 def test_training_plays_the_exercise() -> None:
     """On any number of processes; who is compared with it follows the ball."""
-    effort = Effort(policies=2, shots=1, choices=1, tests=3)
+    effort = Effort(policies=2, shots=1, choices=4, tests=3)
     found = train(1, 3, 1, effort=effort)
     assert len(found.file.weights) == DEFEND.untrained.size and len(found.curve) == 2
     assert train(1, 3, 2, effort=effort) == found
