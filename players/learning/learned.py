@@ -39,7 +39,7 @@ class Learned:
     """
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
-        """Raises UnknownName and BadValue for parameters and a policy that do not fit."""
+        """Raises UnknownName for a parameter that is none, BadValue for a policy that does not fit, with its file."""
         for key in parameters:
             if key != WEIGHTS:
                 raise UnknownName("unknown parameter", key, [WEIGHTS])
@@ -47,12 +47,15 @@ class Learned:
         if not isinstance(path, str | Path):
             raise BadValue(f"{WEIGHTS}: not the path of a file", path)
         file = read_policy(Path(path))
+        self._tick_ns = deployment.tick_ns
         robots = sorted(deployment.robots)
         pairs = [(robot, channel) for robot in robots for channel in deployment.robots[robot].sensors]
-        self._readings = ReadingVector(deployment, chosen(pairs, file.readings), ages=True)
-        self._commands = CommandVector(deployment, robots, file.commands, file.bounds)
-        self._policy = Policy(file, self._readings.columns, self._commands.columns)
-        self._tick_ns = deployment.tick_ns
+        try:
+            self._readings = ReadingVector(deployment, chosen(pairs, file.readings), ages=True)
+            self._commands = CommandVector(deployment, robots, file.commands, file.bounds)
+            self._policy = Policy(file, self._readings.columns, self._commands.columns)
+        except BadValue as error:
+            raise BadValue(f"{path}: {error.problem}", error.value, error.nearest) from None
 
     def act(self, tick: int, samples: Samples) -> Turn:
         """Return the commands of all its robots."""

@@ -5,6 +5,7 @@ A shell over `learning.training` and `learning.shots`.
 
 from __future__ import annotations
 
+import os
 import time
 from contextlib import closing
 from importlib.util import find_spec
@@ -56,7 +57,7 @@ def train(
     Ctrl-C ends it; then nothing is written.
     """
     training = _training()
-    _check_folders(weights, picture)
+    _check_files(weights, picture)
 
     def report(measured: Measured) -> None:
         shots = f"{measured.shots} shots" if measured.generation else "untrained"
@@ -96,7 +97,7 @@ def delays(
     It plays as in a run, by its class in the deployment: readings and commands are packets, and both are delayed.
     """
     training = _training()
-    _check_folders(picture)
+    _check_files(picture)
     from foosim.players.learning.exercises import DEFEND
     from foosim.rehearsal.learning.shots import Network
 
@@ -131,11 +132,17 @@ def _times(text: str) -> list[int]:
     return [read_at("--delay", parse_ns, part.strip()) for part in text.split(",")]
 
 
-def _check_folders(*paths: Path | None) -> None:
-    """Raise BadValue for a file in a folder that is not there, before anything is computed for it."""
+def _check_files(*paths: Path | None) -> None:
+    """Raise BadValue for a file that cannot be written, before anything is computed for it."""
     for path in paths:
-        if path is not None and not path.parent.is_dir():
+        if path is None:
+            continue
+        if not path.parent.is_dir():
             raise BadValue("cannot be written: its folder is not there", str(path))
+        if path.is_dir():
+            raise BadValue("cannot be written: it is a folder", str(path))
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise BadValue("cannot be written: permission denied", str(path))
 
 
 def _write(path: Path, content: bytes) -> None:

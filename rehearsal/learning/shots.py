@@ -68,7 +68,7 @@ class Network:
     def __init__(self, exercise: Exercise, delay_ms: float, weights: Path | None = None) -> None:
         """`delay_ms` is that of each packet, one way. `weights` is the policy's file, by default what was shipped.
 
-        Raises BadValue and UnknownName for a policy that does not fit.
+        Raises BadValue for a policy that does not fit, DeploymentError for a delay that no link has.
         """
         links = f"network={{links: [{{id: delayed, from: '*', to: '*', delay: {delay_ms:g} ms}}]}}"
         chosen = {} if weights is None else {"weights": str(weights.absolute())}

@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from foosim.client.vectors import Vector
+from foosim.common.errors import Refused
 from foosim.players.learning.exercises import DEFEND, TABLE
 from foosim.players.learning.learned import SHIPPED, read_policy
 from foosim.rehearsal.learning import main
@@ -33,6 +34,7 @@ from foosim.rehearsal.learning.training import (
     train,
 )
 from foosim.rehearsal.simulation import read_for_stepping
+from foosim.runtime.command import BAD_INPUT
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -150,11 +152,14 @@ def test_the_command_refuses_what_is_not_valid(tmp_path: Path) -> None:
     for arguments, words in (
         (["delays", "--delay", "3"], "--delay: "),
         (["delays", str(tmp_path / "no.json"), "--shots", "1"], "a policy that cannot be read"),
+        (["delays", "--delay", "2 min"], "network.links[0].delay: out of range 0 s to 60 s"),
+        (["train", str(tmp_path)], "cannot be written: it is a folder"),
         (["train", str(tmp_path / "no" / "policy.json")], "cannot be written: its folder is not there"),
         (["delays", "--picture", str(tmp_path / "no" / "curve.svg")], "cannot be written: its folder is not there"),
     ):
         done = CliRunner().invoke(app, arguments)
         assert words in str(done.exception), (arguments, done.exception)
+        assert isinstance(done.exception, Refused) and done.exception.exit_code == BAD_INPUT, arguments
 
 
 def test_who_lacks_a_library_is_told_which(monkeypatch: pytest.MonkeyPatch) -> None:
