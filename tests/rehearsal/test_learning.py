@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
@@ -101,8 +102,8 @@ def test_training_ends_before_its_time_with_one_generation_at_least() -> None:
 
 
 def test_training_plays_the_exercise() -> None:
-    """Other processes measure what this one does; who is compared with it follows the ball."""
-    found = train(1, 3, 2, effort=Effort(policies=2, shots=1, choices=4, tests=3))
+    """Who is compared with it follows the ball."""
+    found = train(1, 3, 1, effort=Effort(policies=2, shots=1, choices=4, tests=3))
     assert len(found.file.weights) == DEFEND.untrained.size and len(found.curve) == 2
     there = Range(DEFEND)
     tests = range(FIRST_TEST, FIRST_TEST + 3)
@@ -110,6 +111,7 @@ def test_training_plays_the_exercise() -> None:
     assert found.curve[0].saved == sum(there.wins([0.0] * DEFEND.untrained.size, tests)) / 3
     assert found.kept.saved == sum(there.wins(found.file.weights, tests)) / 3
     there.close()
+    assert pickle.loads(pickle.dumps(DEFEND)) == DEFEND, "other processes get it, too"
 
 
 def test_the_exercise_has_the_camera_of_the_table() -> None:
@@ -182,5 +184,7 @@ def test_a_curve_shows_each_point_at_its_share() -> None:
 @pytest.mark.campaign
 def test_training_improves_a_player() -> None:
     """With the effort of the command: some minutes on two slow cores."""
+    effort = Effort(policies=4, shots=2, choices=3, tests=5)
+    assert train(2, 5, 3, effort=effort) == train(2, 5, 1, effort=effort), "on any number of processes"
     found = train(8)
     assert found.curve[0].saved < found.by_hand + 0.1 < 0.7 < found.kept.saved, found
