@@ -80,14 +80,14 @@ class Agent:
             raise UnknownName("no player that could be an agent", name, deployment.players)
         self.sequence = 0
         self.malformed = 0
-        """Readings that did not fit their channel: the network has changed them."""
+        """Readings since the last `reset` that do not fit their channel: the network has changed them."""
         self.codecs = {pair: channel_codec(deployment, *pair) for pair in self.hears}
         """What carries each (endpoint, channel) that it hears; None for bytes."""
         self.newest: dict[Pair, Received] = {}
 
     def begin(self) -> None:
         """Forget what was heard and sent."""
-        self.sequence = 0
+        self.sequence = self.malformed = 0
         self.newest = {}
 
     def take(self, packets: Sequence[Received], is_checked: bool) -> None:
@@ -266,6 +266,11 @@ class Simulation:
                 value = packet.payload if codec is None else codec.decode(packet.payload)
                 found[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
         return dict(sorted(found.items()))
+
+    @property
+    def quarantined(self) -> list[str]:
+        """Who came into quarantine since the last `reset`, and why, in words."""
+        return self._stepped.quarantined
 
     @property
     def scene(self) -> Scene:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+from math import nan
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +14,8 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.players.learning.table_rewards import with_ball
+from foosim.protocol.messages import Received
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.simulation import LEARNER, Simulation, read_for_stepping
@@ -127,6 +131,30 @@ def test_what_a_person_sees() -> None:
         assert simulation.status["score"] == {"red": 0, "blue": 0}
         assert found["red.goal", "encoder"].value.slide == pytest.approx(0.05, abs=0.002)  # type: ignore[union-attr]
         assert "ball" in simulation.scene.bodies
+
+
+def test_who_came_into_quarantine_is_said() -> None:
+    with Simulation(TABLE) as simulation:
+        simulation.step()
+        assert simulation.quarantined == []
+        too_fast = with_ball(simulation.deployment, simulation.frame, (0.0, 0.0, 0.0175), (100.0, 0.0, 0.0))
+        simulation.reset(too_fast)
+        simulation.step(ticks=2)
+        assert any("ball stands in quarantine from here on" in text for text in simulation.quarantined)
+        simulation.reset()
+        assert simulation.quarantined == []
+
+
+def test_an_agent_keeps_the_newest_reading_and_counts_those_that_are_none() -> None:
+    """Packets come out of order, and changed by the network."""
+    with Simulation(TABLE, agents=["player-red"], network=True) as simulation:
+        agent = simulation.agents["player-red"]
+        good = [Received("camera", number, 0, "ball", 0, 0, struct.pack("<3d", number, 0.0, 0.0)) for number in (1, 2)]
+        changed = Received("camera", 3, 0, "ball", 0, 0, struct.pack("<3d", nan, 0.0, 0.0))
+        agent.take([good[1], good[0], changed], is_checked=True)
+        assert simulation.readings["camera", "ball"].value.x == 2.0 and agent.malformed == 1  # type: ignore[union-attr]
+        simulation.reset()
+        assert simulation.readings == {} and agent.malformed == 0
 
 
 def test_a_deployment_without_players_has_one_agent_who_commands_all() -> None:
