@@ -22,7 +22,7 @@ class Exercise(NamedTuple):
 
     In the deployment as it is changed, the agent is a player of the class `Learned`, so that it can act by itself, too.
     `untrained` is the policy without weights. `by_hand` is what the learned one is compared with: a simple controller,
-    from an observation to an action.
+    from an observation to an action, and in words what it does.
     """
 
     file: Path
@@ -33,6 +33,7 @@ class Exercise(NamedTuple):
     reward: type[DefendShot]
     untrained: PolicyFile
     by_hand: Callable[[Vector], Vector]
+    by_hand_does: str
 
 
 def follow_ball(ball: Vector) -> Vector:
@@ -69,6 +70,7 @@ DEFEND: Final = Exercise(
         hidden=4,
     ),
     follow_ball,
+    "follows the ball",
 )
 """One shot at red's goal: the goalkeeper sees the ball (x, y, z in m), and slides."""
 

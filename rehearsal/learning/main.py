@@ -58,6 +58,7 @@ def train(
     """
     training = _training()
     _check_files(weights, picture)
+    from foosim.players.learning.exercises import DEFEND
 
     def report(measured: Measured) -> None:
         shots = f"{measured.shots} shots" if measured.generation else "untrained"
@@ -69,13 +70,13 @@ def train(
     _write(weights, msgspec.json.format(msgspec.json.encode(trained.file), indent=1) + b"\n")
     print(
         f"kept: generation {trained.kept.generation}, by {effort.choices} other shots; "
-        f"it saves {100 * trained.kept.saved:.0f} %, who follows the ball {100 * trained.by_hand:.0f} %"
+        f"it saves {100 * trained.kept.saved:.0f} %, who {DEFEND.by_hand_does} {100 * trained.by_hand:.0f} %"
     )
     if picture is not None:
         points = [
             Point(float(one.shots), one.saved, training.error_of(one.saved, effort.tests)) for one in trained.curve
         ]
-        level = Level("follows the ball", trained.by_hand)
+        level = Level(DEFEND.by_hand_does, trained.by_hand)
         chart = curve_svg("Learning to defend a shot", "shots learned from", "shots saved", points, level)
         _write(picture, chart.encode())
 
