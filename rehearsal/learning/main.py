@@ -30,6 +30,8 @@ LIBRARIES: Final = ("cma", "gymnasium", "pettingzoo")
 """Those of the extra."""
 FIRST_SHOT: Final = 2_000_000
 """The seed of the first shot that `delays` counts: training learns from others, chooses and tests by others."""
+SEED_MAX: Final = 1_000_000_000
+"""What numpy's generators take, and as many runs of training have shots of their own."""
 MS_PER_S: Final = 1e3
 
 
@@ -39,16 +41,18 @@ def foosim_learn(version: VersionOption = False) -> None:
 
     It needs the extra `learn`: pip install 'foosim[learn]'.
 
-    Exit codes: 0 done, 1 failed, 2 bad input, 3 refused.
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 Ctrl-C.
     """
 
 
 @app.command()
 def train(
     weights: Annotated[Path, typer.Argument(metavar="FILE", help="The policy is written here, as JSON.")],
-    minutes: Annotated[float, typer.Option(help="Wall time, after at least one generation.", min=0.0)] = 10.0,
+    minutes: Annotated[
+        float, typer.Option(help="Wall time in which it ends, but for the first generation.", min=0.0)
+    ] = 10.0,
     generations: Annotated[int, typer.Option(help="Number of generations at the most.", min=1)] = 12,
-    seed: Annotated[int, typer.Option(help="Of the shots and the policies that are tried.", min=1)] = 1,
+    seed: Annotated[int, typer.Option(help="Of the shots and the policies that are tried.", min=1, max=SEED_MAX)] = 1,
     jobs: Annotated[int, typer.Option(help="Number of processes; it changes no result.", min=1)] = 2,
     picture: Annotated[Path | None, typer.Option(help="The curve is written here, as SVG.")] = None,
 ) -> None:
