@@ -36,8 +36,8 @@ def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) 
       and so do commands.
     * `reward`: a class as `reward.Reward` describes it, made with the deployment and the robots of each agent; those of
       the table are in `foosim.players.learning.table_rewards`. By default `Nothing`.
-    * `seconds`: the simulated time after which an episode is cut; by default never.
-    * `start`: the frame that episodes begin with, a `Start` or `CAPTURE@12.5s`; by default the deployment's first.
+    * `seconds`: the simulated time, more than 0, after which an episode is cut; by default never.
+    * `start`: the frame that episodes begin with, a `Frame`, a `Start` or `CAPTURE@12.5s`; by default the first one.
     * `readings`, `commands`: globs of `robot/channel` that select among what agents hear and command.
     * `bounds`: least and greatest values of commands by globs of `robot/channel.field`, within those of the actuators.
     * `ages`: whether the age of each reading (s) is observed, too; -1 before the first.

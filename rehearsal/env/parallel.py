@@ -72,7 +72,7 @@ class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[np.float64]], Infos]:
-        """Begin an episode. The option `start` is a frame to begin with: a `Start`, or `CAPTURE@12.5s`."""
+        """Begin an episode. The option `start` is what to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`."""
         found = self._episodes.reset(seed, options)
         self.agents = list(self.possible_agents)
         return found, self._infos()

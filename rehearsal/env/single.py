@@ -68,7 +68,7 @@ class FoosimEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """Begin an episode. The option `start` is a frame to begin with: a `Start`, or `CAPTURE@12.5s`."""
+        """Begin an episode. The option `start` is what to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`."""
         super().reset(seed=seed)
         return self._episodes.reset(seed, options)[self._agent], self._info()
 

@@ -98,6 +98,9 @@ def test_reset_to_a_captured_frame_goes_on_as_the_capture(tmp_path: Path) -> Non
         env.step(np.array([getattr(commands[robot], field) for robot, field in columns]))
         assert env.simulation.frame.digest == run.digests[env.simulation.tick - 1]
     assert env.simulation.tick > begin + 5 * PERIOD
+    frame = env.simulation.frame
+    _, info = env.reset(options={"start": frame})
+    assert info["tick"] == frame.tick and env.simulation.frame.digest == frame.digest
     env.close()
 
 
