@@ -51,9 +51,8 @@ from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
 from foosim.world.edits import removed
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Outbox
-from foosim.world.start import AddedEntity
 
 
 @dataclass(frozen=True, slots=True)
@@ -504,11 +503,7 @@ class NodeCore:
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:
-            self.member.want_layout(self._layout_with(prepare.added))
-
-    def _layout_with(self, added: list[AddedEntity]) -> Layout:
-        assert self.deployment is not None
-        return build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
+            self.member.want_layout(self.member.layout_with(prepare.added))
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
@@ -561,7 +556,7 @@ class NodeCore:
         if epoch is None or commit.tick != epoch.tick or commit.digest != epoch.digest:
             self._repeated += 1
             return
-        frame = frame_from_bytes(commit.tick, self._layout_with(epoch.added), commit.values, commit.outboxes)
+        frame = frame_from_bytes(commit.tick, self.member.layout_with(epoch.added), commit.values, commit.outboxes)
         if frame.digest != epoch.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self._resume(frame, now_ns)

@@ -8,7 +8,7 @@ computed. Shared by node and vHub.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, Literal
 
 from foosim.common import limits
@@ -36,8 +36,11 @@ from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import AssetError
+from foosim.world.start import AddedEntity
 
 AGAIN_NS: Final = 200_000_000
+LAYOUTS_KEPT: Final = 4
+"""Layouts of the build's world that are not made again: each epoch and each build asks for one that was there."""
 
 
 def sendable(text: str) -> str:
@@ -82,6 +85,8 @@ class Member:
         self.layout: Layout | None = None
         """The layout of the world at the build."""
         self.layouts: list[Layout] = []
+        self._made: dict[tuple[tuple[str, str], ...], Layout] = {}
+        """Layouts of the build's world by what is added to it, the last one made at the end."""
         self.deadline_ns = now_ns
         self.is_ready = False
         self.simulation = b""
@@ -144,8 +149,9 @@ class Member:
             deployment = deployment.with_assets(fetching.contents())
         except AssetError as error:
             raise self._invalid(build, f"a file of the deployment is not valid on its machine: {error}") from None
-        self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
-        self.deployment = deployment
+        more = tuple([(entity.name, entity.model) for entity in build.added])
+        self.layout = build_layout(deployment, more)
+        self.deployment, self._made = deployment, {more: self.layout}
         self.build, self.problem = build, ""
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
@@ -178,7 +184,7 @@ class Member:
             self._actions.append(Log("error", self.refusal))
             return False
         self._recalled_by = ""
-        self.layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in build.added])
+        self.layout = self.layout_with(build.added)
         self.build = build
         self.deadline_ns = 0
         return True
@@ -209,7 +215,18 @@ class Member:
             raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
         if not set(owners.values()) <= roster or len(roster) != len(epoch.roster):
             raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
-        build_layout(self.deployment, [(entity.name, entity.model) for entity in epoch.added])
+        self.layout_with(epoch.added)
+
+    def layout_with(self, added: Iterable[AddedEntity]) -> Layout:
+        """Return the layout of the build's world with entities added to it, or raise `Malformed`."""
+        assert self.deployment is not None
+        more = tuple([(entity.name, entity.model) for entity in added])
+        if more not in self._made:
+            layout = build_layout(self.deployment, more)
+            while len(self._made) >= LAYOUTS_KEPT:
+                self._made.pop(next(iter(self._made)))
+            self._made[more] = layout
+        return self._made[more]
 
     def want_layout(self, layout: Layout) -> None:
         """Ask the shell for the engine of this layout (node)."""
