@@ -68,8 +68,9 @@ def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR
     matcher.set_seq2(text.lower())
     for choice in sorted(set(choices)):
         matcher.set_seq1(choice.lower())
-        if matcher.real_quick_ratio() < similar or matcher.quick_ratio() < similar:
-            continue
+        enough = max(similar, best_likeness[0])
+        if matcher.real_quick_ratio() < enough or matcher.quick_ratio() < enough:
+            continue  # both are upper bounds
         likeness = (matcher.ratio(), _common_start(choice.lower(), text.lower()))
         if likeness[0] >= similar and likeness > best_likeness:
             best, best_likeness = choice, likeness

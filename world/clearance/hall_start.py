@@ -5,7 +5,8 @@ That takes geometry, so it is looked at when all single fields are right.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from math import floor
 from operator import itemgetter
 
@@ -34,7 +35,7 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
     for name, robot in spec.robots.items():
         if isinstance(robot, RoverRobot):
             circle = robot.x, robot.y, hall.rover.radius
-            yield from _misplaced(spec, name, "the rover starts", circle, [*taken, *rovers.near(robot.x, robot.y)])
+            yield from _misplaced(spec, name, "the rover starts", circle, chain(taken, rovers.near(robot.x, robot.y)))
             rovers.add(name, robot.x, robot.y)
 
 
@@ -46,12 +47,12 @@ class _Rovers:
         self._squares: dict[tuple[int, int], list[tuple[int, str, Circle]]] = {}
         self._count = 0
 
-    def near(self, x: float, y: float) -> list[tuple[str, Outline]]:
-        """Return those that a rover at a place may be in, in the order in which they were added."""
+    def near(self, x: float, y: float) -> Iterator[tuple[str, Outline]]:
+        """Yield those that a rover at a place may be in, in the order in which they were added."""
         east, north = self._square(x, y)
         around = ((east + i, north + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
         found = sorted((entry for square in around for entry in self._squares.get(square, ())), key=itemgetter(0))
-        return [(f"the rover {name}", circle) for _, name, circle in found]
+        yield from ((f"the rover {name}", circle) for _, name, circle in found)
 
     def add(self, name: str, x: float, y: float) -> None:
         """Add a rover at a place."""
@@ -69,7 +70,7 @@ def _misplaced(
     name: str,
     subject: str,
     circle: tuple[float, float, float],
-    taken: Sequence[tuple[str, Outline]],
+    taken: Iterable[tuple[str, Outline]],
 ) -> Iterator[Finding]:
     """Yield what is wrong with the place of a robot, as a circle (m): the first thing that it is in."""
     x, y, _ = circle
