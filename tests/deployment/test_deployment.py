@@ -168,10 +168,14 @@ def test_the_committed_json_schema_is_current() -> None:
     assert (DEPLOY / "deployment.schema.json").read_text() == deployment_schema_text(), f"write it anew: {REGENERATE}"
 
 
-def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse() -> None:
-    schema = json.loads(deployment_schema_text())
-    Draft202012Validator.check_schema(schema)
-    validator = Draft202012Validator(schema)
+@pytest.fixture(scope="module")
+def validator() -> Draft202012Validator:
+    """Of the JSON Schema of files."""
+    return Draft202012Validator(json.loads(deployment_schema_text()))
+
+
+def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse(validator: Draft202012Validator) -> None:
+    Draft202012Validator.check_schema(validator.schema)
     assert list(validator.iter_errors(data_of(TABLE_TEXT))) == []
     for change in (
         "tick=2",
@@ -188,12 +192,7 @@ def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse() ->
         for step in path:
             inner = inner[int(step)] if step.isdigit() else inner[step]
         inner[last] = data_of(value)
-        assert list(validator.iter_errors(data)), change
-
-
-def refused_by_schema(text: str) -> bool:
-    """Whether the JSON Schema refuses a text."""
-    return bool(list(Draft202012Validator(json.loads(deployment_schema_text())).iter_errors(data_of(text))))
+        assert not validator.is_valid(data), change
 
 
 SHORT = hall(
@@ -217,10 +216,13 @@ clients: {{c-$robot: {{each: 'r-?', on: $robot}}}}
 )
 
 
-def test_the_json_schema_takes_what_is_abbreviated() -> None:
-    assert not refused_by_schema(SHORT)
+def test_the_json_schema_takes_what_is_abbreviated(validator: Draft202012Validator) -> None:
+    def is_refused(text: str) -> bool:
+        return not validator.is_valid(data_of(text))
+
+    assert not is_refused(SHORT)
     for name in ("warehouse.yaml", "cluster.yaml"):
-        assert not refused_by_schema((DEPLOY / name).read_text())
+        assert not is_refused((DEPLOY / name).read_text())
     for given, wrong in (
         ("like: bare", "lik: bare"),
         ("like: bare", "like: 5"),
@@ -238,8 +240,8 @@ def test_the_json_schema_takes_what_is_abbreviated() -> None:
         ("include: [a.yaml]", "include: {a: 1}"),
     ):
         assert given in SHORT
-        assert refused_by_schema(SHORT.replace(given, wrong)), wrong
-    assert refused_by_schema(SHORT.replace("include: [a.yaml]\n", "").replace("seed: 1\n", ""))
+        assert is_refused(SHORT.replace(given, wrong)), wrong
+    assert is_refused(SHORT.replace("include: [a.yaml]\n", "").replace("seed: 1\n", ""))
 
 
 def test_the_defaults_in_the_json_schema_are_written_as_in_a_file() -> None:

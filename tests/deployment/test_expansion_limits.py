@@ -41,7 +41,7 @@ LINKS = "".join(
     f"  - {{id: l{n}, from: [{', '.join(repr(f'*{10 * n + i}') for i in range(10))}], to: '*'}}\n" for n in range(500)
 )
 TOO_MUCH = f"templates and counts make more than {limits.EXPANDED_NODES_MAX} values and keys"
-COMPARISONS_MAX = 500_000
+COMPARISONS_MAX = 100_000
 TOO_MANY = f"more than {COMPARISONS_MAX} comparisons of names with selectors"
 
 HOSTILE = {

@@ -391,6 +391,12 @@ def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surfac
 # --- the JSON Schema -------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def validators() -> list[Draft202012Validator]:
+    """Of what a file is expanded to, and of a file."""
+    return [Draft202012Validator(schema) for schema in (deployment_schema(), json.loads(deployment_schema_text()))]
+
+
 @pytest.mark.parametrize(
     ("place", "value", "is_valid"),
     [
@@ -408,15 +414,16 @@ def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surfac
         (("scene",), {"kind": "own_form:own", "radius": "1 m"}, True),
     ],
 )
-def test_the_schema_takes_forms_by_their_class(place: tuple[str, ...], value: object, is_valid: bool) -> None:
+def test_the_schema_takes_forms_by_their_class(
+    validators: list[Draft202012Validator], place: tuple[str, ...], value: object, is_valid: bool
+) -> None:
     """In a file and in what it is expanded to; what the settings of such are, no schema knows."""
     data = yaml.safe_load(TEXT)
     inner = data
     for step in place[:-1]:
         inner = inner[step]
     inner[place[-1]] = value
-    for schema in (deployment_schema(), json.loads(deployment_schema_text())):
-        assert Draft202012Validator(schema).is_valid(data) is is_valid
+    assert [validator.is_valid(data) for validator in validators] == [is_valid, is_valid]
 
 
 OWN_CLASSES: Final = (

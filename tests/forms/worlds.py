@@ -16,6 +16,7 @@ from foosim.client.commands import CommandEncoder
 from foosim.client.player import Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
+from foosim.deployment.text.yaml import write_yaml
 from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 
@@ -232,19 +233,22 @@ class World(NamedTuple):
 
     def text(self, *changes: tuple[Place, Any]) -> str:
         """Return the deployment's text, with settings changed below the place of the form's."""
-        data = json.loads(json.dumps(self.data))
-        for path, value in changes:
-            *way, last = (*self.place, *path)
-            section = data
-            for key in way:
-                section = section.setdefault(key, {}) if isinstance(section, dict) else section[key]
-            section[last] = value
-        return yaml.safe_dump(data, sort_keys=False)
+        return write_yaml(_with(self.data, [((*self.place, *path), value) for path, value in changes]))
 
     def with_(self, path: Place, value: Any, place: Place | None = None) -> World:
         """Return the world with a value at a path from its root, which is where the form's settings are."""
-        text = World(self.data).text((path, value))
-        return World(yaml.safe_load(text), path if place is None else place)
+        return World(_with(self.data, [(path, value)]), path if place is None else place)
+
+
+def _with(data: dict[str, Any], changes: Sequence[tuple[Place, Any]]) -> dict[str, Any]:
+    """Return a copy of plain data with other values at some paths."""
+    copy: dict[str, Any] = json.loads(json.dumps(data))
+    for (*way, last), value in changes:
+        section: Any = copy
+        for key in way:
+            section = section.setdefault(key, {}) if isinstance(section, dict) else section[key]
+        section[last] = json.loads(json.dumps(value))
+    return copy
 
 
 TABLE: Final = World(_table())

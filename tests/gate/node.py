@@ -20,7 +20,7 @@ from tests.gate.planting import Mutant, Planting, Register
 register = Register()
 
 
-@register("node takes old epochs", "a node drops orders and parts of older epochs", 2)
+@register("node takes old epochs", "a node drops orders and parts of older epochs", 3)
 def _old_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch >= self.epoch and bool(before(self, channel, message, payload))
@@ -36,7 +36,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node does not compare input digests", "a node collects parts with its own input digest only", 217)
+@register("node does not compare input digests", "a node collects parts with its own input digest only", 9)
 def _any_digest(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
@@ -46,7 +46,7 @@ def _patient_node(planting: Planting) -> None:
     planting.swap(NodeCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
 
 
-@register("node does not answer who asks", "senders keep what is not yet committed (node)", 3)
+@register("node does not answer who asks", "senders keep what is not yet committed (node)", 2)
 def _mute_node(planting: Planting) -> None:
     planting.swap(NodeCore, "_on_want", lambda self, want, payload, now_ns: None)
 

@@ -204,7 +204,7 @@ def check(outcome: Outcome, contacts: float, handovers: int) -> None:
 
 
 def test_islands_have_the_same_bits_whatever_engine_solves_them() -> None:
-    check(compared(2_000), contacts=50, handovers=100)
+    check(compared(1_200), contacts=50, handovers=100)
 
 
 @pytest.mark.campaign

@@ -99,12 +99,12 @@ def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def broken(planted: Path, source: str, sets: str, *, processes: bool = False) -> list[str]:
+def broken(planted: Path, source: str, sets: str, *, processes: bool = False, ticks: int = TICKS) -> list[str]:
     (planted / "own_form.py").write_text(HEAD + source)
     sys.modules.pop("own_form", None)
     invalidate_caches()
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, sets])
-    return [*broken_laws(text, TABLE.name, TICKS), *(elsewhere(text, TABLE.name, TICKS) if processes else ())]
+    return [*broken_laws(text, TABLE.name, ticks), *(elsewhere(text, TABLE.name, ticks) if processes else ())]
 
 
 def test_what_obeys_passes_also_in_another_process(planted: Path) -> None:
@@ -122,7 +122,7 @@ def test_a_sum_in_the_order_of_hashes_is_found_by_another_process(planted: Path)
     """Two orders of one set give the same sum once in ten times; of 16 sets, never."""
     one = "sum((-1.1) ** (int(name) % 301) for name in {f'{k}' for k in range(400 + n)})"
     apply = f"view.write(self.sum, *({one} for n in range(16)))"
-    found = broken(planted, RULE.replace("APPLY", apply), OF_WORLD, processes=True)
+    found = broken(planted, RULE.replace("APPLY", apply), OF_WORLD, processes=True, ticks=20)
     assert found == ["another process computes another world"]
 
 
@@ -410,7 +410,7 @@ if os.environ.get("PYTHONHASHSEED") == "4711":
 
 
 def test_the_last_words_of_another_process_are_whole_lines(planted: Path) -> None:
-    found = broken(planted, FAILS_ELSEWHERE + SENSOR.format(value=GOOD), OF_ROD, processes=True)
+    found = broken(planted, FAILS_ELSEWHERE + SENSOR.format(value=GOOD), OF_ROD, processes=True, ticks=20)
     (line,) = found
     first, *said = line.splitlines()
     assert first.startswith("in another process it fails, with exit code ") and len(said) == 10
@@ -420,7 +420,7 @@ def test_the_last_words_of_another_process_are_whole_lines(planted: Path) -> Non
 
 def test_what_modules_print_is_not_the_result_of_another_process(planted: Path) -> None:
     source = 'print("said at import")\n' + SENSOR.format(value=GOOD)
-    assert broken(planted, source, OF_ROD, processes=True) == []
+    assert broken(planted, source, OF_ROD, processes=True, ticks=20) == []
 
 
 def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) -> None:
@@ -452,6 +452,6 @@ def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path) ->
     thing = "scenery={thing: {shape: mesh, file: thing.obj, x: 3 m, z: 1 m, radio: wood}}"
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "engine=bullet", thing])
     (folder / "table.yaml").write_text(text)
-    command = ["check-component", "own", "--in", str(folder / "table.yaml"), "--ticks", "40"]
+    command = ["check-component", "own", "--in", str(folder / "table.yaml"), "--ticks", "20"]
     done = subprocess.run([sys.executable, "-P", "-c", COMMAND, *command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
