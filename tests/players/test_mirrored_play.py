@@ -1,4 +1,4 @@
-"""Neither side of the table is better: with a ball and with its mirror image, both teams play mirror images of one game.
+"""Neither side of the table is better: with a ball and its mirror image, teams play mirror images of one game.
 
 Without noise and with one aim, as the draws of these are each team's own; on the engine that matches are played on.
 """
