@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -17,7 +17,7 @@ from foosim.analysis.new_file import check_absent, check_name, new_file
 from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
 from foosim.cli.run_command import with_options
 from foosim.common import units
-from foosim.common.errors import BadValue, Failed, read_at
+from foosim.common.errors import BadValue, Failed, UnknownName, read_at
 from foosim.common.json_text import encode_json
 from foosim.common.units import parse_ns
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -62,7 +62,7 @@ class MatchOptions:
         None
     )
     worse_for: Annotated[
-        Literal["a", "b", "both"], typer.Option("--worse-for", help="Whose links have --delay and --loss.")
+        str, typer.Option("--worse-for", help="Whose links have --delay and --loss: a, b or both.")
     ] = "a"
     drawing: Annotated[
         Path | None, typer.Option("--picture", help="Draw points against delay and loss into NAME.svg.")
@@ -105,6 +105,8 @@ def _checked(options: MatchOptions) -> Match:
         if options.delay is None and options.loss is None:
             raise BadValue("--picture: there is nothing to draw without --delay or --loss", str(drawing))
         check_name("--picture", drawing, "the picture", (".svg",))
+    if options.worse_for not in SIDES:
+        raise UnknownName("--worse-for: not a side", options.worse_for, SIDES)
     entrants = entrant("A", options.a), entrant("B", options.b)
     links = _links(options.delay, options.loss)
     text = apply_sets(read_source_file(options.deployment), name, options.sets)

@@ -67,6 +67,7 @@ def test_worse_networks_have_a_row_each_and_a_picture(command: Command, tmp_path
         (["team", "passive", "--games", "0"], "--games"),
         (["team", "passive", "--minutes", "0"], "--minutes"),
         (["team", "passive", "--jobs", "0"], "--jobs"),
+        (["team", "passive", "--worse-for", "c"], "--worse-for: not a side (there are: a, b, both), 'c'"),
         (["team", "passive", "--delay", "fast"], "--delay"),
         (["team", "passive", "--delay", "0,,5ms"], "--delay: a list with commas is needed"),
         (["team", "passive", "--delay", "5,5ms"], "--delay: a value is there twice"),
