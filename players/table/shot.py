@@ -23,6 +23,8 @@ HIGH_M: Final = 0.026
 COMES_FAST: Final = 2.5
 LEAVES_FAST: Final = 1.5
 """m/s: a ball that comes faster is blocked, one that leaves faster is let go."""
+COMES_BEHIND: Final = 0.8
+"""m/s: a ball that comes faster is not struck behind the best place, where a foot would press it down as well."""
 FULL: Final = 75.0
 TAP: Final = 18.0
 """rad/s at which a foot passes a ball at the best place, and one that lies badly."""
@@ -77,6 +79,8 @@ class Shots:
             contact, speed = found, _speed(ahead)
             start = Motion(swing, rod.turning) if swing < contact - LEAST else Motion(contact - LEAST, 0.0)
             met = ball.later(rod.swing_s(start, contact, speed), rod.room)
+        if ball.vu < -COMES_BEHIND and met.u - rod.u < BEST_M[0]:
+            return None
         y = met.y - self._offset(met, goal)
         if not rod.reaches(y):
             y = met.y

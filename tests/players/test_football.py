@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import cos, hypot, sin
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 
@@ -254,11 +254,15 @@ def test_a_ball_that_no_figure_can_stand_beside_is_not_struck() -> None:
         assert (command is not None) == is_struck, y
 
 
+PRESSED: Final = {"ahead": 0.02, "vu": -1.5, "swing": -1.2}
+"""Met behind the best place, as it comes."""
+
+
 @pytest.mark.parametrize(
-    "why", [{"is_steady": False}, {"height": 0.04}, {"vu": -4.0}, {"vu": 3.0}, {"swing": 0.3}, {"ahead": 0.09}]
+    "why", [{"is_steady": False}, {"height": 0.04}, {"vu": -4.0}, {"vu": 3.0}, {"swing": 0.3}, {"ahead": 0.09}, PRESSED]
 )
 def test_what_cannot_be_struck_low_is_not_struck(why: dict[str, float]) -> None:
-    """Just kicked, in the air, too fast, the foot in front of it, or out of reach."""
+    """Just kicked, in the air, too fast, the foot in front of it, out of reach, or pressed down."""
     about: dict[str, Any] = {"ahead": 0.025, **why}
     command = strike(**about)
     assert command is None or speed_at_contact(command, 0.025) == 0.0
