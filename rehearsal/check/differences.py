@@ -11,7 +11,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import World, asked_together
 from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.view import SensingView, View, called
+from foosim.world.components.view import SensingView, View, called, has_together
 from foosim.world.components.watching import ReadOnly
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -139,7 +139,7 @@ class Asking:
                 motion = layout.entities[index].kind.motion
                 for one in actuators:
                     kind = type(one.actuator)
-                    if motion and hasattr(kind, "together"):
+                    if motion and has_together(kind, "command"):
                         found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
             self._groups[layout.digest] = list(found.values())
         return self._groups[layout.digest]
@@ -149,7 +149,7 @@ def asked_alone_and_together(asking: Asking, frames: Sequence[Frame]) -> Iterato
     """Yield the actuators that ask for something else together than alone. Raises ComponentError."""
     told: set[str] = set()
     for frame in frames:
-        view = View(frame.tick, ReadOnly(frame.numbers))
+        view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
         for group in asking.groups(frame.layout):
             actuators = [one.actuator for one in group]
             made: Any = type(actuators[0])

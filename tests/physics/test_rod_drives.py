@@ -58,8 +58,9 @@ class Driven:
         solved = tuple(entity.index for entity in bodies)
         packets = [Delivered(0, "me", 1, 0, self.rod.name, "motors", struct.pack("<2d", *command))] if command else []
         for _ in range(ticks):
-            self.stepper.deliver(packets, solved, self.numbers, self.tick)
-            self.stepper.solve(self.engine, Work(self.tick, self.layout, (bodies,), solved, self.numbers, {}))
+            start = self.numbers.copy()
+            self.stepper.deliver(packets, solved, self.numbers, self.tick, start)
+            self.stepper.solve(self.engine, Work(self.tick, self.layout, (bodies,), solved, self.numbers, {}, start))
             self.tick += 1
             packets = []
         assert self.of("refused") == [0.0] and self.stepper.quarantined == []

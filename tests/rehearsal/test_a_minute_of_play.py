@@ -15,7 +15,7 @@ from foosim.rehearsal.run import rehearse
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS = 30_000
 LINKS = ("table.yaml's", "perfect")
-PLAYED = [(3, "table.yaml's", MINUTE_TICKS // 12)]
+PLAYED = [(1, "table.yaml's", MINUTE_TICKS // 12)]
 CAMPAIGN = [(seed, links, MINUTE_TICKS) for seed in (1, 2, 3, 4, 5) for links in LINKS]
 
 

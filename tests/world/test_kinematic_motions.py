@@ -13,7 +13,7 @@ from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.actuators.x_y_w import Velocity
 from foosim.world.assembly.world import TOGETHER_MIN
 from foosim.world.components.fitted import sensors_of
-from foosim.world.components.view import ComponentError, View, WritableView
+from foosim.world.components.view import ComponentError, View, WritableView, has_together
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
 QUICK: Final = {"acceleration": "100 m/s2"}
@@ -228,6 +228,29 @@ def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -
     assert together.tolist() == [[list(motor) for motor in motors] for motors in alone]
     at_limit = sum(max(abs(target) for target, _ in motors) > 0.999 * (1 + n / 10) for n, motors in enumerate(alone))
     assert at_limit > 3 or kind == "wheel_speeds"
+
+
+def test_a_class_with_a_command_of_its_own_is_not_asked_by_what_it_inherits() -> None:
+    """`together` computes what `command` of its own class does."""
+
+    class Base:
+        @staticmethod
+        def together(members: object) -> None: ...
+
+        def command(self) -> None: ...
+
+    class Same(Base):
+        pass
+
+    class Other(Base):
+        def command(self) -> None: ...
+
+    class Both(Other):
+        @staticmethod
+        def together(members: object) -> None: ...
+
+    asked = [has_together(kind, "command") for kind in (Base, Same, Other, Both, int)]
+    assert asked == [True, True, False, True, False]
 
 
 def test_an_array_that_is_none_of_all_drives_names_them() -> None:

@@ -34,6 +34,7 @@ from foosim.world.components.view import (
     called,
     called_of,
     component_error,
+    has_together,
 )
 from foosim.world.components.watching import Watched, places_of, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
@@ -387,7 +388,7 @@ class World:
             len(fitted) < TOGETHER_MIN
             or None in fitted
             or len(kinds) > 1
-            or not hasattr(type(actuators[0]), "together")
+            or not has_together(type(actuators[0]), "command")
             or not getattr(self._motions[motion], "takes_arrays", False)
             or any(entity.index in self._powers for entity in entities)
         ):

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue, NotFinite
 from foosim.world.components.fitted import FittedSensor
-from foosim.world.components.view import SensingView, called, component_error
+from foosim.world.components.view import SensingView, called, component_error, has_together
 from foosim.world.forms.failures import WrongResult
 
 Numbers: TypeAlias = NDArray[np.float64]
 MODIFIED_TOGETHER_MIN: Final = 64
 """Numbers from which on modifiers are computed together. Amid a tick little of numpy is in a cache of the processor:
 arrays of fewer numbers cost more than one number after the other."""
+METHODS: Final = {"sensor": "sample", "modifier": "apply"}
+"""What computes one of a form alone."""
 NAMED_MAX: Final = 4
 """Sensors that a message about several names."""
 PLANS_MAX: Final = 64
@@ -95,7 +97,7 @@ class Plan:
         kinds: dict[tuple[type[Any], int], list[tuple[int, Any]]] = {}
         alone = []
         for place, one, size in members:
-            if size and hasattr(type(one), "together"):
+            if size and has_together(type(one), METHODS[form]):
                 kinds.setdefault((type(one), size), []).append((place, one))
             else:
                 alone.append(place)

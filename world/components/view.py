@@ -59,6 +59,16 @@ def called(component: str, entity: str, tick: int, call: Callable[..., Result], 
         raise component_error(component, entity, tick, error) from error
 
 
+def has_together(kind: type[Any], alone: str) -> bool:
+    """Whether a class has `together`, and not only one that it inherits beside another method `alone` of its own."""
+    for one in kind.__mro__:
+        if "together" in vars(one):
+            return True
+        if alone in vars(one):
+            return False
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class Slot:
     """A field of an entity in the frame: the place of its first number, and how many there are.
