@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,6 +11,7 @@ from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector, inertia_about_axis
+from tests.physics.test_rod_drives import Driven
 from tests.placing import place_ball
 from tests.shared_engine import make_shared_engine
 
@@ -165,3 +167,17 @@ def _worlds() -> Iterator[Callable[..., World]]:
 
 world = pytest.fixture(_worlds)
 lasting_world = pytest.fixture(_worlds, scope="module")
+
+
+@pytest.fixture
+def driven() -> Iterator[Callable[..., Driven]]:
+    """Makes driven rods, whose engines end with the test."""
+    made: list[Driven] = []
+
+    def make(*arguments: Any, **more: Any) -> Driven:
+        made.append(Driven(*arguments, **more))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.engine.close()

@@ -6,7 +6,7 @@ On each engine, and on Bullet's for islands, which computes a table that has box
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import exp
 from pathlib import Path
 from random import Random
@@ -76,19 +76,6 @@ class Driven:
     @property
     def speeds(self) -> list[float]:
         return self.of("joint_velocities")
-
-
-@pytest.fixture
-def driven() -> Iterator[Callable[..., Driven]]:
-    made: list[Driven] = []
-
-    def make(*arguments: Any, **more: Any) -> Driven:
-        made.append(Driven(*arguments, **more))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.engine.close()
 
 
 Make = Callable[..., Driven]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import floor, pi
 from random import Random
 from typing import Any, Final
@@ -22,19 +22,6 @@ from tests.placing import place_ball
 TOUCH: Final = "robots.blue.midfield.sensors={touch: {kind: figure_contact, rate: 100 Hz}}"
 NO_PLAYERS: Final = "players={}"
 engines = pytest.mark.parametrize("engine", ["pure", "bullet", "islands"])
-
-
-@pytest.fixture
-def driven() -> Iterator[Callable[..., Driven]]:
-    made: list[Driven] = []
-
-    def make(*arguments: Any, **more: Any) -> Driven:
-        made.append(Driven(*arguments, **more))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.engine.close()
 
 
 def read(one: Driven, channel: str, robot: str | None = None) -> Any:
