@@ -99,7 +99,8 @@ def _environment(tree: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
 
 
-def _run(command: Sequence[str], tree: Path) -> str:
+def run_in(tree: Path, command: Sequence[str]) -> str:
+    """Return the output of a command with the foosim of a tree. Raises BenchError."""
     done = subprocess.run(command, cwd=tree, env=_environment(tree), capture_output=True, text=True, check=False)
     if done.returncode:
         raise BenchError(f"{tree.name}: {' '.join(command[-4:])} failed: {done.stderr.strip()[-600:]}")
@@ -110,7 +111,7 @@ def tick_s(tree: Path, world: str) -> float:
     """Return the processor time of a tick of a world's rehearsal, in seconds."""
     file = tree / "deploy" / f"{world}.yaml"
     numbers = [str(number) for number in (TICKS[world], SEEDS, RUNS, START_TICKS)]
-    return float(_run([sys.executable, "-c", OF_TICKS, str(file), *numbers], tree))
+    return float(run_in(tree, [sys.executable, "-c", OF_TICKS, str(file), *numbers]))
 
 
 def _children_s() -> float:
@@ -121,7 +122,7 @@ def _children_s() -> float:
 def start_s(tree: Path, world: str) -> float:
     """Return the processor time of a command that rehearses one tick, in seconds."""
     before_s = _children_s()
-    _run([sys.executable, "-c", COMMAND, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json"], tree)
+    run_in(tree, [sys.executable, "-c", COMMAND, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json"])
     return _children_s() - before_s
 
 
@@ -135,7 +136,7 @@ def install_s(tree: Path) -> float:
 
 def _install(tree: Path, folder: Path) -> None:
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(folder)]
-    _run([*pip, str(tree)], tree)
+    run_in(tree, [*pip, str(tree)])
 
 
 def ratio(name: str, measure: Measure, trees: tuple[Path, Path], pairs: int) -> Ratio:

@@ -1,6 +1,6 @@
 """What benches decide themselves, without a run."""
 
-from bench import hot, shapes, validate
+from bench import freeze, hot, shapes, validate
 from bench.vhub_loss import CALM_S, KILLS, Killer
 from foosim.deployment.loader import load_deployment
 
@@ -40,3 +40,22 @@ def test_the_fleet_that_is_validated_is_the_same_by_counts_and_by_lines() -> Non
     assert by_counts == by_lines
     assert len(by_counts.robots) == len(by_counts.players) == validate.ROVERS + 1
     assert len(by_counts.nodes) == validate.NODES
+
+
+def test_a_tree_is_compared_with_a_commit_by_fields_and_rows_whatever_fields_are_called() -> None:
+    there = {
+        "ticks": 2, "digest": "ab", "score": ["1 : 0"], "packets": {"delivered": 3},
+        "fields": {"ball position": "1", "ball spin": "2"}, "rows": {"/tick": "3", "/packets": "4"},
+    }  # fmt: skip
+    renamed = {"fields": {"ball position": "1", "ball turn": "2"}, "rows": {"/tick": "5", "/packets": "4"}}
+    here = {**there, "digest": "cd", **renamed}
+    assert freeze.differences(there, there, {}) == []
+    assert freeze.differences(here, there, {"spin": "turn"}) == []
+    assert freeze.differences(here, there, {}) == [
+        "digest ab -> cd",
+        "field ball spin, which this tree lacks",
+        "field ball turn, which the commit lacks",
+        "rows of /tick",
+    ]
+    moved = {**here, "fields": {"ball position": "1", "ball turn": "9"}, "score": ["0 : 0"]}
+    assert freeze.differences(moved, there, {"spin": "turn"}) == ["score ['1 : 0'] -> ['0 : 0']", "field ball turn"]
