@@ -23,7 +23,7 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime.roles.loop import GC_THRESHOLDS
 from foosim.world.forms import registry
 from foosim.world.forms.per_field import codec_of
-from tests.meter import Burden, Meter
+from tests.meter import Burden, Meter, measured_seconds, scope_of
 
 settings.register_profile(
     "foosim",
@@ -45,13 +45,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
+    parser.addoption("--record-seconds", action="store_true", help="write tests/seconds.json, which orders the tests")
     parser.addoption("--slow-start", type=float, default=0.0, help="seconds that each process's start takes longer")
     parser.addoption("--load", type=int, default=0, help="processes beside the tests that keep as many cores busy")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """What tests cost is measured; `make slow` makes the machine a slow one."""
-    config.pluginmanager.register(Meter(), "meter")
+    config.pluginmanager.register(Meter(records=config.getoption("--record-seconds")), "meter")
     config.pluginmanager.register(Burden(config), "burden")
 
 
@@ -124,23 +125,25 @@ def fleet_text() -> Callable[..., str]:
     return text
 
 
-TOGETHER = ("tests/replay/", "tests/vhub/", "tests/wire/")
-
-
 class Together(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """Gives each file to one worker, so that what its tests share is computed once.
-
-    So it does with folders whose files share runs, and with tests/wire: its runs would starve one another of cores.
-    """
+    """Gives each scope to one worker, in the order of collection."""
 
     def _split_scope(self, nodeid: str) -> str:
-        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid.partition("::")[0])
+        return scope_of(nodeid)
 
 
 @pytest.hookimpl(optionalhook=True)  # optional, so that pytest also runs with `-p no:xdist`
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Together:
-    """The order in which workers get their tests. (xdist 3.8's own groups have no effect with pytest 9.2.)"""
+    """The distribution over workers. (xdist 3.8's own groups have no effect with pytest 9.2.)"""
+    config.option.loadscopereorder = False
     return Together(config, log)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest scopes begin first, so that no worker has a long one left when the others have ended."""
+    seconds = measured_seconds()
+    items.sort(key=lambda item: -seconds.get(scope_of(item.nodeid), 0.0))
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ processes did that it waited for; the sum of all is that of pytest, its workers,
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -27,6 +28,23 @@ def processor_s() -> float:
     return sum(os.times()[:4])
 
 
+TOGETHER: Final = ("tests/replay/", "tests/vhub/", "tests/wire/")
+"""Folders whose files share runs, and tests/wire, whose runs would starve one another of cores."""
+SECONDS: Final = Path(__file__).parent / "seconds.json"
+"""The wall time of the scopes that take the longest, as `make test ARGS=--record-seconds` measures it."""
+LISTED_S: Final = 3.0
+
+
+def scope_of(nodeid: str) -> str:
+    """Return which tests share a worker with this one: those of its file, which compute once what they share."""
+    return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid.partition("::")[0])
+
+
+def measured_seconds() -> dict[str, float]:
+    """Return the recorded wall time by scope."""
+    return {**json.loads(SECONDS.read_text())}
+
+
 def folder_of(nodeid: str) -> str:
     """Return what a test counts to: its folder in tests/, or its file if it stands in none."""
     return "/".join(nodeid.partition("::")[0].split("/")[:2])
@@ -35,8 +53,10 @@ def folder_of(nodeid: str) -> str:
 class Meter:
     """Measures each test where it runs, and tells the sums where the output is."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, records: bool) -> None:
         self._begun_s = 0.0
+        self._records = records
+        self._wall_s: dict[str, float] = defaultdict(float)
         self._by_folder: dict[str, float] = defaultdict(float)
 
     @pytest.hookimpl(tryfirst=True)
@@ -53,10 +73,17 @@ class Meter:
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._wall_s[scope_of(report.nodeid)] += report.duration
         if report.when == "teardown":
             spent_s = dict(report.user_properties)[SPENT]
             assert isinstance(spent_s, float)
             self._by_folder[folder_of(report.nodeid)] += spent_s
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if self._records and not hasattr(session.config, "workerinput"):
+            longest = sorted(self._wall_s.items(), key=lambda item: -item[1])
+            listed = {scope: round(wall_s) for scope, wall_s in longest if wall_s >= LISTED_S}
+            SECONDS.write_text(f"{json.dumps(listed, indent=2)}\n")
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.section("processor time")
