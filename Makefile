@@ -90,7 +90,7 @@ lint: environment
 	@$(PYTHON) -m ruff check .
 	@mkdir -p .typecheck/foosim
 	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
-	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench)
+	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench docs/*.py)
 
 # What is checked in is what this makes: tests/console/test_page_bundle.py compares.
 page:
@@ -99,7 +99,7 @@ page:
 
 # What is checked in is what this makes. Runs and browser leave the processor to others.
 pictures: environment
-	@nice $(PYTHON) -m bench.pictures $(ARGS)
+	@nice $(PYTHON) -m docs.pictures $(ARGS)
 
 bench: compiled
 	@.venv-compiled/bin/python -m bench $(ARGS)

@@ -12,35 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import (
-    barrier,
-    certificates,
-    console,
-    console_seek,
-    distributed,
-    echo,
-    env,
-    fleet,
-    hub,
-    islands,
-    lateness,
-    machine,
-    noise,
-    packets,
-    painter,
-    rays,
-    realtime,
-    rigid_fleet,
-    swarm,
-    table_one_process,
-    table_sensors,
-    validate,
-    verdict,
-    vhub_loss,
-    view,
-    warehouse,
-    whatif,
-)
+from bench import distributed, env, fleet, lateness, machine, realtime, table_one_process, verdict
 from bench.runs import BenchError
 
 
@@ -59,18 +31,6 @@ def with_default(measure: Callable[..., Any]) -> Callable[[float | None], Any]:
     return lambda seconds: measure() if seconds is None else measure(seconds)
 
 
-def run_barrier(seconds: float | None) -> list[dict[str, Any]]:
-    """Compare all ways, for about as many ticks as fit into the seconds."""
-    ticks = 1500 if seconds is None else max(100, round(1000 * seconds))
-    load = barrier.Load(ticks, message_bytes=1200, node_us=0, server_us=0)
-    return barrier.compare(barrier.WAYS, load, turns=1)
-
-
-def barrier_lines(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the figures for people."""
-    return [f"{row['way']:36}{row['ticks_per_s']:7} ticks/s{row['cpu_us']:7} us of processor a tick" for row in rows]
-
-
 BENCHES: Final = (
     Bench(
         "table",
@@ -79,80 +39,16 @@ BENCHES: Final = (
         table_one_process.lines,
     ),
     Bench(
-        "table-sensors",
-        "the table in one process, with all sensors",
-        with_default(table_sensors.table_sensors),
-        table_sensors.lines,
-    ),
-    Bench(
         "distributed",
-        "two nodes, vHub recording, supervisor, two lockstep players, as fast as it goes",
+        "table and warehouse as processes: two nodes, vHub recording, supervisor, players; as fast as possible",
         with_default(distributed.distributed),
         distributed.lines,
     ),
-    Bench(
-        "warehouse",
-        "twenty rovers with their controllers and a recording vHub, as fast as it goes",
-        with_default(warehouse.warehouse),
-        warehouse.lines,
-    ),
-    Bench(
-        "fleet",
-        "robots that move by kinematics, with their poses, in one process",
-        with_default(fleet.fleet),
-        fleet.lines,
-    ),
-    Bench(
-        "islands",
-        "rigid bodies island by island: boxes, an arm, robots, and the memory of their engines",
-        with_default(islands.islands),
-        islands.lines,
-    ),
-    Bench(
-        "rigid-fleet",
-        "rigid robots on wheels among boxes at rest, in one process and by one node and two",
-        with_default(rigid_fleet.rigid_fleet),
-        rigid_fleet.lines,
-    ),
-    Bench(
-        "certificates",
-        "the same by turns plain and with mutual TLS",
-        with_default(certificates.certificates),
-        certificates.lines,
-    ),
-    Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
-    Bench("view", "the same as fast as it goes, looked at and not, by turns", with_default(view.view), view.lines),
-    Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
-    Bench(
-        "packets",
-        "packets, drops, refusals, repeats and restarts of the vHub, each explained",
-        with_default(packets.packets),
-        packets.lines,
-    ),
+    Bench("realtime", "the table as processes in real time", with_default(realtime.realtime), realtime.lines),
+    Bench("fleet", "kinematic robots with their poses, in one process", with_default(fleet.fleet), fleet.lines),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
-    Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
-    Bench("noise", "normal numbers of noise, in batches and by themselves", with_default(noise.noise), noise.lines),
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
-    Bench("painter", "pictures from above", with_default(painter.painter), painter.lines),
-    Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
-    Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
-    Bench(
-        "console",
-        "a page beside the run: what the console takes, and the run",
-        with_default(console.console),
-        console.lines,
-    ),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
-    Bench(
-        "console-seek",
-        "the time slider of the console over ten minutes of the table",
-        with_default(console_seek.console_seek),
-        console_seek.lines,
-    ),
-    Bench("validate", "a deployment of a thousand robots by template is checked", validate.validate, validate.lines),
-    Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
-    Bench("vhub-loss", "the vHub is killed and comes back", with_default(vhub_loss.vhub_loss), vhub_loss.lines),
-    Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),
 )
 
 

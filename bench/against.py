@@ -1,11 +1,11 @@
-"""`python -m bench.against REVISION [--pairs N] [--compiled] [--install]`: this tree against an earlier one.
+"""`python -m bench.against REVISION [--pairs N] [--compiled]`: this tree against an earlier one.
 
 Both trees are used as they are checked out, or compiled as an install is, with the packages of this Python. A pair
 measures one after the other, in an order that changes from pair to pair, so that what else the machine does is the same
 for both; the figures are the ratios of the pairs' processor times. Ticks are those of a rehearsal without its start,
 which is run several times: what happens in a tick is the same in each, so it takes the least of its times, whatever
 else the machine does. Garbage is collected seldom, as in the processes of a run. The start is that of a command that
-rehearses one tick; an install is that of `pip install` into an empty folder.
+rehearses one tick, and of the command's help.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from typing import Final
 from bench.bare_tick import bare_tick_us
 from bench.runs import ROOT, BenchError
 
-TICKS: Final = {"table": 500, "warehouse": 150}
-"""Of each deployment in deploy/ for each seed, as many as take about a third of a second."""
+TICKS: Final = {"table": 500, "warehouse": 150, "yard": 150, "fleet": 60}
+"""Of each deployment in deploy/ and of the fleet of `bench.fleet`, for each seed."""
+STARTS: Final = ("table", "warehouse")
 SEEDS: Final = 3
 """What happens in a world differs where draws do, and so does what it costs: it is averaged over some."""
 RUNS: Final = 5
@@ -37,12 +38,16 @@ from pathlib import Path
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 file, ticks, seeds, runs, skipped = Path(sys.argv[1]), *map(int, sys.argv[2:])
-text = file.read_text()
+if file.exists():
+    text = file.read_text()
+else:
+    from bench.fleet import SIZES, fleet_text
+    text = fleet_text(SIZES[0], is_heard=True)
 
 def spent(seed):
     ends = []
     settings = Settings(on_commit=lambda *_: ends.append(time.thread_time()))
-    rehearse(text, file.name, ticks + skipped, 1, [f"seed={seed}"], settings=settings)
+    rehearse(text, file.name, ticks + skipped, 1, [f"seed={seed}"], settings=settings, folder=file.parent)
     return [last - first for first, last in zip(ends, ends[1:])][skipped:]
 
 spent(1)
@@ -121,17 +126,19 @@ def _children_s() -> float:
 
 def start_s(tree: Path, world: str) -> float:
     """Return the processor time of a command that rehearses one tick, in seconds."""
-    before_s = _children_s()
-    run_in(tree, [sys.executable, "-c", COMMAND, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json"])
-    return _children_s() - before_s
+    return _command_s(tree, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json")
 
 
-def install_s(tree: Path) -> float:
-    """Return the processor time of an install into an empty folder, in seconds; what is compiled is part of it."""
-    before_s = _children_s()
-    with tempfile.TemporaryDirectory() as folder:
-        _install(tree, Path(folder))
-    return _children_s() - before_s
+def help_s(tree: Path) -> float:
+    """Return the processor time of a command's help, in seconds."""
+    return _command_s(tree, "--help")
+
+
+def _command_s(tree: Path, *arguments: str) -> float:
+    before = os.times()
+    run_in(tree, [sys.executable, "-c", COMMAND, *arguments])
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
 
 
 def _install(tree: Path, folder: Path) -> None:
@@ -180,7 +187,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("revision", help="a commit, as git names it")
     parser.add_argument("--pairs", type=int, default=15, help="of each figure (default 15)")
     parser.add_argument("--compiled", action="store_true", help="install both trees first, which takes minutes")
-    parser.add_argument("--install", action="store_true", help="installs, too: three pairs, which take minutes")
     chosen = parser.parse_args(arguments)
     if chosen.pairs < 1:
         parser.error(f"--pairs: at least 1, not {chosen.pairs}")
@@ -192,7 +198,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if chosen.compiled:
                 for tree in trees:
                     _install(tree, tree.parent / f"{tree.name}-installed")
-            for name, measure, pairs in _measures(chosen.pairs, with_install=chosen.install):
+            for name, measure, pairs in _measures(chosen.pairs):
                 figures.append(ratio(name, measure, trees, pairs))
                 print(figures[-1].line(), flush=True)
     except BenchError as error:
@@ -202,13 +208,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _measures(pairs: int, *, with_install: bool) -> Iterator[tuple[str, Measure, int]]:
+def _measures(pairs: int) -> Iterator[tuple[str, Measure, int]]:
     for world in TICKS:
         yield f"a tick of the {world}", lambda tree, world=world: tick_s(tree, world), pairs  # type: ignore[misc]
-    for world in TICKS:
+    for world in STARTS:
         yield f"the start of the {world}", lambda tree, world=world: start_s(tree, world), pairs  # type: ignore[misc]
-    if with_install:
-        yield "an install", install_s, 3
+    yield "the command's help", help_s, pairs
 
 
 if __name__ == "__main__":

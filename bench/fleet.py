@@ -33,10 +33,6 @@ SENSORS: Final = {
     "pose": {"kind": "pose", "rate": "50 Hz"},
     "scan": {"kind": "laser_scanner", "rate": "10 Hz", "rays": 24, "range": "4 m", "at": {"z": "20 cm"}},
 }
-TO_REACH: Final = {False: 8.0, True: 16.0}
-"""In b, of the first fleet: by itself, and with a client that hears all."""
-TIMES: Final = 5.5
-"""How many times as long a tick of the second fleet may take."""
 
 
 class Rounds:
@@ -132,13 +128,8 @@ def _run(robots: int, is_heard: bool, seconds: float) -> tuple[float, float]:
 
 def lines(rows: list[Fleet]) -> list[str]:
     """Return the figures for people."""
-    shown, first = [], {row.is_heard: row.ratio for row in rows if row.robots == SIZES[0]}
-    for row in rows:
-        heard = "one client hears all" if row.is_heard else "without subscribers"
-        wanted = TO_REACH[row.is_heard] if row.robots == SIZES[0] else TIMES * first[row.is_heard]
-        spread = " ".join(f"{us:.0f}" for us in row.us_of_runs)
-        shown.append(
-            f"{row.robots:5} robots, {heard:21}{row.us_per_tick:8.0f} us a tick (runs {spread}), {row.ratio:5.1f} b "
-            f"(to reach {wanted:.1f} b)"
-        )
-    return shown
+    return [
+        f"{row.robots:5} robots, {'one client hears all' if row.is_heard else 'without subscribers':21}"
+        f"{row.us_per_tick:8.0f} us a tick (runs {' '.join(f'{us:.0f}' for us in row.us_of_runs)}), {row.ratio:5.1f} b"
+        for row in rows
+    ]

@@ -1,7 +1,7 @@
 """`python -m bench.hot [RUN...] [--least PERCENT] [--json]`: the modules that ticks and packets spend their time in.
 
-Each run is interpreted, and profiled in all its threads from when what is made once is there; the benches' runs are
-profiled whole, so reading their deployments and captures is in them. A module's share is the processor time within its
+Each run is interpreted, and profiled in all its threads from when what is made once is there; `verdict` is profiled
+whole. A module's share is the processor time within its
 own functions, of that within all of foosim's. What has been compiled already (numpy, msgspec, the physics engine) is
 left out, since compiling whoever calls it does not shorten it. A star marks what `setup.py` compiles, the last line is
 the share of all that it leaves to the interpreter.
@@ -23,7 +23,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from bench import hub, rays, verdict
+from bench import verdict
 from bench.runs import ROOT, TABLE
 from foosim.capture.reader import open_capture
 from foosim.protocol.fingerprint import is_compiled
@@ -89,14 +89,10 @@ def rehearsed(file: Path, ticks: int, *sets: str, captured: bool = False) -> Cal
     return run
 
 
-def of_bench(bench: Callable[[float], object], seconds: float) -> Callable[[Profile], None]:
-    """Return a bench's whole run."""
-
-    def run(profile: Profile) -> None:
-        profile.begin()
-        bench(seconds)
-
-    return run
+def judged(profile: Profile) -> None:
+    """Judge packets on links of each kind."""
+    profile.begin()
+    verdict.verdict(0.1)
 
 
 def flown(profile: Profile) -> None:
@@ -123,9 +119,8 @@ RUNS: Final[dict[str, Callable[[Profile], None]]] = {
     "pure": rehearsed(TABLE, 600, *FAST, "engine=pure"),
     "captured": rehearsed(TABLE, 600, *FAST, captured=True),
     "warehouse": rehearsed(verdict.WAREHOUSE, 130),
-    "hub": of_bench(hub.hub, 0.1),
-    "verdict": of_bench(verdict.verdict, 0.1),
-    "rays": of_bench(rays.rays, 0.1),
+    "verdict": judged,
+    "yard": rehearsed(ROOT / "deploy" / "yard.yaml", 130),
     "whatif": judged_again,
     "swarm": flown,
 }

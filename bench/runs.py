@@ -31,8 +31,6 @@ EAGER_S: Final = 0.02
 
 Helpers = Callable[[str, str], Sequence[list[str]]]
 """Gives the command lines of processes that the bench adds, from the addresses of both planes."""
-OnLook = Callable[[float], None]
-"""Is told at each look how many seconds the run has simulated."""
 
 
 class BenchError(Exception):
@@ -94,10 +92,9 @@ class Watched:
 class Watch(Display):
     """A display that shows nothing and remembers."""
 
-    def __init__(self, every_s: float, on_look: OnLook | None = None) -> None:
+    def __init__(self, every_s: float) -> None:
         super().__init__(io.StringIO())
         self.looks: list[Look] = []
-        self._on_look = on_look
         self.first_tick_s = 0.0
         self.every_s = EAGER_S
         self._later_every_s = every_s
@@ -111,8 +108,6 @@ class Watch(Display):
             self.first_tick_s = seen_s - computed_s
             self.every_s = self._later_every_s
         self.looks.append(Look(seen_s, status["ticks"], uses_of_run()))
-        if self._on_look is not None:
-            self._on_look(status["ticks"] * status["tick_ns"] / 1e9)
 
 
 def uses_of_run() -> dict[str, Use]:
@@ -135,19 +130,17 @@ def name_of(command: Sequence[str]) -> str:
     return next((name.removeprefix("foosim-") for name in programs if name.startswith("foosim-")), "")
 
 
-def watch(  # noqa: PLR0913  # what a run may be asked for, by keyword
+def watch(  # what a run may be asked for, by keyword
     pace: str,
     duration_s: float,
     sets: Sequence[str] = (),
     every_s: float = 0.25,
     helpers: Helpers | None = None,
     *,
-    pki: Path | None = None,
     read: Callable[[Path], Any] | None = None,
     deployment: Path = TABLE,
-    on_look: OnLook | None = None,
 ) -> Watched:
-    """Run a deployment with a capture, with the helpers beside it, with certificates where `pki` has them.
+    """Run a deployment with a capture, with the helpers beside it.
 
     `read` is given the finished capture. A line on standard error says which run it is and how fast it was: starting
     its processes alone takes a busy machine half a minute.
@@ -156,13 +149,13 @@ def watch(  # noqa: PLR0913  # what a run may be asked for, by keyword
     """
     port = free_ports()
     lasts, listen = f"{round(duration_s * 1000)} ms", f"127.0.0.1:{port}"
-    options = RunOptions(deployment, pace, lasts, sets=tuple(sets), listen=listen, pki=pki)
+    options = RunOptions(deployment, pace, lasts, sets=tuple(sets), listen=listen)
     begun_s = time.monotonic()
     plan = make_plan(options)
     commands = [] if helpers is None else helpers(f"tcp/127.0.0.1:{port}", f"tcp/127.0.0.1:{port + 1}")
     with tempfile.TemporaryDirectory() as folder:
         capture = Path(folder) / "run.mcap"
-        watching = Watch(every_s, on_look)
+        watching = Watch(every_s)
         print(f"    {deployment.stem}, {pace}, {duration_s:g} s: ", end="", file=sys.stderr, flush=True)
         beside = [
             subprocess.Popen([sys.executable, *command], cwd=ROOT, stdout=subprocess.PIPE, text=True)

@@ -45,8 +45,8 @@ OTHER_OPTIONS: Final = {
     "--only",
     "--slow-start",
     "--load",
-    "--before",
-    "--install",
+    "--record-seconds",
+    "--rename",
 }
 """Options that belong to no command of ours, or to all."""
 

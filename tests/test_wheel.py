@@ -180,7 +180,7 @@ def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: 
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")
 def test_benches_measure_what_is_compiled(installed: Installed) -> None:
     """Methods of a compiled class cannot be replaced, and not every one may be derived from."""
-    program = "from bench import hub, metered_node, packets, rays, table_one_process as table, verdict, whatif;"
+    program = "from bench import fleet, table_one_process as table, verdict;"
     program += "rows = table.table_one_process(0.1, 1); print(*table.lines(rows), is_compiled());"
     program = f"from foosim.protocol.fingerprint import is_compiled; {program}"
     shown = run(installed.commands / "python", "-c", program, cwd=ROOT)

@@ -10,8 +10,9 @@ from typing import Final
 import msgspec
 import pytest
 
-from bench import lateness, throughput
+from bench import lateness
 from bench.machine import Machine, this_machine
+from tests.links import throughput
 from tests.links.proof import Proof, Row
 
 ROWS: Final = "links"

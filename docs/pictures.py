@@ -1,4 +1,4 @@
-"""`python -m bench.pictures [names...]`: makes the pictures of the docs from real runs, as Chromium shows the console.
+"""`python -m docs.pictures [names...]`: makes the pictures of the docs from real runs, as Chromium shows the console.
 
 Seeds are fixed, and what is shown stands at a fixed tick: a live run is let go on to that tick, a capture is sought
 there. What the wall clock decides (lag, loads, the run's pace) differs from one making to the next.
@@ -225,7 +225,7 @@ SETS: Final = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make the pictures that are named, or all of them; return the exit code."""
     names = [name for made, _ in SETS for name in made]
-    parser = argparse.ArgumentParser(prog="python -m bench.pictures", description="Make the pictures of the docs.")
+    parser = argparse.ArgumentParser(prog="python -m docs.pictures", description="Make the pictures of the docs.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}; all by default")
     parser.add_argument("--to", type=Path, default=TO, help="the folder that they are written to")
     chosen = parser.parse_args(arguments)
