@@ -13,9 +13,11 @@ import msgspec
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.parts import files_from
-from foosim.capture.reader import DECODERS, TICK_MARKS, Scan, TickMark, chain_at_start, deployment_of
-from foosim.capture.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
+from foosim.capture.reader import DECODERS, TICK_MARKS, FrameReader, Scan, TickMark, chain_at_start, deployment_of
+from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, RECOVERIES, TICK, Fate
 from foosim.common import struct_types
+from foosim.deployment.schema import Deployment
+from foosim.world.assembly.world import count_commands
 from foosim.world.frame import CHAIN_START, chain_next
 
 
@@ -49,6 +51,8 @@ class CaptureInfo:
     clients: tuple[str, ...]
     packets: Mapping[str, int]
     causes: Mapping[str, int]
+    commands: Mapping[str, int]
+    """Commands that robots had clamped and refused by its last frame; nothing where this version cannot read that."""
     channels: Mapping[str, int]
     """Packets by channel."""
     payload_bytes: int
@@ -100,6 +104,7 @@ def capture_info(path: Path | str) -> CaptureInfo:
         tuple(sorted(found.clients)),
         {"offered": found.fates.total(), **{fate: found.fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
         dict(sorted(found.causes.items())),
+        found.commands(deployment),
         dict(sorted(found.channels.items())),
         found.payload_bytes,
         found.topics[RECOVERIES],
@@ -129,6 +134,8 @@ class _Counts:
         self.nodes: set[str] = set()
         self.arithmetic: set[str] = set()
         self.clients: set[str] = set()
+        self._last: dict[str, Message] = {}
+        """The last layout, then the last frame."""
         self._scan = scan
 
     def take(self, message: Message) -> None:
@@ -141,6 +148,10 @@ class _Counts:
             self.payload_bytes += packet.size
             if packet.cause:
                 self.causes[packet.cause] += 1
+        elif topic in FrameReader.TOPICS:
+            if topic == LAYOUT:
+                self._last.clear()  # the frames before it have another layout
+            self._last[topic] = message
         elif topic == TICK:
             self._take_tick(decode(TICK_MARKS, message))
         elif topic == CLIENTS:
@@ -149,6 +160,17 @@ class _Counts:
             epoch = decode(DECODERS[EPOCHS], message)
             self.nodes.update(epoch.roster)
             self.arithmetic.add(epoch.arithmetic)
+
+    def commands(self, deployment: Deployment) -> dict[str, int]:
+        """Return how many commands the last frame counts; nothing without one, or of another version's layout."""
+        reader = FrameReader(self._scan, deployment)
+        frame = None
+        try:
+            for message in self._last.values():
+                frame = reader.frame(message)
+        except CaptureError:
+            return {}
+        return {} if frame is None else count_commands(frame)
 
     def _take_tick(self, mark: TickMark) -> None:
         self.tick, self.digest = mark.tick, bytes.fromhex(mark.digest)

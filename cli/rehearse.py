@@ -142,11 +142,13 @@ def _told(result: dict[str, Any]) -> str:
     """Return a result for people."""
     seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
     summary = "".join(f", {text}" for text in result["summary"])
-    packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
+    counts = dict(result["packets"])
+    refused = counts.pop("refused")
+    packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in counts.items())
     handovers = f"{result['handovers']} hand-overs, " if result["solvers"] else ""
     return (
         f"{seconds:.2f} s simulated at {result['rtf']}x{summary}\n"
-        f"{handovers}packets {packets}\n"
+        f"{handovers}packets {packets}; packets refused {refused}\n"
         f"digest of all ticks {result['digest']['chain']}"
         + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
         + (f"\ncapture {result['capture']}" if result["capture"] else "")

@@ -66,6 +66,7 @@ def _describe(found: CaptureInfo) -> str:
         f"  clients {', '.join(found.clients) or 'none'}",
         f"  packets {_counted(found.packets)}",
         *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
+        *([f"  {_commands(found.commands)}"] if found.commands else []),
         *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
         f"  payloads {found.payload_bytes / 1e6:.1f} MB",
         f"  recoveries {found.recoveries}",
@@ -81,6 +82,10 @@ def _describe(found: CaptureInfo) -> str:
 
 def _counted(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def _commands(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"commands {fate} {count}" for fate, count in counts.items())
 
 
 def _span(found: CaptureInfo) -> str:

@@ -111,7 +111,7 @@ class Actuator:
 
         What the numbers of its kind mean `foosim-supervisor components actuator KIND` says. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
-        its last command. Raises BadValue for numbers that are out of bounds, not finite, or not those of a command;
+        its last command. Raises BadValue for numbers that are not finite, or not those of a command;
         NotJoined, RunEnded.
         """
         payload = self._client._encoder.encode_numbers(self._robot, self._channel, numbers, named)

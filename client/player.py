@@ -24,6 +24,7 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
+from foosim.world.forms.failures import place_of_method
 from foosim.world.forms.payloads import PayloadCodec, Value
 
 NS_PER_S: Final = 1_000_000_000
@@ -179,7 +180,8 @@ class Acting:
             try:
                 packets.append(Outgoing(robot, *encoder.encode(robot, command)))
             except Refused as error:
-                raise PlayerError(f"{where}: {error}") from error
+                place = place_of_method(self.player.act)
+                raise PlayerError(f"{where}: command of {robot}: {error}{place}") from error
         return packets
 
 

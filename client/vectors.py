@@ -21,6 +21,7 @@ from foosim.client.player import Samples
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
+from foosim.world.components.bounds import bounds_of
 from foosim.world.components.fitted import FittedActuator, FittedSensor, actuators_of, sensors_of
 from foosim.world.forms.payloads import field_at
 from foosim.world.layout import build_layout
@@ -74,12 +75,9 @@ class _Table:
         self.parts: list[_Part] = []
         for one in fitted:
             made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
-            limits: Mapping[str, Bounds] = made.limits() if hasattr(made, "limits") else {}
-            each: Sequence[Bounds] = made.bounds() if hasattr(made, "bounds") else ()
             start, size = len(columns), numbers_in(one)
-            for place in range(size):
-                field = field_at(one.codec.fields, size, place)
-                low, high = each[place] if each else limits.get(field.name, (-inf, inf))
+            for place, bound in enumerate(bounds_of(made, one.codec.fields, size)):
+                (low, high), field = bound, field_at(one.codec.fields, size, place)
                 name = f"{one.robot}/{one.channel}.{field.name}"
                 for glob, (least, most) in bounds.items():
                     if fnmatchcase(name, glob):

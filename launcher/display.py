@@ -98,6 +98,8 @@ def packets_text(status: dict[str, Any]) -> str:
     if not packets["offered"]:
         return ""
     text = f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped"
+    if packets["refused"]:
+        text = f"{text}, packets refused {packets['refused']}"
     return f"{text} {AWAY}" if status["vhub_away"] else text
 
 

@@ -15,13 +15,14 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import first_there, has_end, is_complete, parts_at
 from foosim.deployment.schema import Deployment
 from foosim.launcher.display import recording_text
-from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
+from foosim.protocol.run_status import NO_COMMANDS, NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.runtime.run_folder import RunFolder, open_run, run_exists
 
 _UNKNOWN: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("run", "world", "seed", "ticks", "first_tick", "tick_ns", "rtf", "lag_ms", "lateness_ms")),
     "digest": None,
     "packets": NO_PACKETS,
+    "commands": NO_COMMANDS,
     "recording": NOT_RECORDED,
     "from": None,
     "nodes": {},

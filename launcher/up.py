@@ -513,7 +513,8 @@ class Up:
         if ended is not None and result != ended:
             with suppress(OSError):
                 self.folder.write_result(result)
-        lines = [*map(recovery_text, result["recoveries"][self._shown :]), line]
+        summary = [", ".join(result["summary"])] if result["summary"] else []
+        lines = [*map(recovery_text, result["recoveries"][self._shown :]), line, *summary]
         return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:

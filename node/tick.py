@@ -170,7 +170,7 @@ class Stepper:
         view = WritableView(tick, numbers, numbers.copy() if start is None else start)
         for entity, one in self._waiting:
             if entity.index in solved and numbers[entity.offsets["down"]] == 0.0:
-                one.take_due(view)
+                numbers[entity.offsets["refused"]] += one.take_due(view)
         for packet in packets:
             if packet.destination not in self.layout:
                 continue

@@ -291,7 +291,7 @@ class Simulation:
         """Send commands, by robot, at the present frame, and compute some ticks; return the readings then.
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
-        takes no such command, BadValue for a command that is not finite or out of bounds, ComponentError and
+        takes no such command, BadValue for a command that is not finite, ComponentError and
         PlayerError for a form and a player that fail.
         """
         by_agent: dict[str, list[Outgoing]] = {name: [] for name in self.agents}

@@ -39,6 +39,7 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
 from foosim.runtime.closed import closed
+from foosim.supervisor.command_watch import CommandWatch
 from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.load_balancing import Balancer
@@ -85,6 +86,7 @@ class SupervisorCore:
         self.balancer = Balancer(state.deployment.owners()) if settings.balance else None
         does = self.status, self.open_epoch, self.stop, self.fail
         self.requests = Requests(state, self.viewing, self.node_loss, *does)
+        self._commands = CommandWatch(state)
         self.on_commit: Callable[[Frame], None] | None = None
         """Gets every committed frame, for a rehearsal."""
         self._slots = Slots(state.frame.layout, state.owners)
@@ -326,6 +328,7 @@ class SupervisorCore:
             return False
         self._slots = slots
         inputs.committed(tick)
+        self._commands.committed(state.frame, frame, deliveries)
         self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
         return True
 

@@ -12,13 +12,14 @@ from typing import Any, Final, NamedTuple
 import yaml
 from msgspec import Struct
 
-from foosim.client.commands import CommandEncoder
 from foosim.client.player import Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import write_yaml
+from foosim.world.components.fitted import actuators_of
 from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.layout import build_layout
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 Place = tuple[str | int, ...]
@@ -41,10 +42,11 @@ class Driver:
         self._is_several = fields[-1].is_several
         bounds = parameters["bounds"]
         names = [fields[-1].name] * len(bounds) if self._is_several else [field.name for field in fields]
-        encoder = CommandEncoder(deployment)
+        layout = build_layout(deployment)
         self._bounds: dict[str, list[float]] = {}
         for robot in self._robots:
-            limits = next((one.limits for one in encoder.actuators(robot) if one.limits), {})
+            its = [one.actuator.limits() for one in actuators_of(deployment, layout, layout[robot])]
+            limits = next((one for one in its if one), {})
             most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
             self._bounds[robot] = list(map(min, bounds, most))
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0

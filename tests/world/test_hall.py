@@ -133,7 +133,7 @@ def test_robots_of_a_kit_need_its_section() -> None:
 def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
     layout = build_layout(DEPLOYMENT)
     assert {entity.model for entity in layout.entities} == {"rover", "station"} and "world" not in layout
-    assert world_status(DEPLOYMENT, initial_frame(DEPLOYMENT)).keys() == {"rovers"}
+    assert world_status(DEPLOYMENT, initial_frame(DEPLOYMENT)).keys() == {"commands", "rovers"}
     with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to this world"):
         build_layout(DEPLOYMENT, [("b2", "ball")])
     still = (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.actuators.x_y_w import Velocity
 from foosim.world.assembly.world import TOGETHER_MIN
-from foosim.world.components.fitted import sensors_of
+from foosim.world.components.fitted import actuators_of, sensors_of
 from foosim.world.components.view import ComponentError, View, WritableView, has_together
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
@@ -80,29 +80,34 @@ def test_both_wheels_are_slower_where_one_would_be_too_fast_and_the_arc_stays() 
 
 
 @pytest.mark.parametrize(
-    ("robot", "bad"),
+    ("robot", "bad", "within"),
     [
-        ("drive", Motion(1.1, 0.0)),
-        ("drive", Motion(0.0, -3.2)),
-        ("base", Velocity(0.8, 0.8, 0.0)),
-        ("base", Velocity(0.0, 0.0, 3.2)),
-        ("craft", Waypoint(0.0, 0.0, 121.0, 0.0)),
-        ("craft", Waypoint(0.0, 0.0, -1.0, 0.0)),
-        ("craft", Waypoint(1e6, 0.0, 1.0, 0.0)),
-        ("craft", Waypoint(0.0, 0.0, 1.0, 7.0)),
+        ("drive", Motion(1.1, 0.0), (1.0, 0.0)),
+        ("drive", Motion(0.0, -3.2), (0.0, -pi)),
+        ("base", Velocity(0.9, 1.2, 0.0), (0.6, 0.8, 0.0)),
+        ("base", Velocity(0.9, -0.9, 1.0), (0.5**0.5, -(0.5**0.5), 1.0)),
+        ("base", Velocity(0.0, 0.0, 3.2), (0.0, 0.0, pi)),
+        ("craft", Waypoint(0.0, 0.0, 121.0, 0.0), (0.0, 0.0, 120.0, 0.0)),
+        ("craft", Waypoint(0.0, 0.0, -1.0, 0.0), (0.0, 0.0, 0.0, 0.0)),
+        ("craft", Waypoint(1e6, 0.0, 1.0, 0.0), (1e5, 0.0, 1.0, 0.0)),
+        ("craft", Waypoint(0.0, 0.0, 1.0, 7.0), (0.0, 0.0, 1.0, 2.0 * pi)),
     ],
 )
-def test_commands_out_of_bounds_are_refused(robot: str, bad: Any) -> None:
+def test_commands_out_of_bounds_are_clamped_and_counted(robot: str, bad: Any, within: tuple[float, ...]) -> None:
     models = {"drive": "differential_drive", "base": "holonomic", "craft": "rotorcraft"}
     yard = Yard(yard_text({robot: {"model": models[robot]}}))
-    before = yard.numbers.copy()
-    assert not actuator(yard, robot).accept(bad, WritableView(0, yard.numbers)) and yard.numbers == before
+    entity = yard.layout[robot]
+    (fitted,) = actuators_of(yard.deployment, yard.layout, entity)
+    assert fitted.accept(fitted.codec.encode(bad), WritableView(0, yard.numbers))
+    slot = "target" if robot == "craft" else "set_point"
+    assert yard.vector(robot, f"{fitted.channel}.{slot}") == pytest.approx(within)
+    assert yard.vector(robot, "clamped") == [1.0] and yard.vector(robot, "refused") == [0.0]
 
 
 def test_wheel_speeds_drive_any_robot_on_two_wheels() -> None:
     wheels = {"motion": {"kind": "wheel_speeds"}}
     yard = Yard(yard_text({"r": {"model": "differential_drive", **QUICK, "actuators": wheels}}))
-    actuator(yard, "r").accept(Drive(0.4, 5.0), WritableView(0, yard.numbers))
+    actuator(yard, "r").accept(Drive(0.4, 1.0), WritableView(0, yard.numbers))
     yard.step(50)
     assert yard.vector("r", "wheel_travel") == pytest.approx([0.2, 0.5])
     assert yard.vector("r", "heading")[0] == pytest.approx(0.6 / 0.4 * 0.5)

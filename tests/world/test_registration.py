@@ -174,10 +174,10 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
 @pytest.mark.parametrize(
     ("about", "fields"),
     [
-        ("", ["down", "refused"]),
-        ("slots={'x': 1}", ["x", "down", "refused"]),
-        ("slots={'refused': 1, 'x': 2}", ["refused", "x", "down"]),
-        ("slots={'x': 1}, motion='differential_drive'", ["x", "down", "refused", "quarantined"]),
+        ("", ["down", "refused", "clamped"]),
+        ("slots={'x': 1}", ["x", "down", "refused", "clamped"]),
+        ("slots={'refused': 1, 'x': 2}", ["refused", "x", "down", "clamped"]),
+        ("slots={'x': 1}, motion='differential_drive'", ["x", "down", "refused", "clamped", "quarantined"]),
         ("slots={'x': 1}, is_rigid=True, is_robot=False", ["x", "quarantined"]),
         ("slots={'x': 1}, is_robot=False", ["x"]),
     ],
@@ -197,20 +197,20 @@ def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
     ]
     plain, rigid = (registry.model_of(its) for its in asked)
     assert plain is model and (rigid.name, rigid.is_rigid) == ("own", True)
-    assert [*plain.fields_of(None, None)] == ["x", "down", "refused"]
-    assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "quarantined"]
+    assert [*plain.fields_of(None, None)] == ["x", "down", "refused", "clamped"]
+    assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "clamped", "quarantined"]
 
 
 def test_foosims_own_models_keep_the_places_of_their_fields() -> None:
     """Digests of layouts, and captures, have them."""
     assert [*find_model("rod").fields_of(None, None)] == [
         *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused"),
-        "unmoved",
+        *("unmoved", "clamped"),
     ]
     assert (
         [*find_model("station").fields_of(None, None)]
         == [*find_model("camera").fields_of(None, None)]
-        == ["down", "refused"]
+        == ["down", "refused", "clamped"]
     )
 
 

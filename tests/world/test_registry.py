@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from importlib import import_module
-from math import pi
+from math import nan, pi
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ from jsonschema import Draft202012Validator
 from msgspec import Struct
 
 from foosim.analysis.export import export_capture
+from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.common.errors import DeploymentError, Malformed, Refused, UnknownName
 from foosim.deployment.json_schema import deployment_schema
@@ -174,7 +175,7 @@ class Listener:
         for pair, sample in samples.items():
             Listener.heard.setdefault(pair, {})[sample.sent_ns] = sample.value
         from own_winch import Turn
-        return {robot: Turn(rate) for robot, rate in self._commands.items()}
+        return {robot: Turn(float(rate)) for robot, rate in self._commands.items()}
 '''
 MODULES: Final = {
     "own_gauges": GAUGES,
@@ -588,10 +589,29 @@ def test_an_actuator_of_ones_own_takes_commands_and_moves_its_robot(tmp_path: Pa
 
 
 @pytest.mark.usefixtures("site")
-def test_a_command_of_ones_own_is_checked_by_its_limits() -> None:
-    sets = ("engine=pure", WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": 20.5}))
-    done = rehearse(TEXT, TABLE.name, 60, 1, sets).json
-    assert done["failed"] and "rate of red.goal is not within -20.0 to 20.0 rad/s, 20.5" in done["reason"]
+@pytest.mark.parametrize("nodes", [1, 3])
+def test_a_command_of_ones_own_beyond_its_limits_is_clamped_warned_of_once_and_counted(
+    tmp_path: Path, nodes: int
+) -> None:
+    warned: list[str] = []
+    said = Settings(on_log=lambda process, level, text: warned.append(text) if level == "warning" else None)
+    sets = ("engine=pure", "network.links=[]", WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": 20.5}))
+    done = rehearse(TEXT, TABLE.name, 60, nodes, sets, said, capture=tmp_path / "run.mcap")
+    commands = done.json["commands"]
+    assert not done.json["failed"] and commands["clamped"] > 3 and commands["refused"] == 0
+    assert f"commands clamped {commands['clamped']}" in done.json["summary"]
+    limit = "rate 20.5 rad/s is above its limit, and is clamped to 20 rad/s"
+    (warning,) = [text for text in warned if "clamped" in text]
+    assert "red.goal, turn: " in warning and limit in warning and "sent by" in warning
+    assert capture_info(tmp_path / "run.mcap").commands == commands
+
+
+@pytest.mark.usefixtures("site")
+def test_a_command_that_is_not_finite_names_robot_player_file_and_line() -> None:
+    sets = ("engine=pure", WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": nan}))
+    reason = rehearse(TEXT, TABLE.name, 20, 1, sets).json["reason"]
+    line = 1 + MODULES["own_listener"].splitlines().index("    def act(self, tick, samples):")
+    assert "command of red.goal: " in reason and f"(own_listener.py:{line})" in reason
 
 
 @pytest.mark.usefixtures("site")

@@ -191,7 +191,8 @@ def test_the_drive_holds_speeds_within_its_own_and_refuses_the_rest(
         with pytest.raises(Malformed):
             drive.codec.decode(payload)
     else:
-        assert drive.actuator.accept(drive.codec.decode(payload), WritableView(0, fitted.numbers))
+        assert drive.accept(payload, WritableView(0, fitted.numbers))
+        assert fitted.numbers[fitted.rover.offsets["clamped"]] == float(payload != struct.pack("<2d", *expected))
         assert fitted.numbers[at : at + 2] == expected
         assert [speed for speed, _ in drive.actuator.command(View(0, fitted.numbers))] == expected
     after, fitted.numbers = fitted.numbers, before.copy()

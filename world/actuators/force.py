@@ -54,12 +54,9 @@ class ForceActuator:
         return forces | {f"torque_{axis}": (-self._torque, self._torque) for axis in "xyz"}
 
     def accept(self, command: Push, view: WritableView) -> bool:
-        """Take a force and a torque; what is above its greatest is refused."""
+        """Take a force and a torque."""
         force = command.force_x, command.force_y, command.force_z
-        torque = command.torque_x, command.torque_y, command.torque_z
-        if max(map(abs, force)) > self._force or max(map(abs, torque)) > self._torque:
-            return False
-        view.write(self._set_point, *force, *torque)
+        view.write(self._set_point, *force, command.torque_x, command.torque_y, command.torque_z)
         return True
 
     def hold(self, view: WritableView) -> None:

@@ -64,9 +64,14 @@ class JointPositionActuator:
         """Return the least and the greatest position of each joint."""
         return tuple(zip(self._group.lows, self._group.highs, strict=True))
 
+    def names(self) -> tuple[str, ...]:
+        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        return self._group.names
+
     def accept(self, command: JointPositions, view: WritableView) -> bool:
-        """Take the set-points of all joints; one beyond its joint's limits refuses them."""
-        return self._group.take(command.positions, self._group.lows, self._group.highs, view)
+        """Take the set-points of all joints."""
+        view.write(self._group.set_point, *command.positions)
+        return True
 
     def hold(self, view: WritableView) -> None:
         """Make the present positions the set-points."""

@@ -41,10 +41,14 @@ class JointTorqueActuator:
         """Return the least and the greatest effort of each joint."""
         return tuple((-force, force) for force in self._group.forces)
 
+    def names(self) -> tuple[str, ...]:
+        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        return self._group.names
+
     def accept(self, command: JointEfforts, view: WritableView) -> bool:
-        """Take the efforts of all joints; one above its joint's greatest refuses them."""
-        forces = self._group.forces
-        return self._group.take(command.efforts, [-force for force in forces], forces, view)
+        """Take the efforts of all joints."""
+        view.write(self._group.set_point, *command.efforts)
+        return True
 
     def hold(self, view: WritableView) -> None:
         """Let the joints go."""

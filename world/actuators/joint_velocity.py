@@ -41,10 +41,14 @@ class JointVelocityActuator:
         """Return the least and the greatest speed of each joint."""
         return tuple((-speed, speed) for speed in self._group.speeds)
 
+    def names(self) -> tuple[str, ...]:
+        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        return self._group.names
+
     def accept(self, command: JointVelocities, view: WritableView) -> bool:
-        """Take the speeds of all joints; one above its joint's greatest refuses them."""
-        speeds = self._group.speeds
-        return self._group.take(command.velocities, [-speed for speed in speeds], speeds, view)
+        """Take the speeds of all joints."""
+        view.write(self._group.set_point, *command.velocities)
+        return True
 
     def hold(self, view: WritableView) -> None:
         """Stop the joints."""

@@ -18,7 +18,7 @@ from foosim.world.parameters.rod_drives import RodLimits
 from foosim.world.parameters.table import table_of
 
 ANGLE_RAD_MAX: Final = 1000.0
-"""The greatest angle that a rod's actuator accepts."""
+"""The greatest angle of a rod's set-point."""
 
 
 class RodPositionSettings(ActuatorSettings):
@@ -56,13 +56,11 @@ class PositionActuator:
         self._spin = (drive.spin.gain, drive.spin.speed, torque)
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest slide (m) and spin (rad) that are accepted."""
+        """Return the least and greatest slide (m) and spin (rad)."""
         return {"slide": (-self._slide_m_max, self._slide_m_max), "spin": (-ANGLE_RAD_MAX, ANGLE_RAD_MAX)}
 
     def accept(self, command: Command, view: WritableView) -> bool:
-        """Take a set-point; one that is out of its limits is refused."""
-        if abs(command.slide) > self._slide_m_max or abs(command.spin) > ANGLE_RAD_MAX:
-            return False
+        """Take a set-point."""
         view.write(self._set_point, command.slide, command.spin)
         return True
 

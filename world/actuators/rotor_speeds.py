@@ -46,9 +46,7 @@ class RotorSpeedsActuator:
         return {"speeds": (0.0, self._speed_max)}
 
     def accept(self, command: RotorSpeeds, view: WritableView) -> bool:
-        """Take the speeds; one that is negative or above the greatest refuses them."""
-        if len(command.speeds) != 4 or not all(0.0 <= speed <= self._speed_max for speed in command.speeds):
-            return False
+        """Take the speeds of all rotors."""
         view.write(self._set_point, *command.speeds)
         return True
 

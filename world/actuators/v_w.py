@@ -45,14 +45,12 @@ class MotionActuator:
         self._at, self._half_track = self._set_point.at, self._wheels.track / 2.0
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest speed (m/s) and turn rate (rad/s) that are accepted."""
+        """Return the least and greatest speed (m/s) and turn rate (rad/s)."""
         speed, rate = self._wheels.speed, self._wheels.turn_rate
         return {"linear": (-speed, speed), "angular": (-rate, rate)}
 
     def accept(self, command: Motion, view: WritableView) -> bool:
-        """Take a motion; one that is out of its limits is refused."""
-        if abs(command.linear) > self._wheels.speed or abs(command.angular) > self._wheels.turn_rate:
-            return False
+        """Take a motion."""
         view.write(self._set_point, command.linear, command.angular)
         return True
 

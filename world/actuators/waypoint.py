@@ -44,15 +44,12 @@ class WaypointActuator:
         self._position, self._heading = at.slot("position"), at.slot("heading")
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest of each coordinate (m) and of the yaw (rad) that are accepted."""
+        """Return the least and greatest of each coordinate (m) and of the yaw (rad)."""
         level = (-FAR_M, FAR_M)
         return {"x": level, "y": level, "z": (0.0, self._robot.ceiling), "yaw": (-YAW_RAD_MAX, YAW_RAD_MAX)}
 
     def accept(self, command: Waypoint, view: WritableView) -> bool:
-        """Take a waypoint; one that is out of its limits is refused."""
-        is_level = abs(command.x) <= FAR_M and abs(command.y) <= FAR_M and abs(command.yaw) <= YAW_RAD_MAX
-        if not (is_level and 0.0 <= command.z <= self._robot.ceiling):
-            return False
+        """Take a waypoint."""
         self._set(view, command.x, command.y, command.z, command.yaw)
         return True
 

@@ -39,13 +39,12 @@ class DriveActuator:
         self._set_point, self._speed = at.slot("set_point"), self._wheels.speed
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest speed of each wheel (m/s); a command beyond is held within."""
+        """Return the least and greatest speed of each wheel (m/s)."""
         return {"left": (-self._speed, self._speed), "right": (-self._speed, self._speed)}
 
     def accept(self, command: Drive, view: WritableView) -> bool:
-        """Take the wheels' speeds, held within the drive's."""
-        left, right = (min(max(speed, -self._speed), self._speed) for speed in (command.left, command.right))
-        view.write(self._set_point, left, right)
+        """Take the wheels' speeds."""
+        view.write(self._set_point, command.left, command.right)
         return True
 
     def hold(self, view: WritableView) -> None:

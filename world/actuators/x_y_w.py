@@ -6,6 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from foosim.common.exact_math import hypot
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
@@ -37,16 +38,21 @@ class VelocityActuator:
         self._acceleration, self._turning = robot.acceleration, robot.acceleration / robot.radius
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and greatest speed in either direction (m/s) and turn rate (rad/s) that are accepted."""
+        """Return the least and greatest speed in either direction (m/s) and turn rate (rad/s)."""
         speed, rate = self._speed, self._turn_rate
         return {"x": (-speed, speed), "y": (-speed, speed), "angular": (-rate, rate)}
 
+    def within(self, command: Velocity) -> Velocity:
+        """Return a velocity that is no faster than the base, in the direction that was asked for."""
+        x, y, most = command.x, command.y, self._speed
+        if x * x + y * y <= most * most:
+            return command
+        share = most / hypot(x, y)
+        return Velocity(x * share, y * share, command.angular)
+
     def accept(self, command: Velocity, view: WritableView) -> bool:
-        """Take a velocity; one that is faster than the base, in whatever direction, is refused."""
-        x, y, speed = command.x, command.y, self._speed
-        if x * x + y * y > speed * speed or abs(command.angular) > self._turn_rate:
-            return False
-        view.write(self._set_point, x, y, command.angular)
+        """Take a velocity."""
+        view.write(self._set_point, command.x, command.y, command.angular)
         return True
 
     def hold(self, view: WritableView) -> None:

@@ -19,7 +19,7 @@ SLOW_M_S: Final = 0.01
 SLOW_RAD_S: Final = 0.05
 """Below these speeds a body is slow. A box that a substep's gravity lets settle is slower; one that begins to tip over
 is faster within the time of rest."""
-MAY_CHANGE: Final = frozenset(("slow_ticks", "partners", "refused"))
+MAY_CHANGE: Final = frozenset(("slow_ticks", "partners", "refused", "clamped"))
 """Fields of a body at rest that may change: references follow their entities into another layout."""
 REST_NS: Final = 500_000_000
 """How long all bodies of an island are slow before they are at rest."""

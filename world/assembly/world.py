@@ -170,9 +170,9 @@ def addition(spec: WorldSpec, layout: Layout, name: str, model: str) -> tuple[Ve
 
 
 def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
-    """Return what rules and kits show of a frame, for JSON."""
+    """Return what rules and kits show of a frame, and the commands that its robots clamped and refused, for JSON."""
     view = View(frame.tick, frame.numbers)
-    status: dict[str, Any] = {}
+    status: dict[str, Any] = {"commands": count_commands(frame)}
     shown: list[tuple[str, Any, Any]] = [
         (f"rule {name}", rule, view) for name, rule in rules_of(spec, frame.layout).items()
     ]
@@ -188,8 +188,15 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
     return status
 
 
+def count_commands(frame: Frame) -> dict[str, int]:
+    """Return how many commands the robots of a frame have clamped and refused."""
+    robots, values = frame.layout.robots, frame.values
+    return {key: int(sum(values[robot.offsets[key]] for robot in robots)) for key in ("clamped", "refused")}
+
+
 def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
-    """Return in words what rules and kits show, from what `world_status` returned."""
+    """Return in words what rules and kits show, and the commands that were not taken as they came, from what
+    `world_status` returned."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [registry.find("kit", name).made for name in sorted(spec.kits)]
     found = [f"no {failed}" for failed in [status.get("failed")] if failed]
@@ -201,6 +208,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
                 raise
             except BaseException as error:  # noqa: BLE001  # without its part of the status, for one
                 found.append(f"{NO_TEXT} {one.__qualname__}: {failure_of(error)}")
+    found += [f"commands {fate} {count}" for fate, count in status.get("commands", {}).items() if count]
     return [text for text in found if text]
 
 

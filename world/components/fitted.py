@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
+from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.view import (
     Actuator,
     ComponentError,
@@ -24,13 +25,11 @@ from foosim.world.components.view import (
 from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.forms import SAMPLES, Component
-from foosim.world.forms.payloads import FLOAT, PayloadCodec
+from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
 from foosim.world.layout import Entity, Layout, modifier_labels, slot_that_speaks
 from foosim.world.spec import WorldSpec
-
-NO_LIMITS: Final[Mapping[str, tuple[float, float]]] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +61,12 @@ class FittedModifier:
     ) -> list[float] | None:
         try:
             values = call(*arguments)
-            if values is None or (
-                type(values) is list
-                and len(values) == size
-                and (FLOAT.issuperset(map(type, values)) or all(isinstance(one, int | float) for one in values))
-            ):
-                return values
+            if values is None:
+                return None
+            if type(values) is list and len(values) == size:
+                floats = values if FLOAT.issuperset(map(type, values)) else as_floats(values)
+                if floats is not None:
+                    return floats
             raise WrongResult(call, f"a list of {size} numbers, or None,", values)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
@@ -129,6 +128,9 @@ class FittedActuator:
     modifiers: tuple[FittedModifier, ...]
     size: int
     """How many numbers a command has; 0 of one that is not all numbers."""
+    bounds: CommandBounds
+    clamped_at: int
+    """The place of the robot's count of clamped commands."""
     moves: bool = True
     """Whether it commands the motors of its robot."""
 
@@ -138,9 +140,9 @@ class FittedActuator:
         return any(one.due is not None for one in self.modifiers)
 
     def accept(self, payload: bytes, view: WritableView) -> bool:
-        """Take a command; False when it is refused. Raises ComponentError."""
+        """Take a command, clamped to its limits; False when it is refused. Raises ComponentError."""
         try:
-            command = self.codec.decode(payload)
+            command = self.codec.decode_finite(payload)
         except Malformed:
             return False
         view.count_command(self)
@@ -148,12 +150,27 @@ class FittedActuator:
             return self._take(command, view)
         return self._go_on(0, self.codec.numbers(command), view)
 
-    def take_due(self, view: WritableView) -> None:
-        """Take the commands whose time has come. Raises ComponentError."""
+    def take_due(self, view: WritableView) -> int:
+        """Take the commands whose time has come; return how many of them are refused. Raises ComponentError."""
+        refused = 0
         for place, one in enumerate(self.modifiers):
             values = one.take_due(self.size, view)
-            if values is not None:
-                self._go_on(place + 1, values, view)
+            if values is not None and not self._go_on(place + 1, values, view):
+                refused += 1
+        return refused
+
+    def examine(self, payload: bytes) -> tuple[str, Sequence[Clamped]]:
+        """Return why a command can only be refused, empty where it need not be, and which of its numbers are clamped.
+
+        Modifiers may change it before. Raises ComponentError.
+        """
+        try:
+            found = self.bounds.clamp(self.codec.decode_finite(payload))
+        except Malformed as error:
+            return str(error), ()
+        except BaseException as error:
+            raise self.failed(0, error) from error
+        return ("", found[1]) if found is not None else (f"{self.codec.name} of another length", ())
 
     def _go_on(self, place: int, values: list[float], view: WritableView) -> bool:
         """Take a command that has come to this place among the modifiers; dropping or delaying one is no refusal."""
@@ -168,8 +185,14 @@ class FittedActuator:
 
     def _take(self, command: Any, view: WritableView) -> bool:
         try:
-            is_taken = self.actuator.accept(command, view)
+            found = self.bounds.clamp(command)
+            if found is None:
+                return False
+            within, clamped = found
+            is_taken = self.actuator.accept(within, view)
             if is_taken is True or is_taken is False:
+                if is_taken and clamped:
+                    view.written_to[self.clamped_at] += 1.0
                 return is_taken
             raise WrongResult(self.actuator.accept, "True or False", is_taken)
         except BaseException as error:
@@ -227,7 +250,11 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         numbers = numbers_of(component, settings, robot.counts)
         size = 0 if numbers is None else numbers.size
         codec = codec_of(settings.kind, "actuator")
-        fitted.append(FittedActuator(robot.name, channel, made, codec, modifiers, size, component.moves))
+        bounds = called(f"actuator {channel}", robot.name, 0, CommandBounds, made, codec)
+        counter = robot.offsets["clamped"]
+        fitted.append(
+            FittedActuator(robot.name, channel, made, codec, modifiers, size, bounds, counter, component.moves)
+        )
     return tuple(fitted)
 
 
@@ -264,8 +291,8 @@ def _modifiers(
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = NO_LIMITS
-    if component.form == "sensor" and hasattr(made, "limits"):
-        limits = called(f"sensor {channel}", robot.name, 0, _limits, made)
+    if component.form == "sensor":
+        limits = called(f"sensor {channel}", robot.name, 0, limits_of, made)
     bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
@@ -275,11 +302,3 @@ def _modifiers(
         one = _made(registry.find_component("modifier", its.kind), its, at)
         accept, due = getattr(one, "accept", one.apply), getattr(one, "due", None)
         yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, accept, due)
-
-
-def _limits(made: Any) -> Mapping[str, tuple[float, float]]:
-    """Return the bounds of a sensor's readings. Raises WrongResult."""
-    limits = made.limits()
-    if not (isinstance(limits, Mapping) and all(isinstance(its, tuple) and len(its) == 2 for its in limits.values())):
-        raise WrongResult(made.limits, "a mapping of fields to least and greatest value", limits)
-    return limits

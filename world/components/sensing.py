@@ -16,6 +16,7 @@ from foosim.common.errors import BadValue, NotFinite
 from foosim.world.components.fitted import FittedSensor
 from foosim.world.components.view import SensingView, called, component_error, has_together
 from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.payloads import as_floats
 
 Numbers: TypeAlias = NDArray[np.float64]
 MODIFIED_TOGETHER_MIN: Final = 64
@@ -179,8 +180,8 @@ def _computed(
 def _numbers(one: FittedSensor, reading: Any, view: SensingView) -> list[float]:
     """Return the numbers of a reading, for modifiers. Raises ComponentError."""
     try:
-        numbers = one.codec.numbers(reading)
-        if len(numbers) == one.size and all(isinstance(number, int | float) for number in numbers):
+        numbers = as_floats(one.codec.numbers(reading))
+        if numbers is not None and len(numbers) == one.size:
             return numbers
         raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
     except BaseException as error:

@@ -314,15 +314,17 @@ class Modifier(Protocol):
 class Actuator(Protocol):
     """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
 
-    A class may have three more methods: `bounds()`, which returns the least and the greatest value of each number of a
-    command, where that is numbers whose fields have several each; `unpowered()`, which returns what is asked of the
+    A class may have five more methods: `bounds()`, which returns the least and the greatest value of each number of a
+    command, where that is numbers whose fields have several each; `within(command)`, which returns the command that is
+    carried out instead, where limits are of several numbers together; `names()`, what the numbers of a command are
+    called; `unpowered()`, which returns what is asked of the
     motors of a robot without power; where there is none, that is a speed of 0 with the force or acceleration of
     `command`. The static `together(actuators)` returns an object whose `command(view)` gives what several ask, of
     robots that move by kinematics, as an array of shape (actuators, motors, 2), with the same bits.
     """
 
     def accept(self, command: Any, view: WritableView) -> bool:
-        """Take a command, a value of the registered type, into the slots; False when it is refused."""
+        """Take a command within the limits, a value of the registered type, into the slots; False: it is refused."""
 
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """Return the least and the greatest value of each field of a command that has bounds."""

@@ -51,7 +51,7 @@ def failure_of(error: BaseException, module: str = "") -> str:
         text = " ".join(said.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
     if isinstance(error, Misdeed):
-        return text + _place_of_method(error.method)
+        return text + place_of_method(error.method)
     return (f"{kind}: {text}" if text else kind) + _place_of(error, module)
 
 
@@ -69,7 +69,8 @@ def _place_of(error: BaseException, module: str) -> str:
     return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
 
 
-def _place_of_method(method: Callable[..., Any]) -> str:
+def place_of_method(method: Callable[..., Any]) -> str:
+    """Return ` (file:line)` of the first line of a method; empty of one that is not of Python."""
     code = getattr(unwrap(getattr(method, "__func__", method)), "__code__", None)
     return "" if code is None else f" ({_shown(code.co_filename)}:{code.co_firstlineno})"
 

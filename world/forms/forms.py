@@ -115,8 +115,8 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
     return f"{numbers} numbers in all, at most {SLOTS_MAX} are valid" if numbers > SLOTS_MAX else ""
 
 
-OF_ROBOTS: Final = ("down", "refused")
-"""Fields that each robot has: whether it is out of service, and how many commands it has refused."""
+OF_ROBOTS: Final = ("down", "refused", "clamped")
+"""Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
 OF_SOLVED: Final = ("quarantined",)
 """Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
 
@@ -208,11 +208,12 @@ class Model(Form):
     """A model of entities.
 
     `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
-    needs it has whatever it declares: robots `down` and `refused`, what is solved `quarantined`. An engine solves one
-    that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and sends and
-    receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a deployment.
-    `units` are those of its fields' numbers, the last one standing for all behind it; fields that every model calls the
-    same need none. `variants` are what it is instead where its setting `dynamics` has one of these values.
+    needs it has whatever it declares: robots `down`, `refused` and `clamped`, what is solved `quarantined`. An engine
+    solves one that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and
+    sends and receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a
+    deployment. `units` are those of its fields' numbers, the last one standing for all behind it; fields that every
+    model calls the same need none. `variants` are what it is instead where its setting `dynamics` has one of these
+    values.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)

@@ -9,7 +9,6 @@ bytes.
 from __future__ import annotations
 
 import struct
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -20,7 +19,6 @@ from msgspec import Struct, inspect
 
 from foosim.common.errors import BadValue, Malformed, NotFinite
 
-FLOAT_MAX: Final = sys.float_info.max
 FLOAT: Final = frozenset((float,))
 MANY_MAX: Final = 1 << 16
 """Numbers in a tuple whose type has no bound of its own."""
@@ -48,7 +46,7 @@ class PayloadCodec:
         self.fields: Final = tuple(_field(field) for field in _info(kind).fields)
         self._many = many_of(self.fields)
         count = len(self.fields) - self._many
-        self._is_packed = all(field.is_number for field in self.fields[:count])
+        self.is_packed: Final = all(field.is_number for field in self.fields[:count])
         self._packed = struct.Struct(f"<{count}d")
         bounds = [_bounds(field.type) for field in _info(kind).fields[count:]]
         self._least, self._most = max((least for least, _ in bounds), default=0), min((m for _, m in bounds), default=0)
@@ -67,7 +65,7 @@ class PayloadCodec:
 
     def decode(self, payload: bytes) -> Any:
         """Return the value in a payload; raises Malformed for one that is none, or has a number that is not finite."""
-        if not self._is_packed:
+        if not self.is_packed:
             try:
                 return self._other.decode(payload)
             except msgspec.DecodeError as error:
@@ -79,6 +77,13 @@ class PayloadCodec:
                 raise Malformed(f"{self.name} with numbers that are not finite")
             return self.kind(*numbers)
         return self._decode_many(payload)
+
+    def decode_finite(self, payload: bytes) -> Any:
+        """Return the value in a payload; raises Malformed as `decode`, and for any other number that is not finite."""
+        value = self.decode(payload)
+        if not self.is_packed and not _is_finite(msgspec.to_builtins(value)):
+            raise Malformed(f"{self.name} with numbers that are not finite")
+        return value
 
     def _decode_many(self, payload: bytes) -> Any:
         if not self._many:
@@ -96,8 +101,11 @@ class PayloadCodec:
     def encode(self, value: Any) -> bytes:
         """Return the payload of a value; raises BadValue for a number that is none or not finite."""
         assert isinstance(value, self.kind), f"{self.name} is a {self.kind.__name__}, not a {type(value).__name__}"
-        if not self._is_packed:
-            return msgspec.msgpack.encode(value)
+        if not self.is_packed:
+            try:
+                return msgspec.msgpack.encode(value, enc_hook=as_float)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise BadValue(f"{self.name}: {error}", value) from None
         numbers = self.numbers(value)
         if not self._many and FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers)):
             return self._packed.pack(*numbers)
@@ -115,12 +123,12 @@ class PayloadCodec:
         Raises NotFinite for a number that is not finite, BadValue for what is not of its field's type.
         """
         payload = self.encode(value)
-        if not self._is_packed:
+        if not self.is_packed:
             try:
                 self._other.decode(payload)
             except msgspec.DecodeError as error:
                 raise BadValue(f"{self.name}: {error}", value) from None
-            if not _is_finite(msgspec.to_builtins(value)):
+            if not _is_finite(msgspec.to_builtins(value, enc_hook=as_float)):
                 raise NotFinite(f"{self.name} with numbers that are not finite")
         return payload
 
@@ -142,26 +150,51 @@ class PayloadCodec:
         return self.kind(*numbers[:count], *(tuple(numbers[start : start + more]) for start in starts))
 
     def _check(self, field: str, number: Any) -> None:
-        if not isinstance(number, int | float):
-            raise BadValue(f"{self.name}.{field} is not a number", number)
-        if not -FLOAT_MAX <= number <= FLOAT_MAX:
+        try:
+            is_finite = isfinite(as_float(number))
+        except OverflowError:
+            is_finite = False
+        except (TypeError, ValueError):
+            raise BadValue(f"{self.name}.{field} is not a number", number) from None
+        if not is_finite:
             raise NotFinite(f"{self.name}.{field} is not finite", number)
 
     def numbers(self, value: Any) -> list[Any]:
         """Return all numbers of a value, in the order of its fields; of what is not packed none. Raises BadValue."""
-        if not self._is_packed:
+        if not self.is_packed:
             return []
         values = list(msgspec.structs.astuple(value))
         if not self._many:
             return values
         count = len(values) - self._many
         for field, several in zip(self.fields[count:], values[count:], strict=True):
-            if not isinstance(several, tuple | list):
+            if not isinstance(several, tuple | list) and not _is_array(several):
                 raise BadValue(f"{self.name}.{field.name} is not several numbers", several)
             if len(several) != len(values[count]):
                 what = f"{self.name}.{field.name} is not as many numbers as {self.fields[count].name}"
                 raise BadValue(f"{what}, {len(values[count])}", len(several))
         return [*values[:count], *(number for several in values[count:] for number in several)]
+
+
+def as_float(value: Any) -> float:
+    """Return a number as a float: one of Python, of numpy, or of any class that says how. Raises TypeError and
+    ValueError for what is none, OverflowError for one beyond all floats."""
+    if not hasattr(value, "__float__"):
+        raise TypeError(f"a {type(value).__name__} is not a number")
+    return float(value)
+
+
+def as_floats(values: Sequence[Any]) -> list[float] | None:
+    """Return numbers as floats; None where one is no number."""
+    try:
+        return [as_float(one) for one in values]
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _is_array(value: Any) -> bool:
+    """Whether that is an array of numpy, or another sequence of numbers."""
+    return all(hasattr(value, method) for method in ("__len__", "__getitem__", "__array__"))
 
 
 def many_of(fields: Sequence[Field]) -> int:

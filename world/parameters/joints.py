@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf
 from typing import Annotated, Final
 
@@ -15,7 +15,7 @@ from foosim.common.plain_data import quoted
 from foosim.common.spec_base import Name
 from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import body_at
-from foosim.world.components.view import Mounting, Slot, View, WritableView
+from foosim.world.components.view import Mounting, Slot, View
 from foosim.world.forms.forms import JOINTS_MAX, Carrier
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.scene import Link
@@ -57,7 +57,10 @@ class JointGroup:
             if name not in names:
                 problem = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
                 raise Misfit(("joints", place), problem, name, quoted(nearest_name(name, names)))
-        self.indices = tuple(names.index(name) for name in settings.joints or names)
+        links = tuple(settings.joints or names)
+        self.indices = tuple(names.index(name) for name in links)
+        self.names = tuple(f"joint of {name}" for name in links)
+        """What the numbers of a command are of."""
         self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
         self.set_point: Slot = at.slot("set_point")
         start = at.robot.offsets["joint_positions"]
@@ -70,12 +73,3 @@ class JointGroup:
     def positions(self, view: View) -> list[float]:
         """Return where the joints are (m or rad)."""
         return [view.numbers[at] for at in self._positions]
-
-    def take(self, wanted: Sequence[float], lows: Sequence[float], highs: Sequence[float], view: WritableView) -> bool:
-        """Make numbers the set-points; False where there are too many or few of them, or one is out of its bounds."""
-        if len(wanted) != len(self.indices):
-            return False
-        if not all(low <= one <= high for one, low, high in zip(wanted, lows, highs, strict=True)):
-            return False
-        view.write(self.set_point, *wanted)
-        return True

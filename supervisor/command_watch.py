@@ -1,0 +1,105 @@
+"""Warns of commands that robots clamp or refuse: the first time for each robot, channel and number.
+
+How many there are the frames say. Which they were follows from the deliveries of the tick, so whichever node computed
+it, and however many there are, the warning comes once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from foosim.protocol.codec import decode
+from foosim.protocol.messages import Deliveries
+from foosim.supervisor.state import RunState
+from foosim.world.components.bounds import Clamped
+from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
+from foosim.world.robot_packets import Delivered
+
+COUNTERS: Final = ("clamped", "refused")
+UNSEEN: Final[Mapping[str, str]] = {
+    "clamped": "a command is clamped as its modifiers leave it",
+    "refused": "a packet is refused: the robot is out of service, or neither outbox nor actuator takes it",
+}
+"""What is known of a command whose packet does not show it."""
+
+
+class CommandWatch:
+    """Compares the counters of robots in committed frames."""
+
+    def __init__(self, state: RunState) -> None:
+        self._state = state
+        self._layout: Layout | None = None
+        self._places = np.zeros((0, 2), dtype=np.int64)
+        self._actuators: dict[str, tuple[FittedActuator, ...]] = {}
+        """Of robots whose counters have changed."""
+        self._warned: set[tuple[str, str, str]] = set()
+        """Robots, channels and numbers, or the fate of the whole command."""
+
+    def committed(self, before: Frame, after: Frame, deliveries: bytes) -> None:
+        """Log what happened to commands in the tick between two frames, whose deliveries these are."""
+        layout = after.layout
+        if layout is not before.layout:  # who joins or leaves has its counters anew
+            return
+        if layout is not self._layout:
+            self._layout, self._actuators = layout, {}
+            places = [[robot.offsets[counter] for counter in COUNTERS] for robot in layout.robots]
+            self._places = np.array(places, dtype=np.int64).reshape(len(places), 2)
+        more = after.values[self._places] > before.values[self._places]
+        if not more.any():
+            return
+        packets = decode(Deliveries, deliveries).packets
+        for robot, (is_clamped, is_refused) in zip(layout.robots, more.tolist(), strict=True):
+            if is_clamped or is_refused:
+                theirs = [packet for packet in packets if packet.destination == robot.name]
+                self._warn(robot.name, after.tick - 1, theirs, (is_clamped, is_refused))
+
+    def _warn(self, robot: str, tick: int, packets: Sequence[Delivered], grown: tuple[bool, bool]) -> None:
+        found = [*self._found(robot, packets)]
+        for fate, has_grown in zip(COUNTERS, grown, strict=True):
+            if not has_grown:
+                continue
+            its = [(channel, number, text) for channel, kind, number, text in found if kind == fate]
+            for channel, number, text in its or [("", fate, UNSEEN[fate])]:
+                key = robot, channel, number
+                if key not in self._warned:
+                    self._warned.add(key)
+                    where = f"{robot}, {channel}" if channel else robot
+                    self._state.log("warning", f"tick {tick}: {where}: {text}; further ones are counted")
+
+    def _found(self, robot: str, packets: Sequence[Delivered]) -> Iterator[tuple[str, str, str, str]]:
+        """Yield of commands the channel, what happens to them, to which number, and the text."""
+        its = self._actuators_of(robot)
+        for packet in packets:
+            one = next((one for one in its if one.channel == packet.channel), None)
+            if one is None:
+                channels = ", ".join(one.channel for one in its) or "none"
+                yield (
+                    packet.channel,
+                    "refused",
+                    "refused",
+                    f"a packet is refused: there are the channels {channels}",
+                )
+                continue
+            why, clamped = one.examine(packet.payload)
+            if why:
+                yield one.channel, "refused", "refused", f"a command of {packet.source} is refused: {why}"
+            for number in clamped:
+                yield one.channel, "clamped", number.name, f"{number_text(number)}, sent by {packet.source}"
+
+    def _actuators_of(self, robot: str) -> tuple[FittedActuator, ...]:
+        if robot not in self._actuators:
+            assert self._layout is not None
+            self._actuators[robot] = actuators_of(self._state.deployment, self._layout, self._layout[robot])
+        return self._actuators[robot]
+
+
+def number_text(number: Clamped) -> str:
+    """`a 2.5 rad is above its limit and is clamped to 2 rad`."""
+    unit = f" {number.unit}" if number.unit else ""
+    way = "above" if number.value > number.limit else "below"
+    return f"{number.name} {number.value:g}{unit} is {way} its limit, and is clamped to {number.limit:g}{unit}"

@@ -1,0 +1,117 @@
+"""The limits of an actuator's commands: numbers beyond them are clamped, as real drives do it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
+from operator import le
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import msgspec
+
+from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.payloads import Field, PayloadCodec, field_at
+
+Bound: TypeAlias = tuple[float, float]
+NO_LIMITS: Final[Mapping[str, Bound]] = {}
+
+
+class Clamped(NamedTuple):
+    """A number of a command that was clamped: its name and unit, its value, and the limit that it has instead."""
+
+    name: str
+    unit: str
+    value: float
+    limit: float
+
+
+NONE_CLAMPED: Final[Sequence[Clamped]] = ()
+
+
+def limits_of(made: Any) -> Mapping[str, Bound]:
+    """Return the least and the greatest value of the fields of a component. Raises WrongResult."""
+    if not hasattr(made, "limits"):
+        return NO_LIMITS
+    limits = made.limits()
+    if not (isinstance(limits, Mapping) and all(isinstance(its, tuple) and len(its) == 2 for its in limits.values())):
+        raise WrongResult(made.limits, "a mapping of fields to least and greatest value", limits)
+    return limits
+
+
+def bounds_of(made: Any, fields: Sequence[Field], size: int) -> list[Bound]:
+    """Return the least and the greatest of each of `size` numbers: `bounds()` of a component, else its `limits()`."""
+    if hasattr(made, "bounds"):
+        return list(made.bounds())
+    limits = limits_of(made)
+    return [limits.get(field_at(fields, size, place).name, (-inf, inf)) for place in range(size)]
+
+
+class CommandBounds:
+    """The limits of one actuator. What it keeps follows from the actuator."""
+
+    def __init__(self, made: Any, codec: PayloadCodec) -> None:
+        """Raises WrongResult for limits that are none."""
+        self._made, self._codec, self._limits = made, codec, limits_of(made)
+        self._within: Callable[[Any], Any] | None = getattr(made, "within", None)
+        self._ends: dict[int, tuple[tuple[float, ...], tuple[float, ...]]] = {}
+        """The least and the greatest values, by how many numbers a command has."""
+
+    def clamp(self, command: Any) -> tuple[Any, Sequence[Clamped]] | None:
+        """Return a command within the limits, and which numbers were not; None of one with too many numbers or too few.
+
+        All its numbers are finite.
+        """
+        if not self._codec.is_packed:
+            return self._clamp_fields(command)
+        numbers = self._codec.numbers(command)
+        size = len(numbers)
+        low, high = self._ends[size] if size in self._ends else self._ends_of(size)
+        if len(low) != size:
+            return None
+        within, left = command, numbers
+        if self._within is not None:
+            within = self._within(command)
+            left = self._codec.numbers(within)
+        if not (all(map(le, low, left)) and all(map(le, left, high))):
+            clamped = [min(max(one, least), most) for one, least, most in zip(left, low, high, strict=True)]
+            within = self._codec.from_numbers(clamped)
+        if within is command:
+            return command, NONE_CLAMPED
+        names = self._names(size)
+        pairs = enumerate(zip(numbers, self._codec.numbers(within), strict=True))
+        fields = self._codec.fields
+        beyond = [
+            Clamped(names[place], field_at(fields, size, place).unit, value, limit)
+            for place, (value, limit) in pairs
+            if value != limit
+        ]
+        return within, beyond
+
+    def _ends_of(self, size: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        bounds = bounds_of(self._made, self._codec.fields, size)
+        ends = tuple(low for low, _ in bounds), tuple(high for _, high in bounds)
+        self._ends[size] = ends
+        return ends
+
+    def _names(self, size: int) -> Sequence[str]:
+        """Return what each number of a command is called."""
+        if hasattr(self._made, "names"):
+            return tuple(self._made.names())
+        found = [field_at(self._codec.fields, size, place) for place in range(size)]
+        first = {field.name: place for place, field in reversed([*enumerate(found)])}
+        return [
+            f"{field.name}[{place - first[field.name]}]" if field.is_several else field.name
+            for place, field in enumerate(found)
+        ]
+
+    def _clamp_fields(self, command: Any) -> tuple[Any, Sequence[Clamped]]:
+        """Clamp the fields with limits of a command that is not all numbers."""
+        units = {field.name: field.unit for field in self._codec.fields}
+        beyond = [
+            Clamped(name, units[name], value, min(max(value, low), high))
+            for name, (low, high) in self._limits.items()
+            if not low <= (value := getattr(command, name)) <= high
+        ]
+        if not beyond:
+            return command, NONE_CLAMPED
+        return msgspec.structs.replace(command, **{one.name: one.limit for one in beyond}), beyond
