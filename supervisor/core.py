@@ -18,7 +18,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import encode
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import (
     Commit,
@@ -39,7 +39,6 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import Patience
 from foosim.runtime.closed import closed
-from foosim.supervisor.command_watch import CommandWatch
 from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.load_balancing import Balancer
@@ -52,6 +51,7 @@ from foosim.supervisor.state import RunState
 from foosim.supervisor.status import SupervisorStatistics, result, status
 from foosim.supervisor.vhub_loss import PlayerLosses, VhubLoss
 from foosim.supervisor.viewing import Viewing
+from foosim.world.components.command_watch import CommandWatch
 from foosim.world.edits import Edit, layout_after
 from foosim.world.frame import Frame, chain_next
 
@@ -86,7 +86,7 @@ class SupervisorCore:
         self.balancer = Balancer(state.deployment.owners()) if settings.balance else None
         does = self.status, self.open_epoch, self.stop, self.fail
         self.requests = Requests(state, self.viewing, self.node_loss, *does)
-        self._commands = CommandWatch(state)
+        self._commands = CommandWatch(state.deployment, lambda text: state.log("warning", text))
         self.on_commit: Callable[[Frame], None] | None = None
         """Gets every committed frame, for a rehearsal."""
         self._slots = Slots(state.frame.layout, state.owners)
@@ -328,7 +328,7 @@ class SupervisorCore:
             return False
         self._slots = slots
         inputs.committed(tick)
-        self._commands.committed(state.frame, frame, deliveries)
+        self._commands.committed(state.frame, frame, lambda: decode(Deliveries, deliveries).packets)
         self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
         return True
 

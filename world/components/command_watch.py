@@ -6,19 +6,17 @@ it, and however many there are, the warning comes once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
-from foosim.protocol.codec import decode
-from foosim.protocol.messages import Deliveries
-from foosim.supervisor.state import RunState
 from foosim.world.components.bounds import Clamped
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.robot_packets import Delivered
+from foosim.world.spec import WorldSpec
 
 COUNTERS: Final = ("clamped", "refused")
 UNSEEN: Final[Mapping[str, str]] = {
@@ -31,8 +29,8 @@ UNSEEN: Final[Mapping[str, str]] = {
 class CommandWatch:
     """Compares the counters of robots in committed frames."""
 
-    def __init__(self, state: RunState) -> None:
-        self._state = state
+    def __init__(self, spec: WorldSpec, warn: Callable[[str], None]) -> None:
+        self._spec, self._say = spec, warn
         self._layout: Layout | None = None
         self._places = np.zeros((0, 2), dtype=np.int64)
         self._actuators: dict[str, tuple[FittedActuator, ...]] = {}
@@ -40,8 +38,8 @@ class CommandWatch:
         self._warned: set[tuple[str, str, str]] = set()
         """Robots, channels and numbers, or the fate of the whole command."""
 
-    def committed(self, before: Frame, after: Frame, deliveries: bytes) -> None:
-        """Log what happened to commands in the tick between two frames, whose deliveries these are."""
+    def committed(self, before: Frame, after: Frame, delivered: Callable[[], Sequence[Delivered]]) -> None:
+        """Warn of what happened to commands in the tick between two frames; `delivered` returns what came in it."""
         layout = after.layout
         if layout is not before.layout:  # who joins or leaves has its counters anew
             return
@@ -52,7 +50,7 @@ class CommandWatch:
         more = after.values[self._places] > before.values[self._places]
         if not more.any():
             return
-        packets = decode(Deliveries, deliveries).packets
+        packets = delivered()
         for robot, (is_clamped, is_refused) in zip(layout.robots, more.tolist(), strict=True):
             if is_clamped or is_refused:
                 theirs = [packet for packet in packets if packet.destination == robot.name]
@@ -69,7 +67,7 @@ class CommandWatch:
                 if key not in self._warned:
                     self._warned.add(key)
                     where = f"{robot}, {channel}" if channel else robot
-                    self._state.log("warning", f"tick {tick}: {where}: {text}; further ones are counted")
+                    self._say(f"tick {tick}: {where}: {text}; further ones are counted")
 
     def _found(self, robot: str, packets: Sequence[Delivered]) -> Iterator[tuple[str, str, str, str]]:
         """Yield of commands the channel, what happens to them, to which number, and the text."""
@@ -94,7 +92,7 @@ class CommandWatch:
     def _actuators_of(self, robot: str) -> tuple[FittedActuator, ...]:
         if robot not in self._actuators:
             assert self._layout is not None
-            self._actuators[robot] = actuators_of(self._state.deployment, self._layout, self._layout[robot])
+            self._actuators[robot] = actuators_of(self._spec, self._layout, self._layout[robot])
         return self._actuators[robot]
 
 
