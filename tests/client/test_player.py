@@ -159,14 +159,14 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
         ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a command"),
-        ({"red.goal": Command(0.0, "up")}, "rod_position.spin is not a number, 'up'"),  # type: ignore[arg-type]
+        ({"red.goal": Command(0.0, "up")}, "command of red.goal: rod_position.spin is not a number,"
+         " 'up' (ACT)"),  # type: ignore[arg-type]
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
         (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),
         ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to Commands"),
-        ({"red.goal": Command(0.5, 0.0)}, "slide of red.goal is not within -0.123 to 0.123 m, 0.5"),
-        ({"camera": Command(0.0, 0.0)}, "no robot that takes a Command (there are: blue.attack, blue.defence,"
-         " blue.goal, blue.midfield, red.attack, red.defence, red.goal, red.midfield), 'camera'"),
+        ({"camera": Command(0.0, 0.0)}, "command of camera: no robot that takes a Command (there are: blue.attack,"
+         " blue.defence, blue.goal, blue.midfield, red.attack, red.defence, red.goal, red.midfield), 'camera' (ACT)"),
     ],
 )  # fmt: skip
 def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
@@ -176,7 +176,8 @@ def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
     with pytest.raises(PlayerError) as error:
         go(loop, 1)
     place = f"{__file__}:{RAISES}: raise self.commands"
-    assert str(error.value) == f"{NAME} failed at tick 5: {text.replace('PLACE', place)}"
+    act = f"tests/client/test_player.py:{Scripted.act.__code__.co_firstlineno}"
+    assert str(error.value) == f"{NAME} failed at tick 5: {text.replace('PLACE', place).replace('ACT', act)}"
     assert error.value.exit_code == 1
     assert said(loop) == []
 

@@ -163,7 +163,7 @@ def test_a_free_robot_needs_a_mass(folder: Path) -> None:
 def test_the_state_follows_from_the_file(deployment: Deployment) -> None:
     layout = build_layout(deployment)
     arm, cart = layout["arm"], layout["cart"]
-    own = {"quarantined": 1, "down": 1, **CONTACTS, "refused": 1}
+    own = {"quarantined": 1, "down": 1, **CONTACTS, "refused": 1, "clamped": 1}
     assert arm.fields == {**dict.fromkeys(JOINTS, 7), **own} and not arm.is_free
     assert cart.fields == {**BODY, **dict.fromkeys(JOINTS, 1), **own} and cart.is_free
     assert cart in layout.free and arm not in layout.free
