@@ -6,9 +6,10 @@ Each imports what it calls, so `--help` and the commands that need little start 
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import redirect_stdout
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from foosim.cli.run_command import with_options
-from foosim.common.errors import BadValue, Refused, read_at
+from foosim.common.errors import BadValue, Failed, Refused, read_at
 from foosim.launcher.run_options import RunOptions
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
@@ -85,16 +86,17 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 
     --resume continues a run whose launcher died, from its last committed frame and with its options.
     """
-    from foosim.launcher.begin import begin, go_on
-    from foosim.launcher.console_child import page_of
-    from foosim.launcher.display import Display
-    from foosim.launcher.outcome import refused_result
-    from foosim.launcher.up import Killed, Up
-    from foosim.runtime.run_folder import open_run
-
-    display = Display(sys.stderr if json else sys.stdout)
+    context.with_resource(_interrupting_signals())
     begun: Up | Outcome | None = None
     try:
+        from foosim.launcher.begin import begin, go_on
+        from foosim.launcher.console_child import page_of
+        from foosim.launcher.display import Display, unfailing_output
+        from foosim.launcher.up import Killed, Up
+        from foosim.runtime.run_folder import open_run
+
+        context.with_resource(unfailing_output())
+        display = Display(sys.stderr if json else sys.stdout)
         page = page_of(console, open_browser, second, offset, detached)
         if resumed is not None:
             if given := _given(context, but=BESIDE_RESUME):
@@ -107,19 +109,51 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         else:
             begun = begin(options, capture, not no_capture, run, detached, display, page)
         outcome = begun.run() if isinstance(begun, Up) else begun
+    except (Refused, MemoryError, KeyboardInterrupt) as error:
+        _print_unended(error, begun, resumed, run, json)
+        raise
     except Killed as killed:
         print(killed, file=sys.stderr)
         _print_result(killed.result, json)
         raise typer.Exit(INTERRUPTED) from None
-    except (Refused, MemoryError) as error:
-        reason = "too little memory" if isinstance(error, MemoryError) else str(error)
-        result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
-        _print_result(result, json)
-        raise
     for line in outcome.lines:
         display.say(line)
     _print_result(outcome.result, json)
     raise typer.Exit(FAILED if outcome.failed else DONE)
+
+
+class BeforeRun(Failed):
+    """A signal has ended `up` before its run began."""
+
+
+@contextmanager
+def _interrupting_signals() -> Iterator[None]:
+    """Raise KeyboardInterrupt at each Ctrl-C, SIGTERM or SIGHUP until the run handles them."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt(f"{signal.Signals(number).name} ended foosim-supervisor up before the run began")
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, interrupt) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _print_unended(
+    error: BaseException, begun: Up | Outcome | None, resumed: str | None, run: str | None, json: bool
+) -> None:
+    """Print the result of a run that an error has ended. Raises BeforeRun where that was a signal."""
+    from foosim.launcher.outcome import refused_result
+    from foosim.launcher.up import Up
+
+    reason = "too little memory" if isinstance(error, MemoryError) else str(error)
+    result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
+    _print_result(result, json)
+    if isinstance(error, KeyboardInterrupt):
+        raise BeforeRun(reason) from None
 
 
 def _given(context: typer.Context, but: Collection[str]) -> list[str]:

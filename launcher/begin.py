@@ -15,6 +15,7 @@ from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome
 from foosim.launcher.plan import (
     Plan,
     check_certificates,
+    check_descriptors,
     check_models_here,
     check_players_here,
     make_plan,
@@ -66,7 +67,8 @@ def go_on(folder: RunFolder, display: Display, page: Page | None) -> Up | Outcom
 
 
 def look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
-    """Raise Refused where a disk is too full to begin, and warn where it is nearly full."""
+    """Raise Refused where a disk is too full to begin, or files are too few; warn where a disk is nearly full."""
+    check_descriptors(plan)
     captured_here = None if VHUB in places(plan.deployment) else capture
     for warning in check_rooms(plan.deployment.capture, captured_here, runs):
         display.say(warning)

@@ -5,9 +5,11 @@ Both are pure functions of a status (`supervisor.status`); only `Display` knows 
 
 from __future__ import annotations
 
+import os
 import sys
+from contextlib import AbstractContextManager, ExitStack, redirect_stderr, redirect_stdout
 from types import TracebackType
-from typing import Any, Final, TextIO
+from typing import Any, Final, TextIO, cast
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -224,6 +226,43 @@ def render_text(status: dict[str, Any], width: int = 120) -> str:
     with console.capture() as captured:
         console.print(render(status))
     return captured.get()
+
+
+class Output:
+    """A stream that drops its text once it cannot be written (a full disk, a closed pipe): the run continues."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        try:
+            return self._stream.write(text)
+        except OSError:
+            self._drop()
+            return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except OSError:
+            self._drop()
+
+    def _drop(self) -> None:
+        """Have the rest, and what the stream still holds, written to nowhere: Python flushes it at its end."""
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def unfailing_output() -> AbstractContextManager[object]:
+    """Make both output streams such that errors in writing do not end the run."""
+    with ExitStack() as stack:
+        stack.enter_context(redirect_stdout(cast(TextIO, Output(sys.stdout))))
+        stack.enter_context(redirect_stderr(cast(TextIO, Output(sys.stderr))))
+        return stack.pop_all()
 
 
 class Display:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit
+from typing import TYPE_CHECKING, Final
 
 from foosim.common import wall_clock
 from foosim.common.addresses import Address, check_listen
@@ -31,6 +32,11 @@ if TYPE_CHECKING:
     from foosim.capture.start_frame import Branch
     from foosim.supervisor.settings import RunSettings
     from foosim.world.start import Start
+
+DESCRIPTORS: Final = 48
+"""What the process with the most file descriptors has: its files, Zenoh's own, operators; 24 were measured."""
+DESCRIPTORS_PER_ROLE: Final = 2
+"""Of each node, player and client: its link, and one that it replaces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +97,19 @@ def check_models_here(plan: Plan) -> None:
     if VHUB not in places(plan.deployment):
         file, network = plan.options.file, plan.deployment.network
         check_link_models(network, read_source_file(file), str(file), plan.options.all_sets)
+
+
+def check_descriptors(plan: Plan) -> None:
+    """Raise Refused where a process may have fewer file descriptors than that with the most links needs."""
+    deployment = plan.deployment
+    needed = DESCRIPTORS + DESCRIPTORS_PER_ROLE * sum(
+        len(names) for names in (deployment.nodes, deployment.players, deployment.clients)
+    )
+    may, _ = getrlimit(RLIMIT_NOFILE)
+    if may != RLIM_INFINITY and may < needed:
+        raise Refused(
+            f"a process may have {may} file descriptors, {needed} are needed: ulimit -n {needed}; nothing was started"
+        )
 
 
 def check_players_here(plan: Plan) -> None:

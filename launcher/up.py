@@ -285,6 +285,7 @@ class Up:
 
     def _show(self, control: Control) -> None:
         supervisor = self._supervisor
+        done = [child for child in self._launcher.ended() if child.exit_code == DONE]
         try:
             status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
@@ -301,6 +302,10 @@ class Up:
         self._has_begun = self._has_begun or status["begun"]
         self._has_ended = status["state"] in ENDED
         self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
+        for child in done if not self._has_ended else ():  # they ended before this status, and no end was published
+            child.left_early = not (
+                self._stopped.intersection(self._roles(child.name)) or child.name in self._launcher.units
+            )
         self._start_wanted(status["starts"])
         if not self._has_ended and not self._ending_s:
             self._restart_ended(now_s, knows=True)
@@ -354,7 +359,7 @@ class Up:
         """Restart a supervisor that ended before the run did; False when the run is over, or it is given up."""
         over = self._ending_s or self._has_ended or self.folder.result() is not None
         began = self.folder.info() is not None or supervisor.how.is_by_signal
-        if over or not began or supervisor.exit_code in (DONE, REFUSED):
+        if over or not began or supervisor.exit_code == REFUSED:
             return False
         may_restart = all(player.restart for player in self._beside) or not self._has_begun
         if not may_restart or (self._beside and self._hangs >= HANGS_MAX):
@@ -375,7 +380,7 @@ class Up:
                 continue
             if (
                 self._stopped.intersection(self._roles(child.name))
-                or child.exit_code == DONE
+                or (child.exit_code == DONE and not child.left_early)
                 or self._restarts.is_known(child.name)
             ):
                 continue
@@ -459,7 +464,7 @@ class Up:
             self._restart_ended(now_s)
         if self._lost is None:
             self._look_for_lost(now_s)
-        elif not self._ending_s and (now_s > self._lost_s + LOST_S or self._lost.exit_code == REFUSED):
+        elif not self._ending_s and (now_s > self._lost_s + LOST_S or self._lost.exit_code in (DONE, REFUSED)):
             if self._can_resume:
                 return False
             self._ending_s = now_s
@@ -469,7 +474,7 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot continue without this child, which has ended."""
-        return child.exit_code != DONE and not self._comes_back(child)
+        return (child.exit_code != DONE or child.left_early) and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:
         """Record the first child that ended unexpectedly; a killed one precedes those that ended because of it."""
@@ -530,7 +535,7 @@ class Up:
             blamed = self._launcher.children.get(self._process_of.get(name, name))
             if blamed is None:
                 return []
-            has_failed = blamed.exit_code not in (None, DONE)
+            has_failed = blamed.exit_code not in (None, DONE) or blamed.left_early
             how = f"{name} {blamed.ending}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
         return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]

@@ -40,7 +40,9 @@ class Room:
         return Level.LOW if self.left < 2 * self.reserve else Level.FINE
 
     def __str__(self) -> str:
-        return f"{megabytes(max(0, self.left))} left {self.where}, the reserve is {size_text(self.reserve)}"
+        return (
+            f"{size_like(max(0, self.left), self.reserve)} left {self.where}, the reserve is {size_text(self.reserve)}"
+        )
 
 
 def free_bytes(place: int | Path) -> int:
@@ -63,3 +65,12 @@ def size_text(count: int) -> str:
     """Return a size as in a deployment: exact, in the unit with the shortest number (`64 MiB`)."""
     whole = [f"{count // size} {unit}" for unit, size in _UNITS.items() if count >= size and count % size == 0]
     return min([*whole, f"{count} B"], key=lambda text: len(text.split()[0]))
+
+
+def size_like(count: int, other: int) -> str:
+    """Return a size in the unit in which `size_text` shows another one, with which it is compared: `61.8 MiB`."""
+    unit = size_text(other).split()[1]
+    if unit not in _UNITS:
+        return f"{count} {unit}"
+    number = count / _UNITS[unit]
+    return f"{number:.1f} {unit}" if number >= 10 else f"{number:.2g} {unit}"

@@ -125,7 +125,10 @@ class SupervisorShell:
 
     def is_over(self) -> bool:
         """Whether the run has ended and the vHub has closed the capture."""
-        return self.core.state.finished
+        core = self.core
+        if core.state.end is not None and core.failover.waits_for_hub(time.monotonic_ns()) and self._is_captured():
+            return True  # the vHub was done before this start
+        return core.state.finished
 
     def finish(self) -> int:
         """Write the result of the run; return the exit code.
@@ -148,6 +151,11 @@ class SupervisorShell:
         """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""
         launch = self._folder.launch()
         return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
+
+    def _is_captured(self) -> bool:
+        """Whether no capture is written, or its file is closed: no vHub has anything left to do."""
+        launch = self._folder.launch()
+        return launch is not None and (not launch.capture or self._has_capture())
 
     def stop(self) -> None:
         """End the run in order, as the command `down` does; a signal handler may call this."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import csv
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import cos, isfinite, radians, sin, sqrt
@@ -67,7 +68,7 @@ class _Table:
     def __init__(self, place: str, header: Sequence[str]) -> None:
         self._names = [name.strip().lower() for name in header]
         self._place = place
-        double = sorted({name for name in self._names if self._names.count(name) > 1 and name})
+        double = sorted(name for name, count in Counter(self._names).items() if count > 1 and name)
         if double:
             raise BadPoses(f"{place}: column {double[0]!r} stands there twice")
         time = self._one("time", TIMES)

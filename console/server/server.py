@@ -111,6 +111,7 @@ class ConsoleServer:
             max_queue=4,
             write_limit=WRITE_BYTES,
             open_timeout=HELLO_S,
+            ssl_handshake_timeout=None if tls is None else HELLO_S,
             close_timeout=CLOSE_S,
             ping_interval=PING_S,
             ping_timeout=PING_S,
@@ -175,7 +176,10 @@ class ConsoleServer:
 
     def _answer_http(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file; None lets a WebSocket open."""
-        if self._is_local and _host(request.headers.get("Host", "")) not in LOCAL_HOSTS:
+        hosts = request.headers.get_all("Host")
+        if len(hosts) > 1:  # RFC 9112, 3.2
+            return _response(400, PLAIN, b"A request has one Host header.\n")
+        if self._is_local and _host("".join(hosts)) not in LOCAL_HOSTS:
             # Another host name that resolves to this address would give its pages the rights of this origin.
             return _response(421, PLAIN, b"This console is asked for as 127.0.0.1 or localhost.\n")
         path = request.path.partition("?")[0]
@@ -329,7 +333,7 @@ def _host(header: str) -> str:
 
 
 def _response(status: int, content_type: str, content: bytes) -> Response:
-    reasons = {200: "OK", 404: "Not Found", 421: "Misdirected Request"}
+    reasons = {200: "OK", 400: "Bad Request", 404: "Not Found", 421: "Misdirected Request"}
     headers = Headers(
         {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content)), "Connection": "close"}
     )

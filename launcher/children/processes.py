@@ -54,6 +54,8 @@ class Child:
     """Where the kernel had killed processes when its end was noticed; None before."""
     killed: str = ""
     """Why the launcher killed it; empty when it did not."""
+    left_early: bool = False
+    """Whether it ended with exit code 0 while the run went on, as by `os._exit(0)`."""
 
     @property
     def exit_code(self) -> int | None:
@@ -218,6 +220,7 @@ class Launcher:
 
     def _signal(self, number: signal.Signals) -> None:
         for child in reversed(self.alive()):
+            child.killed = child.killed or "the run is over"
             try:
                 os.killpg(child.process.pid, number)
             except ProcessLookupError:

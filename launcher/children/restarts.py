@@ -47,7 +47,7 @@ class Ending:
     @property
     def text(self) -> str:
         """`was killed by SIGKILL, not by foosim`: follows the name of the process."""
-        if self.killed_by_us:
+        if self.killed_by_us and self.is_by_signal:
             return f"was killed by up: {self.killed_by_us}"
         if self.code < 0:
             if self._lacked_memory:

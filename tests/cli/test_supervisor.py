@@ -14,6 +14,7 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Capture
 from foosim.deployment.text.files import read_deployment_text
+from foosim.launcher import plan
 from foosim.launcher.new_capture import check_capture, check_rooms
 from foosim.launcher.pki import certificates
 from foosim.node.main import main as run_node
@@ -182,12 +183,21 @@ def test_a_disk_with_less_than_the_reserve_is_refused_before_anything_starts(
     reserve = "--set", "capture.reserve=1000 TiB"
     done = command("up", TABLE, "--for", "1s", *reserve, "--capture", "mine.mcap")
     assert done.code == 3 and not runs_folder().exists()
-    what = r"GB left on its disk, the reserve is 1000 TiB \(capture\.reserve\): make room, or lower the reserve; "
+    what = r"TiB left on its disk, the reserve is 1000 TiB \(capture\.reserve\): make room, or lower the reserve; "
     assert re.match(rf"\.: [0-9.]+ {what}nothing was started\n$", done.err)
     done = command("up", TABLE, "--for", "1s", *reserve, "--set", "capture.on_full=continue_unlogged")
     assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err), "journals have to be written"
     done = command("run", TABLE, "--for", "1s", *reserve)
     assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err) and not runs_folder().exists()
+
+
+def test_too_few_file_descriptors_are_refused_before_anything_starts(
+    command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plan, "getrlimit", lambda which: (55, 4096))
+    done = command("up", TABLE, "--for", "1s", "--no-capture")
+    what = "a process may have 55 file descriptors, 56 are needed: ulimit -n 56; nothing was started\n"
+    assert (done.code, done.err) == (3, what) and not runs_folder().exists()
 
 
 def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -> None:

@@ -270,5 +270,7 @@ def test_the_page_is_served_with_a_policy_and_nothing_else_is() -> None:
         for path in ("/../server.py", "/server.py", "/%2e%2e/server.py", "/etc/passwd"):
             assert (await get(stage, path, local))[0].startswith("HTTP/1.1 404 ")
         assert (await get(stage, "/", "Host: elsewhere.example"))[0].startswith("HTTP/1.1 421 ")
+        for path in ("/", "/ws"):
+            assert (await get(stage, path, local, local))[0].startswith("HTTP/1.1 400 "), "RFC 9112, 3.2"
 
     play(part)

@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosedError
 
 from foosim.common.addresses import Insecure
 from foosim.common.errors import BadValue
+from foosim.console.server import server as server_module
 from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.server.serving import ServeOptions, listening_at, write_private
 from foosim.launcher.pki import certificates
@@ -54,7 +55,9 @@ def test_nobody_guesses_a_token_and_each_has_its_role() -> None:
     ]
 
 
-def test_a_page_over_https_is_reached_by_its_host_and_opens_from_its_own_origin_alone(tmp_path: Path) -> None:
+def test_a_page_over_https_is_reached_by_its_host_and_opens_from_its_own_origin_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "pki"
     certificates.init(folder)
     certificate, *_ = [path for path in certificates.issue(folder, ["vhub"], ["127.0.0.1"]) if path.suffix == ".pem"]
@@ -63,11 +66,13 @@ def test_a_page_over_https_is_reached_by_its_host_and_opens_from_its_own_origin_
     trusting = ssl.create_default_context(cafile=folder / "ca.pem")
 
     async def talk() -> None:
+        """Beside browsers, one begins a handshake and ends it not: the connection is closed after `HELLO_S`."""
         source = MemorySource(table())
         server = ConsoleServer([source], TOKENS, "1")
         async with asyncio.timeout(30), server.listening("127.0.0.1", 0, context) as port:
             running = asyncio.create_task(server.run_sources())
             await source.begun.wait()
+            silent, writer = await asyncio.open_connection("127.0.0.1", port)
             for scheme, is_let_in in (("https", True), ("http", False)):
                 origin = f"{scheme}://127.0.0.1:{port}"
                 async with connect(f"wss://127.0.0.1:{port}/ws", ssl=trusting, origin=origin) as connection:  # type: ignore[arg-type]
@@ -80,6 +85,9 @@ def test_a_page_over_https_is_reached_by_its_host_and_opens_from_its_own_origin_
                             await connection.send(hello)
                             await connection.recv()
                         assert ended.value.rcvd is not None and ended.value.rcvd.code == 4403
+            assert await silent.read() == b""
+            writer.close()
             running.cancel()
 
+    monkeypatch.setattr(server_module, "HELLO_S", 2.0)
     asyncio.run(talk())

@@ -1,8 +1,10 @@
 """What a person sees: every figure that the run has is in the table and, shorter, in the plain line."""
 
 import io
+import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO, cast
 
 import pytest
 from rich.console import Console
@@ -11,6 +13,7 @@ from foosim.common.units import parse_pace
 from foosim.launcher.display import (
     LINKS_SHOWN_MAX,
     Display,
+    Output,
     closing_text,
     fitted,
     plain_line,
@@ -246,3 +249,23 @@ def test_a_run_that_has_ended_shows_how_far_it_is_with_its_capture(running: dict
     running["recording"] = {**running["recording"], **counts}
     display.show_closing(running)
     assert stream.getvalue() == "closing the capture: 81,200 rows are left, 12.3 MB are written\n"
+
+
+def full_disk() -> TextIO:
+    return os.fdopen(os.open("/dev/full", os.O_WRONLY), "w")
+
+
+def closed_pipe() -> TextIO:
+    reading, writing = os.pipe()
+    os.close(reading)
+    return os.fdopen(writing, "w")
+
+
+@pytest.mark.parametrize("opened", [full_disk, closed_pipe])
+def test_a_stream_that_cannot_be_written_ends_nothing(opened: Callable[[], TextIO]) -> None:
+    with opened() as stream:
+        display = Display(cast(TextIO, Output(stream)))
+        for _ in range(3):
+            display.say("a line")
+    with pytest.raises((OSError, SystemExit)), opened() as stream:
+        Display(stream).say("a line")

@@ -78,7 +78,7 @@ def test_a_run_that_would_end_at_once_for_want_of_room_is_left_as_it_is(typed: T
     before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
     done = typed("foosim-supervisor", main)("up", "--resume", folder.name)
     assert done.code == 3 and done.err.startswith(f"{Path(launch.capture).parent}: ")
-    assert "GB left on its disk, the reserve is 1000 TiB (capture.reserve): make room" in done.err
+    assert "TiB left on its disk, the reserve is 1000 TiB (capture.reserve): make room" in done.err
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
 
 

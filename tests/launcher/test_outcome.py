@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
+import time
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -14,6 +16,7 @@ import pytest
 from foosim.capture.parts import FOOTER
 from foosim.cli.supervisor import main
 from foosim.common.errors import Refused
+from foosim.launcher import console_child
 from foosim.launcher.journal_check import supervisor_records
 from foosim.launcher.outcome import plan_facts, result_without_supervisor, with_capture
 from foosim.launcher.plan import make_plan, plan_again
@@ -271,6 +274,40 @@ def test_a_capture_that_has_its_end_is_not_cut_off_whatever_was_heard_of_its_vhu
     told = left.folder.result()
     assert told is not None and told["failed"] != is_closed
     assert told["reason"] == ("stopped" if is_closed else "stopped; the capture is cut off: nobody said how")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_while_up_imports_leaves_a_result(
+    typed: Typed, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    before = signal.getsignal(number)
+    monkeypatch.setattr(console_child, "page_of", lambda *options: signal.raise_signal(number))
+    done = typed("foosim-supervisor", main)("up", TABLE, "--no-capture", "--json")
+    (line,) = done.out.splitlines()
+    content = msgspec.json.decode(line)
+    assert content["reason"] == f"{number.name} ended foosim-supervisor up before the run began"
+    assert (done.code, done.err, content["failed"]) == (FAILED, f"{content['reason']}\n", True)
+    assert signal.getsignal(number) is before
+
+
+def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_that_is_done(run: Run, left: Left) -> None:
+    left.capture.write_bytes(run.capture.read_bytes())
+    journal = left.journal(SUPERVISOR)
+    records = list(read_records(journal))
+    journal.unlink()
+    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
+    thresholds = gc.get_threshold()
+    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
+        history = fold(plan.deployment, iter(records))
+        process = Process(SUPERVISOR)
+        shell = SupervisorShell(process, plan.settings(left.folder.name), None, left.folder, session, written, history)
+        assert shell.core.state.end is not None and shell.core.failover.waits_for_hub(time.monotonic_ns())
+        assert shell.is_over()
+        left.capture.write_bytes(run.cut.read_bytes())
+        assert not shell.is_over(), "its vHub may complete it"
+        shell.leave()
+    gc.set_threshold(*thresholds)
+    gc.unfreeze()
 
 
 def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> None:

@@ -105,6 +105,7 @@ def test_what_follows_when_a_node_ends(
         ("kill -9 $$", False, True, "lost supervisor: it was killed by SIGKILL, not by foosim"),
         ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
         ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
+        ("exit 0", True, True, "lost supervisor: it ended with exit code 0"),
         ("echo run mine cannot go on: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
         ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
     ],
@@ -374,6 +375,32 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     up._show(closing)  # type: ignore[arg-type]
     assert up._goes_on() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
     up._launcher.kill()
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("state", "stopped", "lost"), [("running", False, True), ("running", True, False), ("ended", False, False)]
+)
+def test_a_player_that_ends_with_exit_code_0_while_the_run_goes_on_is_lost_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, stopped: bool, lost: bool
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    up._launch("player-red", ["sh", "-c", "exit 0"])
+    up._launcher.children["player-red"].process.wait()
+    told = {"state": state, "begun": True, "recoveries": [], "starts": {}, "recording": NOT_RECORDED}
+    told["processes"] = {"player-red": {"stopped": stopped}}
+    monkeypatch.setattr(up.display, "show", lambda status, now_s: None)
+    monkeypatch.setattr(up._stalled_watch, "look", lambda *about: {})
+    up._show(SimpleNamespace(status=lambda timeout_s, give_up: told))  # type: ignore[arg-type]
+    up._goes_on()
+    up._goes_on()
+    assert bool(up._ending_s) == lost
+    up._launcher.stop()
+    reason = "lost player-red: it ended with exit code 0"
+    ended = "lost supervisor: it was killed by up: the run is over"
+    assert up._outcome().result["reason"] == (reason if lost else ended)
     up._launcher.close()
 
 

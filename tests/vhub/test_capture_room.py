@@ -161,14 +161,14 @@ def test_the_quota_is_kept(hub_run: HubRun, tmp_path: Path) -> None:
         assert path.stat().st_size <= quota * KIB
         assert levels[-1:] == ([] if quota == 400 else [Level.OUT])
         if quota == 100:
-            assert "of the 0.1 MB that it may have" in writer.state.text
+            assert "of the 102400 B that it may have, the reserve is 12800 B" in writer.state.text
 
 
 def test_levels_of_room() -> None:
     levels = [Room(left, 100, "").level for left in (200, 199, 100, 99, 25, 24, 0, -5)]
     assert levels == [Level.FINE, Level.LOW, Level.LOW, Level.FULL, Level.FULL, Level.OUT, Level.OUT, Level.OUT]
-    assert str(Room(-5, 64_000_000, "on its disk")) == "0.0 MB left on its disk, the reserve is 64 MB"
-    assert str(Room(40_000_000, 64 << 20, "on its disk")) == "40.0 MB left on its disk, the reserve is 64 MiB"
+    assert str(Room(-5, 64_000_000, "on its disk")) == "0 MB left on its disk, the reserve is 64 MB"
+    assert str(Room(40_000_000, 64 << 20, "on its disk")) == "38.1 MiB left on its disk, the reserve is 64 MiB"
 
 
 def test_on_a_disk_that_is_really_full_the_reserve_takes_the_end(

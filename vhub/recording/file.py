@@ -39,7 +39,7 @@ from foosim.capture.state_at import HOLDING
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Epoch
-from foosim.runtime.disk import Room, megabytes, room_on_disk
+from foosim.runtime.disk import Room, room_on_disk, size_like
 from foosim.vhub.network.custom_models import model_versions
 from foosim.vhub.recording.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.recording.rows_of_closing import add_packets, epoch_entry, frame_row, plan_of, world_rows
@@ -204,8 +204,9 @@ class CaptureFile:
         rooms = [replace(on_disk, left=on_disk.left - last)]
         if self._bytes_max is not None:
             left = self._bytes_max - self.total_bytes - last
-            where = f"of the {megabytes(self._bytes_max)} that it may have"
-            rooms.append(Room(left, min(self._reserve, self._bytes_max // 8), where))
+            reserve = min(self._reserve, self._bytes_max // 8)
+            where = f"of the {size_like(self._bytes_max, reserve)} that it may have"
+            rooms.append(Room(left, reserve, where))
         return min(rooms, key=lambda room: room.left / room.reserve)
 
     def give_up(self) -> None:

@@ -28,7 +28,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
-from foosim.runtime.disk import megabytes, room_on_disk
+from foosim.runtime.disk import room_on_disk, size_like
 from foosim.runtime.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.recording.file import CaptureFile, Described, Line
@@ -118,7 +118,7 @@ def _write(about: About, records: Iterable[bytes], part: Path, out: Path) -> Rec
         needed = sum(left.stat().st_size for left in files_from(about.path))
         room = room_on_disk(part.parent, deployment.capture.reserve_bytes)
         if room.left - needed < room.reserve:
-            raise CaptureError(f"{out}: needs {megabytes(needed)} or more, there are {room}")
+            raise CaptureError(f"{out}: needs {size_like(needed, room.reserve)} or more, there are {room}")
         torn_bytes, damage = _copy(about.path, file)
         had = file.done.tick
         completion = _Completion(deployment, about.metadata.get("run", ""), records)
