@@ -88,6 +88,8 @@ KEPT_TICKS: Final = 16
 """Ticks of sent messages that each process keeps for repetition."""
 RELEASE_AHEAD: Final = 4
 """W: order k is released once tick k - W is committed."""
+RESTART_PAUSE_NS_MAX: Final = 8_000_000_000
+"""The longest pause before a process that ended is started again."""
 WANT_AFTER_NS: Final = 20_000_000
 WANT_EVERY_NS_MAX: Final = 1_000_000_000
 HEARTBEAT_NS: Final = 100_000_000

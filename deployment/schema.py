@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
+from pydantic import BeforeValidator, Field, JsonValue, StringConstraints, model_validator
 
 from foosim.common import limits, names, units
 from foosim.common.addresses import LOOPBACK
@@ -137,11 +137,19 @@ class Deadlines(SpecBase):
     lockstep_fast_ns: Deadline = default("10 s", "lockstep_fast")
     lockstep_realtime_ns: Deadline = default("2 s", "lockstep_realtime")
     start_ns: Deadline = default("60 s", "start")
-    orphan_ns: Deadline = default("30 s", "orphan")
+    orphan_ns: Deadline = default("68 s", "orphan")
     """Nodes and vHub end when their supervisor has been gone for so long."""
-    vhub_back_ns: Deadline = default("30 s", "vhub_back")
+    vhub_back_ns: Deadline = default("68 s", "vhub_back")
     client_back_ns: Deadline = default("2 s", "client_back")
     close_ns: Deadline = default("30 s", "close")
+
+    @model_validator(mode="after")
+    def _outlast_restart(self) -> Self:
+        """Raise the waits for a lost supervisor and vHub, unless the file gives them, to the time of a restart."""
+        restart_ns = self.start_ns + limits.RESTART_PAUSE_NS_MAX
+        waits = {name for name in ("orphan_ns", "vhub_back_ns") if getattr(self, name) < restart_ns}
+        raised = dict.fromkeys(waits - self.model_fields_set, restart_ns)
+        return self.model_copy(update=raised) if raised else self
 
 
 def _int_only(value: object) -> object:

@@ -69,8 +69,15 @@ DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
         "the processes and players of a started or resumed run; until its first commit no other deadline counts. "
         "Before that, the import of players' modules",
     ),
-    "orphan": ("nodes, vHub", "the return of a lost supervisor; then they end, and the run can be resumed"),
-    "vhub_back": ("supervisor, clients", "the return of a lost vHub; then the run, or the client, ends"),
+    "orphan": (
+        "nodes, vHub",
+        "the return of a lost supervisor; then they end, and the run can be resumed. Where it is not given, it is at "
+        "least `start` and the longest pause before a restart",
+    ),
+    "vhub_back": (
+        "supervisor, clients",
+        "the return of a lost vHub; then the run, or the client, ends. Where it is not given, as `orphan`",
+    ),
     "client_back": (
         "vHub",
         "the return of a client after its connection has closed; then it is lost, unless its time to answer ends later",

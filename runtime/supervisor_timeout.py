@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.deployment.schema import Deployment
+from foosim.deployment.schema import Deadlines, Deployment
 
-UNKNOWN_NS: Final = 30_000_000_000
+UNKNOWN_NS: Final = Deadlines().orphan_ns
 """The timeout before the deployment has been received."""
 
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from foosim.common import limits
 from foosim.runtime.children import BY_SIGNAL
 from foosim.runtime.command import REFUSED
 
-WAITS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)
+WAITS_S: Final = (0.5, 1.0, 2.0, 4.0, limits.RESTART_PAUSE_NS_MAX / 1e9)
 AWAY_S: Final = 4.0
 """Back-off for a process whose machine was unreachable; it is retried without a limit."""
 WINDOW_S: Final = 60.0

@@ -208,7 +208,7 @@ def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end(
         core = player.core
         assert core.deployment is not None
         core.hub_gone(0)
-        deadline_ns = core.deployment.deadlines.start_ns
+        deadline_ns = core.deployment.deadlines.vhub_back_ns
         assert core.deadline_ns() <= deadline_ns, "they were told nothing yet"
         over = []
         for now_ns in (deadline_ns - 1, deadline_ns):

@@ -20,6 +20,8 @@ from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.launcher.children.restarts import WAITS_S
+from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
 from foosim.world.forms.registry import find_component
 from foosim.world.models.camera import CameraRobot
@@ -263,3 +265,14 @@ def test_each_parameter_of_the_world_has_its_source_and_mark() -> None:
     values = [line for line in block.splitlines() if re.match(r"\s+\w+: +[^\s#]", line)]
     assert len(values) > 60
     assert [line for line in values if not re.search(r"# .*\[[SMDA]\]", line)] == []
+
+
+@pytest.mark.parametrize("start_s", [1, 60, 300])
+def test_a_lost_supervisor_or_vhub_is_waited_for_as_long_as_a_start_takes(start_s: int) -> None:
+    """Also after the longest pause before it, where the file gives no other time."""
+    sets = [f"deadlines.start={start_s} s"]
+    longest_ns = start_s * 10**9 + round(WAITS_S[-1] * 1e9)
+    deadlines = load_deployment(apply_sets(TABLE_TEXT, "f", sets), "f").deadlines
+    assert min(deadlines.orphan_ns, deadlines.vhub_back_ns, UNKNOWN_NS if start_s <= 60 else longest_ns) >= longest_ns
+    given = load_deployment(apply_sets(TABLE_TEXT, "f", [*sets, "deadlines.orphan=5 s"]), "f").deadlines
+    assert given.orphan_ns == 5 * 10**9 and given.vhub_back_ns == deadlines.vhub_back_ns

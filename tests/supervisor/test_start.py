@@ -194,7 +194,7 @@ def test_a_supervisor_that_alone_was_started_again_waits_no_longer_than_before()
     ],
 )
 def test_a_resume_that_fails_leaves_the_run_as_it_was(sets: tuple[str, ...], late: str, reason: str) -> None:
-    run = Run((*sets, "deadlines.start=5 s"))
+    run = Run((*sets, "deadlines.start=5 s", "deadlines.orphan=30 s"))
     run.resume_at(60, {SUPERVISOR: 0.1, "n1": 1.0, "n2": 1.0, VHUB: 1.0, late: 58.0})
     run.go()
     assert run.core.state.end is None and run.core.state.abandoned == reason
