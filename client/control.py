@@ -34,7 +34,7 @@ from foosim.runtime.transport.settings import Security
 
 ANSWER_S: Final = 30.0
 """How long an answer is waited for: adding waits until every node has built an engine."""
-CONNECT_S: Final = 5.0
+CONNECT_S: Final = 10.0
 WAITING_MAX: Final = 256
 Role = Literal["operator", "viewer"]
 _ASKED_BY: Final[dict[str, tuple[type[Request], Channel]]] = {

@@ -14,12 +14,14 @@ import atexit
 import contextlib
 import json
 import os
+import queue
 import re
 import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain, repeat
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -35,8 +37,10 @@ KeyReader = Callable[[str], tuple[str, str] | None]
 """Returns the channel and the name in a key, or None for an unknown key."""
 
 CLOSE_S: Final = 2.0
-ATTEMPT_S: Final = 0.5
-"""The interval of attempts to connect, between which `give_up` is called and signals are handled."""
+ATTEMPTS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""The times of attempts to connect, the last one repeated: a link with a long delay needs several round trips."""
+GIVE_UP_S: Final = 0.1
+"""The interval at which `give_up` is called, and signals are handled, during an attempt."""
 ROUTER_THREADS: Final = 8
 """Each sender whose message waits for a stuck reader holds one receiving thread of the router. With Zenoh's two, a
 stuck client stopped healthy ones for 9 s; with eight for 1.3 s, and nothing of theirs was lost."""
@@ -79,6 +83,53 @@ class SessionStatistics:
     refused: int
     errors: int
     error: str
+
+
+class _Attempt:
+    """One attempt to connect. It has a thread of its own: Zenoh's call can neither be interrupted nor cancelled."""
+
+    def __init__(self, settings: dict[str, Any]) -> None:
+        self._settings = settings
+        self._outcome: queue.SimpleQueue[zenoh.Session | zenoh.ZError] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._is_abandoned = False
+
+    def session(self, give_up: Callable[[], bool]) -> zenoh.Session | None:
+        """Return the session, or None as soon as `give_up` says so. Raises ZError when there is none."""
+        if give_up():
+            return None
+        threading.Thread(target=self._connect, name="connect", daemon=True).start()
+        try:
+            while True:
+                with contextlib.suppress(queue.Empty):
+                    outcome = self._outcome.get(timeout=GIVE_UP_S)
+                    break
+                if give_up():
+                    self._abandon()
+                    return None
+        except BaseException:  # a signal's
+            self._abandon()
+            raise
+        if isinstance(outcome, zenoh.ZError):
+            raise outcome
+        return outcome
+
+    def _connect(self) -> None:
+        try:
+            outcome: zenoh.Session | zenoh.ZError = _open(self._settings)
+        except zenoh.ZError as error:
+            outcome = error
+        with self._lock:
+            if not self._is_abandoned:
+                self._outcome.put(outcome)
+                return
+        _discard(outcome)
+
+    def _abandon(self) -> None:
+        with self._lock:
+            self._is_abandoned = True
+        with contextlib.suppress(queue.Empty):
+            _discard(self._outcome.get_nowait())
 
 
 class Publisher:
@@ -157,21 +208,24 @@ class Session:
         if address.port == 0 or address.is_wildcard:
             raise BadValue("not an address to connect to (tcp/HOST:PORT)", connect)
         begun_ns = time.monotonic_ns()
-        while not give_up():
+        for longest_s in chain(ATTEMPTS_S, repeat(ATTEMPTS_S[-1])):
             left_s = timeout_s - (time.monotonic_ns() - begun_ns) / 1e9
             try:
-                return cls(
-                    _open(client_settings(address, message_bytes_max, min(left_s, ATTEMPT_S), security)), str(address)
-                )
+                settings = client_settings(address, message_bytes_max, min(left_s, longest_s), security)
+                session = _Attempt(settings).session(give_up)
             except zenoh.ZError:  # its text is the address alone, for every cause
                 from foosim.runtime.transport.tls_probe import probe  # brings ssl, which few processes need
 
-                probe(address, None if security is None else security.credentials, left_s <= ATTEMPT_S)
-                if left_s <= ATTEMPT_S:
+                probe(address, None if security is None else security.credentials, left_s <= longest_s)
+                if left_s <= longest_s:
                     raise ConnectError(
                         f"no router answers at {address} within {timeout_s:g} s: "
                         "it is not started, listens elsewhere, or a firewall is between"
                     ) from None
+                continue
+            if session is None:
+                break
+            return cls(session, str(address))
         raise ConnectError(f"gave up before a router answered at {address}")
 
     def publisher(self, key: str, express: bool = True, blocking: bool = True) -> Publisher:
@@ -420,6 +474,12 @@ def _presence(sample: zenoh.Sample) -> bytes:
 
 def _name(key: str) -> str:
     return key.rpartition("/")[2]
+
+
+def _discard(outcome: zenoh.Session | zenoh.ZError) -> None:
+    """Close the session of an attempt that was given up."""
+    if isinstance(outcome, zenoh.Session):
+        outcome.close()  # type: ignore[no-untyped-call]
 
 
 def _open(settings: dict[str, Any]) -> zenoh.Session:

@@ -31,6 +31,7 @@ from foosim.runtime.transport.session import ConnectError, Session
 from foosim.runtime.transport.settings import Security, client_settings, router_settings
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 from tests.wire.conftest import TABLE, wait_for
+from tests.wire.proxy import Proxy, Weather
 
 LONG_S: Final = 900.0
 INSIDERS: Final = {
@@ -286,6 +287,20 @@ def test_a_put_with_wildcards_reaches_no_handler(world: World, folder: Path) -> 
     assert all(may_put(writer, key) and "*" not in key for _, key, writer in world.router.heard), (
         "no wildcard lies inside what one identity may put"
     )
+
+
+@pytest.mark.parametrize("is_secured", [False, True], ids=["tcp", "tls"])
+def test_a_link_of_long_delay_connects(folder: Path, deployment: Deployment, is_secured: bool) -> None:
+    """Its session needs longer than the first attempts take."""
+    server, node = (load_credentials(folder, name) if is_secured else None for name in ("supervisor", "node.red"))
+    admits = None if server is None else Security(server, access_to(Plane.SIMULATION, deployment))
+    late = Weather(delay_s=0.3)
+    with Session.router("127.0.0.1:0", security=admits) as router:
+        protocol, _, port = router.locator.partition("/127.0.0.1:")
+        with Proxy(int(port), up=late, down=late) as proxy:
+            address = proxy.address.replace("tcp", protocol)
+            Session.client(address, LONG_S, security=None if node is None else Security(node)).close()
+            assert proxy.accepted > 1, "also the first attempt has reached it"
 
 
 def test_who_has_no_certificate_of_this_root_is_told_so(

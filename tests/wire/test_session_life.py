@@ -59,6 +59,17 @@ def test_a_client_waits_for_a_router_that_starts_later() -> None:
     routers[0].close()
 
 
+def test_an_attempt_is_given_up_at_once_and_leaves_no_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "ATTEMPTS_S", (LONG_S,))
+    port, asked = free_port(), iter((False, False, True))
+    with pytest.raises(ConnectError, match="gave up"):
+        Session.client(f"127.0.0.1:{port}", LONG_S, give_up=lambda: next(asked))
+    (attempt,) = [thread for thread in threading.enumerate() if thread.name == "connect"]
+    with Session.router(f"tcp/127.0.0.1:{port}"):
+        attempt.join(LONG_S)
+        assert not attempt.is_alive(), "it has connected after all, and closed its session"
+
+
 def test_what_cannot_be_listened_on_is_said(router: Session) -> None:
     with pytest.raises(ListenError) as caught:
         Session.router(router.locator)
