@@ -127,7 +127,8 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ),
     ("launcher.children.liveness", "QUESTION_S"): (
         "`up`",
-        "an answer of the supervisor; after five missing ones in a row it is killed and started again",
+        "an answer of the supervisor; after five missing ones in a row, by the clock of its process, it is killed and "
+        "started again",
     ),
     ("launcher.children.liveness", "STALLED_S"): (
         "`up`",

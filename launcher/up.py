@@ -17,6 +17,7 @@ from foosim.client.control import Control, NoAnswer
 from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
+from foosim.launcher.children.child_time import ChildTimes, observe
 from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
 from foosim.launcher.children.processes import Child, Launcher, command_line, counted_signals
 from foosim.launcher.children.restarts import Restarts
@@ -98,15 +99,15 @@ class Up:
         self._not_home = ""
         """Why the capture was not fetched from the machine on which it was written."""
         self._interrupts = 0
-        self._ending_s = 0.0
+        self._ending_s = self._lost_s = 0.0
         self._end_requested = False
         """Whether the supervisor was requested to end the run."""
         self._lost: Child | None = None
-        self._lost_s = 0.0
         self._has_begun = self._has_ended = False
         self._is_resumed = resumed is not None
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
+        self._child_times = ChildTimes(observe)
         declared = plan.deployment.players
         self._beside = [declared[role] for role in self._roles(self._process_of[SUPERVISOR]) if role in declared]
         """The players that share the supervisor's process."""
@@ -220,7 +221,7 @@ class Up:
     def _start_child(self, name: str, command: Sequence[str], log: Path) -> None:
         self._launcher.start(name, command, log)
         if SUPERVISOR in self._roles(name):
-            self._supervisor_watch.started(self._own_time.at(time.monotonic()))
+            self._supervisor_watch.started(self._time_of(self._supervisor))
 
     @property
     def _supervisor(self) -> Child:
@@ -271,25 +272,29 @@ class Up:
                 time.sleep(WATCH_S)
 
     def _connect(self, stack: ExitStack) -> Control | None:
-        """Connect to the supervisor; None when it has ended before: the run was short, or it was killed."""
+        """Connect to the supervisor; None when that does not succeed yet, or when it has ended before."""
         info, supervisor = self._own_info(), self._supervisor
         if info is None:
             return None
+        begun_s = self._time_of(supervisor)
         try:
             credentials = operator_credentials(self.plan.options.pki)
-            return stack.enter_context(Control(info.simulation, credentials, lambda: supervisor.exit_code is not None))
+            control = Control(
+                info.simulation, credentials, lambda: supervisor.exit_code is not None or self._interrupts > 1
+            )
+            return stack.enter_context(control)
         except ConnectError:
-            if supervisor.exit_code is None:
-                raise
+            self._supervisor_watch.unanswered(self._time_of(supervisor) - begun_s)
             return None
 
     def _show(self, control: Control) -> None:
         supervisor = self._supervisor
         done = [child for child in self._launcher.ended() if child.exit_code == DONE]
+        asked_s = self._time_of(supervisor)
         try:
             status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
-            self._supervisor_watch.unanswered()
+            self._supervisor_watch.unanswered(self._time_of(supervisor) - asked_s)
             return
         self._supervisor_watch.answered()
         now_s = self._own_time.at(time.monotonic())
@@ -337,7 +342,8 @@ class Up:
         alive = {role: child for child in others for role in self._roles(child.name)}
         pids = {role: child.process.pid for role, child in alive.items()}
         away = {role for role, child in alive.items() if child.remote is not None}
-        killed = self._stalled_watch.look(status, pids, away, self._own_time.at(time.monotonic()))
+        times_s = {role: self._time_of(child) for role, child in alive.items()}
+        killed = self._stalled_watch.look(status, pids, away, times_s)
         for name, why in killed.items():
             self._kill(alive[name], why)
 
@@ -345,10 +351,22 @@ class Up:
         """Kill a supervisor that hangs: a new one resumes the run."""
         if not self._supervisor_watch.is_found and self._own_info() is not None:
             self._supervisor_watch.found()
-        why = self._supervisor_watch.why_killed(self._own_time.at(time.monotonic()))
+        why = self._supervisor_watch.why_killed(self._time_of(supervisor))
         if why and not self._has_ended and not self._ending_s:
             self._hangs += not supervisor.killed
             self._kill(supervisor, why)
+
+    def _time_of(self, child: Child) -> float:
+        """Return the time of a child's clock, by which its deadlines run; on another machine it is the launcher's."""
+        now_s = self._own_time.at(time.monotonic())
+        return now_s if child.remote is not None else self._child_times.at(child.process.pid, now_s)
+
+    def _show_starved(self) -> None:
+        """Show that this machine is starved, and by which processes that was observed."""
+        pids = {child.name: child.process.pid for child in self._launcher.alive()}
+        warning = self._child_times.warning(pids, self._own_time.at(time.monotonic()))
+        if warning:
+            self.display.say(warning)
 
     def _kill(self, child: Child, why: str) -> None:
         if not child.killed:
@@ -454,6 +472,7 @@ class Up:
                 self._look_for_lost(now_s)
             return False
         self._end_stalled_supervisor(supervisor)
+        self._show_starved()
         if self._interrupts and not self._ending_s:
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._ending_s = now_s

@@ -1,6 +1,7 @@
 """Liveness checks: decide from requests, statuses and the time which hanging processes the launcher kills.
 
-The launcher requests the supervisor's status once a second. Requests count once the supervisor has published its
+Deadlines of a process on this machine run on its own clock (`child_time`), so a starved one is not taken for a hanging
+one. The launcher requests the supervisor's status once a second. Requests count once the supervisor has published its
 address; until then `deadlines.start` applies, for a long journal or a slow machine. A node or a vHub that the run has
 lost, and whose process lives, has a grace period to rejoin; before the run has begun it is not killed. Time in which
 the launcher itself was suspended does not count. Pure: times are arguments, in s.
@@ -59,11 +60,12 @@ class SupervisorWatch:
         self._started_s = 0.0
         self.is_found = False
         """Whether it has published its address."""
-        self._unanswered = 0
+        self._silent_s = 0.0
+        """The time of the unanswered requests in a row, by its clock."""
 
     def started(self, now_s: float) -> None:
         """Its process was started or restarted."""
-        self._started_s, self.is_found, self._unanswered = now_s, False, 0
+        self._started_s, self.is_found, self._silent_s = now_s, False, 0.0
 
     def found(self) -> None:
         """It has published its address."""
@@ -71,15 +73,16 @@ class SupervisorWatch:
 
     def answered(self) -> None:
         """It has answered a request."""
-        self._unanswered = 0
+        self._silent_s = 0.0
 
-    def unanswered(self) -> None:
-        """It has not answered a request in time; does not count before it listens."""
-        self._unanswered += self.is_found
+    def unanswered(self, waited_s: float) -> None:
+        """It has not answered a request for this time of its clock; does not count before it listens."""
+        if self.is_found:
+            self._silent_s += waited_s
 
     def why_killed(self, now_s: float) -> str:
-        """Return why its process is to be killed; empty when it is not."""
-        if self._unanswered * QUESTION_S >= self._unanswered_s:
+        """Return why its process is to be killed at a time of its clock; empty when it is not."""
+        if self._silent_s >= self._unanswered_s:
             return f"it had not answered for {self._unanswered_s:g} s"
         if not self.is_found and now_s - self._started_s >= self._start_s:
             return f"it had not published its address within {self._start_s:g} s (deadlines.start)"
@@ -96,11 +99,14 @@ class StalledWatch:
         self._lost: dict[str, tuple[int, float]] = {}
         """Lost processes that live: the process, and since when."""
 
-    def look(self, status: Mapping[str, Any], pids: Mapping[str, int], away: set[str], now_s: float) -> dict[str, str]:
+    def look(
+        self, status: Mapping[str, Any], pids: Mapping[str, int], away: set[str], times_s: Mapping[str, float]
+    ) -> dict[str, str]:
         """Return the names of the processes to be killed by a status of the run, with the reasons.
 
-        `pids` are the processes that live, by name; those of `away` are on other machines. One that was started since
-        its name was lost has not sent its hello yet, and has the deadline of a start.
+        `pids` are the processes that live, by name, and `times_s` the times of their clocks; those of `away` are on
+        other machines. One that was started since its name was lost has not sent its hello yet, and has the deadline
+        of a start.
         """
         processes = status["processes"] if status["begun"] else {}
         before, self._lost = self._lost, {}
@@ -110,6 +116,7 @@ class StalledWatch:
             if not processes.get(name, {"lost": False})["lost"]:
                 self._here[name] = pid, looks + 1 if last == pid else 1
                 continue
+            now_s = times_s[name]
             known, since_s = before.get(name, (pid, now_s))
             self._lost[name] = pid, since_s if known == pid else now_s
             took_part = last == pid and looks >= LOOKS_MIN

@@ -20,6 +20,7 @@ from foosim.runtime.roles.loop import Loop
 from foosim.runtime.roles.role import Core, Role
 from foosim.runtime.roles.wire import Wire
 from foosim.runtime.run_folder import open_run
+from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.runtime.systemd import Notify
 from foosim.runtime.transport.admission import Admission
 from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
@@ -28,8 +29,8 @@ from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError, Session, use_client_runtime
 from foosim.runtime.transport.settings import Security
 
-CONNECT_S: Final = 60.0
-"""How long a process tries to reach its router."""
+CONNECT_S: Final = UNKNOWN_NS / 1e9
+"""How long a process tries to reach its router, whose process may be started again."""
 RUN: Final = "run:"
 """Before the name of a run, instead of an address."""
 LOOK_S: Final = 0.02

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Final
@@ -13,7 +14,7 @@ import msgspec
 import pytest
 
 from foosim.client import control
-from foosim.launcher.children.liveness import UNANSWERED_MAX
+from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
 from foosim.launcher.children.processes import Child
 from foosim.launcher.children.restarts import WAITS_S
 from foosim.launcher.display import Display
@@ -25,7 +26,6 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.run_status import NOT_RECORDED
 from foosim.runtime.command import REFUSED
 from foosim.runtime.run_folder import RESULT_FILE, RunInfo
-from foosim.runtime.transport.session import ConnectError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -193,13 +193,13 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
     up._launch(SUPERVISOR, ["sleep", "100"])
     supervisor = up._launcher.children[SUPERVISOR]
     for _ in range(3 * UNANSWERED_MAX):
-        up._supervisor_watch.unanswered()
+        up._supervisor_watch.unanswered(QUESTION_S)
         up._end_stalled_supervisor(supervisor)
     assert supervisor.exit_code is None, "it has not said where it listens"
     up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
     up._end_stalled_supervisor(supervisor)
     for _ in range(UNANSWERED_MAX):
-        up._supervisor_watch.unanswered()
+        up._supervisor_watch.unanswered(QUESTION_S)
     up._end_stalled_supervisor(supervisor)
     supervisor.process.wait()
     assert said.getvalue() == ("supervisor does not answer any more: it is killed (it had not answered for 5 s)\n")
@@ -219,10 +219,10 @@ def test_a_process_with_players_that_hangs_twice_is_given_up(tmp_path: Path, mon
         up.folder.write_info(RunInfo("run", "table", str(TABLE), process.process.pid, "", "tcp/127.0.0.1:1"))
         up._end_stalled_supervisor(process)
         for _ in range(14):
-            up._supervisor_watch.unanswered()
+            up._supervisor_watch.unanswered(QUESTION_S)
         up._end_stalled_supervisor(process)
         assert process.exit_code is None, "deadlines.lockstep_fast is 10 s"
-        up._supervisor_watch.unanswered()
+        up._supervisor_watch.unanswered(QUESTION_S)
         up._end_stalled_supervisor(process)
         process.process.wait()
         monkeypatch.setattr(up, "_start_due", lambda now_s: None)
@@ -333,7 +333,9 @@ def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
     up._launcher.close()
 
 
-def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_supervisor_that_cannot_be_reached_yet_is_tried_again_until_it_counts_as_hanging(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(control, "CONNECT_S", 0.0)
     up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
@@ -343,8 +345,15 @@ def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, m
         assert up._connect(stack) is None, "the run file is that of a supervisor before, this one is only starting"
     pid = up._launcher.children[SUPERVISOR].process.pid
     up.folder.write_info(RunInfo("run", "table", str(TABLE), pid, "", "tcp/127.0.0.1:1"))
-    with ExitStack() as stack, pytest.raises(ConnectError, match="no router answers at"):
-        up._connect(stack)
+    supervisor, seconds = up._launcher.children[SUPERVISOR], count(0.0)
+    monkeypatch.setattr(up, "_time_of", lambda child: next(seconds))
+    with ExitStack() as stack:
+        for _ in range(UNANSWERED_MAX):
+            up._end_stalled_supervisor(supervisor)
+            assert supervisor.exit_code is None and not supervisor.killed
+            assert up._connect(stack) is None, "it lives: the run goes on, and another attempt follows"
+        up._end_stalled_supervisor(supervisor)
+    assert supervisor.killed == "it had not answered for 5 s"
     up._launcher.kill()
     up._launcher.close()
 
