@@ -17,8 +17,9 @@ from foosim.client.control import Control, NoAnswer
 from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
-from foosim.launcher.children.child_time import ChildTimes, observe
+from foosim.launcher.children.child_time import ChildTimes
 from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
+from foosim.launcher.children.observe import observe
 from foosim.launcher.children.processes import Child, Launcher, command_line, counted_signals
 from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands

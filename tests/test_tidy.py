@@ -146,6 +146,7 @@ SHELLS = {
     "launcher/crash_recovery.py",
     "supervisor/main.py",
     "launcher/children/memory.py",
+    "launcher/children/observe.py",
     "cli/net.py",
     "launcher/new_capture.py",
     "launcher/outcome.py",
