@@ -159,8 +159,8 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
         ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a command"),
-        ({"red.goal": Command(0.0, "up")}, "command of red.goal: rod_position.spin is not a number,"
-         " 'up' (ACT)"),  # type: ignore[arg-type]
+        ({"red.goal": Command(0.0, "up")},  # type: ignore[arg-type]
+         "command of red.goal: rod_position.spin is not a number, 'up' (ACT)"),
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
         (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),

@@ -91,7 +91,7 @@ def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
 # --- models and their motions ----------------------------------------------------------------------------------------
 
 DRONE: Final = "robots.camera={model: 'own_form:Own'}"
-FIELDS: Final = "an omni has x, y, down, refused, quarantined"
+FIELDS: Final = "an omni has x, y, down, refused, clamped, quarantined"
 
 
 def installed(form: str) -> str:
@@ -139,10 +139,10 @@ def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
     [
         ("needs=('contacts',), writes=('contacts',)", ""),
         ("writes=('contact',)", "rule of entities that writes contact: a rod has joint_positions, joint_velocities, "
-         "joint_efforts, quarantined, down, contacts, refused, unmoved, nearest to contact is contacts"),
+         "joint_efforts, quarantined, down, contacts, refused, unmoved, clamped, nearest to contact is contacts"),
         ("needs=('contact',)", "rule of entities that a rod cannot carry, which has no contact (valid on: none; a rod "
-         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, unmoved, nearest "
-         "to contact is contacts)"),
+         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, unmoved, clamped, "
+         "nearest to contact is contacts)"),
     ],
 )  # fmt: skip
 def test_a_rule_of_robots_reads_and_writes_fields_that_there_are(site: Path, about: str, told: str) -> None:
