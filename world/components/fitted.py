@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
+from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import (
     Actuator,
     ComponentError,
@@ -131,6 +132,8 @@ class FittedActuator:
     """How many numbers a command has; 0 of one that is not all numbers."""
     moves: bool = True
     """Whether it commands the motors of its robot."""
+    joints: tuple[int, ...] | None = None
+    """The numbers of the joints whose motors it commands; None for all of them."""
 
     @property
     def has_waiting(self) -> bool:
@@ -227,8 +230,15 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         numbers = numbers_of(component, settings, robot.counts)
         size = 0 if numbers is None else numbers.size
         codec = codec_of(settings.kind, "actuator")
-        fitted.append(FittedActuator(robot.name, channel, made, codec, modifiers, size, component.moves))
+        joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
+        fitted.append(FittedActuator(robot.name, channel, made, codec, modifiers, size, component.moves, joints))
     return tuple(fitted)
+
+
+def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting) -> tuple[int, ...] | None:
+    """Return the joints that the settings of an actuator name; None where they name none. Raises Misfit."""
+    named = component.joints_named(settings)
+    return None if named is None else joint_indices(mounting, named, component.joints)
 
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:
