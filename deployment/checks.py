@@ -134,11 +134,13 @@ def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]
 
 
 def _names(view: View) -> Iterator[Finding]:
-    """Endpoints, and the processes that a run starts, have names of their own."""
+    """Entities, endpoints, and the processes that a run starts, have names of their own."""
+    entities: dict[str, str] = {}
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
     for section, scopes, reserved in (
-        ("robots", (endpoints,), reserved_entities(view)),
+        ("robots", (entities, endpoints), reserved_entities(view)),
+        ("objects", (entities,), reserved_entities(view)),
         ("nodes", (processes,), names.PROCESS_NAMES_RESERVED),
         ("players", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
         ("clients", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
@@ -155,7 +157,7 @@ def _names(view: View) -> Iterator[Finding]:
 
 
 def reserved_entities(view: PlainData) -> tuple[str, ...]:
-    """Return names that no robot can have: the world itself, and what its kits put into it."""
+    """Return names that no robot and no object can have: the world itself, and what its kits put into it."""
     return (WORLD, *(name for _, kit in kits_of(view) for name in kit.entities))
 
 
@@ -222,7 +224,7 @@ def _channels(view: View, robot: str) -> Iterator[Finding]:
     model = view.get("robots", robot, "model")
     actuators = view.mapping("robots", robot, "actuators")
     if view.get("robots", robot, "actuators") is None and isinstance(model, str):
-        actuators = _usual_actuators(model)
+        actuators = _usual_actuators(model, view.get("robots", robot, "dynamics"))
     for section, others in (("sensors", actuators), ("actuators", {})):
         for channel in view.mapping("robots", robot, section):
             location = ("robots", robot, section, channel)
@@ -241,10 +243,10 @@ def has_body(view: PlainData, model: object) -> bool:
     return found is None or found.has_body or bool(found.kit and view.get(found.kit) is None)
 
 
-def _usual_actuators(model: str) -> Mapping[str, Any]:
-    """Return the actuators of robots of a model that say nothing of theirs."""
+def _usual_actuators(model: str, dynamics: object) -> Mapping[str, Any]:
+    """Return the actuators of robots of a model, with these dynamics, that say nothing of theirs."""
     try:
-        return registry.find_model(model).actuators
+        return registry.find_model(model).variant(dynamics).actuators
     except Refused:
         return {}
 
@@ -349,9 +351,11 @@ def _scenery(view: View) -> Iterator[Finding]:
     engine = view.get("engine")
     no_meshes = isinstance(engine, str) and _is_without_meshes(engine)
     has_rigid = any(model.can_be_free for model in _models(view))
+    objects = view.mapping("objects")
     for name in view.mapping("scenery"):
-        if name in view.robots:
-            yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")
+        for owner, things in (("a robot's", view.robots), ("an object's", objects)):
+            if name in things:
+                yield Finding(("scenery", name), f"a name that is also {owner}", name, at="key")
         if not has_rigid:
             surface = view.get("scenery", name, "surface")
             if surface is not None:
@@ -364,14 +368,20 @@ def _scenery(view: View) -> Iterator[Finding]:
 
 
 def _models(view: View) -> Iterator[Model]:
-    """Yield the models of robots, of what kits put into the world, and of what can be added, where there are such."""
-    named = {model for robot in view.robots for _, model in view.texts("robots", robot, "model")}
+    """Yield the models of robots and objects, of what kits put into the world, and of what can be added, where there
+    are such; each as the variant of it that is meant."""
+    named: set[tuple[str, Any]] = set()
+    for section in ("robots", "objects"):
+        for entity in view.mapping(section):
+            dynamics = view.get(section, entity, "dynamics")
+            for _, model in view.texts(section, entity, "model"):
+                named.add((model, dynamics if isinstance(dynamics, str) else ""))
     for _, kit in kits_of(view):
-        named |= {*kit.entities.values(), *kit.addable}
-    for name in sorted(named):
-        model = find_kit_model(name)
-        if model is not None:
-            yield model
+        named |= {(model, "") for model in (*kit.entities.values(), *kit.addable)}
+    for name, dynamics in sorted(named):
+        found = find_kit_model(name)
+        if found is not None:
+            yield found.variant(dynamics)
 
 
 def _is_without_meshes(engine: str) -> bool:

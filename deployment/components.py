@@ -4,7 +4,7 @@ Kinds are open, so their settings are read before the schema of the deployment i
 it is: of kits, rules of the world, the scene, robots and their components.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final, Literal
 
 from pydantic import ValidationError
@@ -280,15 +280,26 @@ class _Reader:
 
     def _competing(self, actuators: Any, location: Location) -> Iterator[Finding]:
         """Yield the actuators that command motors which another one commands already."""
-        moving = [
-            (name, settings.kind)
-            for name, settings in (actuators.items() if isinstance(actuators, dict) else ())
-            if isinstance(settings, ActuatorSettings)
-            and id(settings) not in self._refused
-            and registry.find_component("actuator", settings.kind).moves
-        ]
-        for name, kind in moving[1:]:
-            yield Finding((*location, name, "kind"), f"commands the motors that {moving[0][0]} commands already", kind)
+        before: dict[str, Sequence[str] | None] = {}
+        for name, settings in actuators.items() if isinstance(actuators, dict) else ():
+            if not isinstance(settings, ActuatorSettings) or id(settings) in self._refused:
+                continue
+            component = registry.find_component("actuator", settings.kind)
+            if not component.moves:
+                continue
+            try:
+                named = component.joints_named(settings)
+            except BadValue as error:
+                yield Finding((*location, name, component.joints), error.problem, error.value)
+                continue
+            clashes = (_clash(named, other, theirs) for other, theirs in before.items())
+            found = next((clash for clash in clashes if clash is not None), None)
+            if found is not None:
+                place, what = found
+                path = ("kind",) if named is None else (component.joints, place)
+                value = settings.kind if named is None else named[place]
+                yield Finding((*location, name, *path), what, value)
+            before[name] = named
 
     def _period_ns(self, component: Component, settings: SensorSettings | ActuatorSettings) -> int | None:
         """Return the least time between two values; None where it is wrong, which is found elsewhere."""
@@ -301,6 +312,20 @@ class _Reader:
         if not 0 < tick_ns * settings.rate_hz <= NS_PER_S:
             return None
         return schedule_of(settings, tick_ns).least_ticks * tick_ns
+
+
+def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None) -> tuple[int, str] | None:
+    """Return the place of a joint among those that an actuator commands, and how another one commands it; None where
+    none is. None for joints are all that the robot has."""
+    if named is None:
+        what = "the motors that" if theirs is None else f"all joints, of which {theirs[0]} is one that"
+        return 0, f"commands {what} {other} commands already"
+    if theirs is None:
+        return 0, f"a joint that {other} commands already, with all others"
+    for place, joint in enumerate(named):
+        if joint in theirs:
+            return place, f"a joint that {other} commands already"
+    return None
 
 
 def _counts(model: Model | None) -> Mapping[str, int]:

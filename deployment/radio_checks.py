@@ -258,7 +258,7 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
     others: list[str] = []
     for end in ends if on_air else ():
         robot = deployment.robots.get(profiles.body(end))
-        has_body = robot is not None and registry.find_model(robot.model).has_body
+        has_body = robot is not None and registry.model_of(robot).has_body
         if has_body or network.place_of(end) is not None:
             continue
         others = others or _representatives(profiles, _kinds(profiles, ends))

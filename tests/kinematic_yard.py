@@ -39,8 +39,10 @@ def yard_text(robots: Mapping[str, Any], **sections: Any) -> str:
 class Yard:
     """The numbers of a world, and what computes them."""
 
-    def __init__(self, text: str) -> None:
-        self.deployment = load_deployment(text, "yard.yaml")
+    def __init__(self, text: str, files: Mapping[str, bytes] | None = None) -> None:
+        """`files` are what the text names, by path."""
+        deployment = load_deployment(text, "yard.yaml")
+        self.deployment = deployment if files is None else deployment.with_assets(files)
         self.layout = build_layout(self.deployment)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.stepper = Stepper(self.deployment, self.layout)

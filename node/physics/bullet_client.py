@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from foosim.node.physics.quiet import without_lines
+from foosim.world.bodies.limits import PRIMITIVES_MAX
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics, Side
 from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector
@@ -17,6 +18,7 @@ __all__ = [
     "JOINT_TYPES",
     "MESH_PIECE",
     "REST",
+    "bullet_indices",
     "connect_spares",
     "give_client",
     "make_dynamics",
@@ -94,12 +96,25 @@ def settings_of(physics: Physics, substep_s: float) -> dict[str, Any]:
     }
 
 
+def bullet_indices(client: int, body: int, count: int) -> tuple[int, ...]:
+    """Return Bullet's index of each of so many links of a body, in the order in which they were given.
+
+    Bullet numbers links depth first, and names each by its place in the order given: link1, link2, ...
+    """
+    names = [p.getJointInfo(body, index, client)[12] for index in range(p.getNumJoints(body, client))]
+    given = [b"link%d" % number for number in range(1, count + 1)]
+    assert sorted(names) == sorted(given), f"{count} links were given, Bullet has {len(names)}: {names}"
+    places = {name: index for index, name in enumerate(names)}
+    return tuple([places[name] for name in given])
+
+
 def make_shape(client: int, shapes: Sequence[Shape], *, placed: bool) -> int:
     """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1.
 
     A mesh or a hull is the only one: Bullet has no compound of these. They are handed over as numbers, never as the
     name of a file.
     """
+    assert len(shapes) <= PRIMITIVES_MAX, f"{len(shapes)} shapes: a compound in Bullet has {PRIMITIVES_MAX}"
     if not shapes:
         return -1
     if isinstance(shapes[0].geometry, Mesh | Hull):

@@ -20,6 +20,7 @@ from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
     MESH_PIECE,
     REST,
+    bullet_indices,
     give_client,
     make_dynamics,
     make_scenery,
@@ -241,6 +242,7 @@ class BulletEngine:
             useMaximalCoordinates=False,
             physicsClientId=self._client,
         )
+        assert bullet_indices(self._client, made, count) == tuple(range(count)), f"{body.name} is a chain"
         for index, link in enumerate(links):
             p.setCollisionFilterGroupMask(made, index, JOINTED_GROUP, FREE_GROUP, physicsClientId=self._client)
             make_dynamics(self._client, made, index, link.mass, link.inertia)

@@ -14,7 +14,7 @@ the start of the tick, so that others are pushed by it. (Nothing is pushed by a 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import fsum, inf, isfinite, sqrt
@@ -26,6 +26,7 @@ from foosim.deployment.schema import Deployment
 from foosim.node.physics.bullet_client import (
     JOINT_TYPES,
     MESH_PIECE,
+    bullet_indices,
     give_client,
     make_dynamics,
     make_scenery,
@@ -41,18 +42,17 @@ from foosim.node.physics.touch_log import TouchLog
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene, initial_numbers
+from foosim.world.bodies.limits import split_shapes
 from foosim.world.components.drives import Motor
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
-from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics
 from foosim.world.scene import (
     MOVING,
     ORIGIN,
     UPRIGHT,
     Body,
-    Hull,
     Link,
     Shape,
     Vector,
@@ -90,7 +90,8 @@ class _Made:
     """A body in an engine: its id, its joints that move, and where it is parked.
 
     `joints` are indices of Bullet; `is_free` says that the base moves; `end` is the link that a tie holds, if any can;
-    `shaped` are the links that have a shape, -1 being the base, and the groups that each meets.
+    `shaped` are the links that have a shape, -1 being the base, and the groups that each meets. `own` are the indices
+    of the body's links by those of Bullet.
     """
 
     id: int
@@ -100,6 +101,7 @@ class _Made:
     is_free: bool
     end: int | None
     shaped: tuple[tuple[int, int], ...]
+    own: Mapping[int, int]
     parking: Vector
 
 
@@ -277,7 +279,7 @@ def _is_mover(body: Body) -> bool:
 
 
 def _as_built(body: Body) -> tuple[Link | None, list[Link]]:
-    """Return a body as Bullet has it: the base of a free body, and links whose parents are Bullet's indices.
+    """Return a body as Bullet is given it: the base of a free body, and links whose parents are places among these.
 
     Bullet has no compound of convex hulls: all but one shape of a link with hulls hang on it as links without a mass.
     """
@@ -285,7 +287,7 @@ def _as_built(body: Body) -> tuple[Link | None, list[Link]]:
     shift = 0 if base is None else 1
     links, more = [], []
     for index, link in enumerate(body.links):
-        first, others = _of_one(link)
+        first, others = split_shapes(link.shapes)
         own = index - shift
         if own >= 0:
             links.append(replace(link, shapes=first, parent=link.parent - shift))
@@ -295,15 +297,19 @@ def _as_built(body: Body) -> tuple[Link | None, list[Link]]:
     return base, [*links, *more]
 
 
-def _of_one(link: Link) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
-    """Return the shapes of a link that Bullet can have as one, and those that it cannot."""
-    hulls = [shape for shape in link.shapes if isinstance(shape.geometry, Hull | Mesh)]
-    others = tuple([shape for shape in link.shapes if shape not in hulls])
-    return (others, tuple(hulls)) if others else (tuple(hulls[:1]), tuple(hulls[1:]))
+def _owners(body: Body, links: Sequence[Link], indices: Sequence[int]) -> dict[int, int]:
+    """Return the indices of a body's links by those of Bullet; a further hull is the link that it hangs on.
+
+    `links` are those that were given to Bullet, `indices` its own of each.
+    """
+    shift = 1 if body.is_free else 0
+    count = len(body.links) - shift
+    owners = [place if place < count else link.parent for place, link in enumerate(links)]
+    return {-1: 0, **{index: owner + shift for index, owner in zip(indices, owners, strict=True)}}
 
 
 def _shaped(base: Link | None, links: Sequence[Link]) -> tuple[tuple[int, int], ...]:
-    """Return the links that have a shape, by Bullet's indices, and the groups that each meets.
+    """Return the links that have a shape, by their places, -1 being the base, and the groups that each meets.
 
     Links of a body on a fixed base that no joint moves meet no scenery: nothing can happen between the two.
     """
@@ -441,22 +447,24 @@ class CompositionEngine:
             useMaximalCoordinates=False,
             physicsClientId=client,
         )
+        indices = bullet_indices(client, made, len(links))
         if base is not None:
             self._finish(made, -1, base, None)
-        for index, link in enumerate(links):
+        for index, link in zip(indices, links, strict=True):
             self._finish(made, index, link, links[link.parent] if link.parent >= 0 else base)
-        shaped = _shaped(base, links)
+        shaped = tuple([(indices[place] if place >= 0 else -1, mask) for place, mask in _shaped(base, links)])
         for index, mask in shaped:
             p.setCollisionFilterGroupMask(made, index, BODIES, mask, client)
         p.changeDynamics(made, -1, activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
-        joints = tuple([index for index, link in enumerate(links) if link.joint in MOVING])
+        joints = tuple([index for index, link in zip(indices, links, strict=True) if link.joint in MOVING])
         zeros = (0.0,) * len(joints)
         if joints:
             p.setJointMotorControlArray(
                 made, joints, p.VELOCITY_CONTROL, targetVelocities=zeros, forces=zeros, physicsClientId=client
             )
         end = -1 if mass > 0.0 else (joints[0] if joints else None)
-        return _Made(made, body, joints, zeros, base is not None, end, shaped, parking)
+        owners = _owners(body, links, indices)
+        return _Made(made, body, joints, zeros, base is not None, end, shaped, owners, parking)
 
     def _tie(self) -> None:
         """Tie all that moves into one of Bullet's islands, by gears without a force, which have no row in a solve.
@@ -633,8 +641,8 @@ class CompositionEngine:
             first = made.body.links[0]
             base = self._bases[place]
             along = sum([(a - b) * c for a, b, c in zip(point[at], base, first.axis, strict=True)])
-            slid = p.getJointState(made.id, 0, self._client)[0] if first.joint == "prismatic" else 0.0
-            log.add(everybody[partner].index, point[link], along - slid, point[9] * self._dt, substep)
+            slid = p.getJointState(made.id, made.joints[0], self._client)[0] if first.joint == "prismatic" else 0.0
+            log.add(everybody[partner].index, made.own[point[link]], along - slid, point[9] * self._dt, substep)
 
     def read(self, island: Island, numbers: list[float]) -> None:
         """Write the state of the island's bodies, and what they touched, into the numbers."""

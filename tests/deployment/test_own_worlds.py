@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 import yaml
@@ -22,6 +22,7 @@ from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
+from tests.kinematic_yard import yard_text
 from tests.own_forms import TABLE, folder_on_path, problems, written
 
 TEXT: Final = TABLE.read_text()
@@ -300,6 +301,65 @@ def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callabl
     surface = "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"
     assert surface in problems(*sets, text=fleet_text(1))
     assert surface not in problems(*sets, "robots.crate={model: 'own_form:Own'}", text=fleet_text(1))
+
+
+MANY: Final = """
+from foosim.world.scene import Body, Box, Link, Shape
+
+class Many(Own):
+    def __init__(self, settings, at):
+        self.name = at.robot.name
+    def body(self):
+        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range({count}))
+        return Body(self.name, "many", (0.0, 0.0, 0.0), (Link("a", "fixed", shapes, 1.0, (0.1,) * 3),))
+    def is_plausible(self, numbers, before):
+        return True
+    def place(self, view):
+        pass
+model("many", RobotSettings, is_rigid=True, slots=CONTACTS)(Many)
+"""
+
+
+@pytest.mark.parametrize(("count", "is_valid"), [(16, True), (17, False)])
+def test_a_rigid_model_has_no_more_shapes_than_the_engine_keeps(site: Path, count: int, is_valid: bool) -> None:
+    written(site, "from foosim.world.forms.forms import CONTACTS", MANY.format(count=count))
+    found = problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="bullet"))
+    assert any("a link with 17 boxes" in one for one in found) != is_valid, found
+    assert not found or not is_valid
+
+
+@pytest.mark.parametrize(
+    ("things", "is_free"),
+    [
+        ({"robots": {"a": {"model": "holonomic"}}}, False),
+        ({"robots": {"a": {"model": "differential_drive"}}}, False),
+        ({"robots": {"a": {"model": "differential_drive", "dynamics": "rigid"}}}, True),
+        ({"objects": {"a": {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"z": "10 cm"}}}}, True),
+    ],
+)
+def test_objects_and_rigid_drives_are_free_bodies(things: dict[str, Any], is_free: bool) -> None:
+    """Scenery may have a surface, and the engine must have its meshes."""
+    robots = {"watcher": {"model": "holonomic", "at": {"x": "-5 m"}}, **things.get("robots", {})}
+    ramp = {"shape": "box", "length": "6 m", "width": "4 m", "height": "20 cm", "x": "10 m", "z": "1 m"}
+    text = yard_text(robots, engine="bullet", objects=things.get("objects", {}), scenery={"ramp": ramp})
+    surface = "scenery.ramp.surface: a surface for free bodies, in a world without any, 'floor'"
+    assert problems("scenery.ramp.surface=floor", text=text) == [surface] * (not is_free)
+    no_meshes = "scenery.ramp.shape: the engine pure has no meshes"
+    mesh = ("engine=pure", "scenery.ramp={shape: mesh, file: a.obj}")
+    assert any(said.startswith(no_meshes) for said in problems(*mesh, text=text)) == is_free
+
+
+def test_objects_have_names_of_their_own() -> None:
+    crate = "{model: box, size: [20 cm, 20 cm, 20 cm], mass: 1 kg, at: {x: 3 m, z: 10 cm}}"
+    wall = "{shape: box, length: 1 m, width: 1 m, height: 1 m, x: -4 m, z: 1 m}"
+    text = yard_text({"a": {"model": "holonomic"}}, engine="bullet")
+    assert problems(f"objects.b={crate}", f"scenery.c={wall}", text=text) == []
+    for sets, what in (
+        ([f"objects.a={crate}"], "objects: a name that is also one of robots, 'a'"),
+        ([f"objects.world={crate}"], "objects: a reserved name, 'world'"),
+        ([f"objects.b={crate}", f"scenery.b={wall}"], "scenery: a name that is also an object's, 'b'"),
+    ):
+        assert problems(*sets, text=text) == [what]
 
 
 def test_a_rod_by_its_class_is_a_rod() -> None:

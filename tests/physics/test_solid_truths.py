@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from math import cos, pi, sin, sqrt
+from pathlib import Path
+from random import Random
 from typing import Final
 
 import pytest
@@ -28,6 +31,7 @@ from foosim.world.scene import (
     Capsule,
     Cylinder,
     Hull,
+    JointKind,
     Link,
     Sphere,
     Vector,
@@ -41,6 +45,7 @@ from tests.solids import GRAVITY, TICK_S, Solids, ball, box, physics, shape
 
 SEED: Final = 17
 KEY: Final = draw_key(SEED, "solids")
+JOINT_KINDS: Final[tuple[JointKind, ...]] = ("prismatic", "revolute", "continuous", "fixed")
 Y: Final = (0.0, 1.0, 0.0)
 Z: Final = (0.0, 0.0, 1.0)
 
@@ -301,6 +306,49 @@ def test_motors_reach_speeds_with_their_forces() -> None:
         assert one.get("arm", "joint_velocities")[0] == pytest.approx(1.0, abs=1e-6)
 
 
+PARTS: Final = "".join(
+    f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
+    '<collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
+    f'<joint name="to_{name}" type="continuous"><parent link="foot"/><child link="{name}"/><origin xyz="{x} 0 0"/>'
+    '<axis xyz="0 0 1"/><limit effort="10" velocity="5"/></joint>'
+    for x, name in enumerate(("left", "reach", "right", "spare"))
+)
+OWN_SPIN: Final = """
+from foosim.world.actuators.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
+from foosim.world.forms.registry import actuator
+from foosim.world.parameters.joints import set_points
+
+class SpinSettings(JointVelocitySettings): pass
+
+@actuator("spin", SpinSettings, JointVelocities, slots=set_points, needs=("joint_positions",), joints="joints")
+class Spin(JointVelocityActuator):
+    def __init__(self, settings, at):
+        super().__init__(settings, at)
+        self.joints = 3
+"""
+
+
+@pytest.mark.parametrize("kind", ["joint_velocity", "own_spin:Spin"])
+def test_actuators_of_disjoint_joints_share_a_robot(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wheels by speeds beside an arm by position; what no actuator names is free. An own attribute `joints` is one's
+    own."""
+    (tmp_path / "own_spin.py").write_text(OWN_SPIN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    actuators = {
+        "arm": {"kind": "joint_position", "joints": ["reach"]},
+        "wheels": {"kind": kind, "joints": ["right", "left"]},
+    }
+    cart = {"model": "urdf", "file": "cart.urdf", "fixed": True, "at": {"z": "1 m"}, "actuators": actuators}
+    files = {"cart.urdf": f'<robot name="cart"><link name="foot"/>{PARTS}</robot>'.encode()}
+    yard = Yard(yard_text({"cart": cart}, engine="bullet", physics={"gravity": "1 m/s2"}), files)
+    yard.put("cart", "wheels.set_point", 2.0, -1.0)
+    yard.put("cart", "arm.set_point", 0.5)
+    yard.step(100)
+    left, reach, right, spare = yard.vector("cart", "joint_positions")
+    assert [left, right] == pytest.approx([-1.0, 2.0], rel=0.02)
+    assert reach == pytest.approx(0.5, abs=0.01) and spare == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_revolute_joint_stops_at_its_limits() -> None:
     body = Body("arm", "limited", (0.0, 0.0, 3.0), (Link(
         "arm", "revolute", (shape(Sphere(0.02), position=(0.0, 0.0, -0.5)),), 1.0, (1e-4,) * 3,
@@ -341,6 +389,50 @@ def test_what_lies_on_the_floor_stays_as_high_as_its_shape(name: str, shapes: tu
         assert one.get(name, "position")[2] == pytest.approx(height, abs=0.003), one.get(name, "position")
         count, impulse, last = one.get(name, "contacts")
         assert (count, last) == (0.0, 3.0) and impulse == pytest.approx(GRAVITY * TICK_S, rel=0.02)
+
+
+def tree(case: int, *, with_hulls: bool) -> Body:
+    """Eight links of drawn joints on drawn parents, in no order of depth; with further hulls on each, or without.
+
+    Its base is fixed where the case is even, else free.
+    """
+    random = Random(SEED * 100 + case)
+    further = tuple([shape(Hull(corners((0.02, 0.02, 0.02))), position=(0.1, 0.0, z)) for z in (0.0, 0.1)])
+    links = []
+    for number in range(8):
+        joint: JointKind = random.choice(JOINT_KINDS) if number else ("free" if case % 2 else "fixed")
+        parent = random.randrange(number) if number else -1
+        shapes = (shape(Box((0.03, 0.03, 0.03))), *(further if with_hulls else ()))
+        mass, inertia = random.uniform(0.5, 2.0), (random.uniform(0.02, 0.03),) * 3
+        axis = random.choice(((1.0, 0.0, 0.0), Y, Z))
+        place = (random.uniform(0.2, 0.3), random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2))
+        made = Link(f"a{number}", joint, shapes, mass, inertia, axis=axis, limits=(-1.0, 1.0))
+        links.append(replace(made, parent=parent, position=place))
+    return Body("tree", "tree", ORIGIN, tuple(links), speed_limit=10.0)
+
+
+@pytest.mark.parametrize("case", range(6))
+def test_each_joint_of_a_tree_with_further_hulls_is_the_one_that_is_commanded(case: int) -> None:
+    """It moves and is read back, where the tree without them has it; so have all others, masses and motors."""
+    ends = {}
+    for with_hulls in (False, True):
+        body = tree(case, with_hulls=with_hulls)
+        count = len(body.joints)
+        with solids(body, feel=physics(gravity=0.0), scenery=()) as one:
+            start = one.numbers.copy()
+            for joint in range(count):
+                one.numbers[:] = start
+                motors = [Motor(0.0, 1000.0)] * count
+                motors[joint] = Motor(0.5, 1000.0)
+                one.drives["tree"] = Drives(tuple(motors))
+                one.run(20)
+                positions = one.get("tree", "joint_positions")
+                assert positions[joint] == pytest.approx(0.1, abs=0.01)
+                others = positions[:joint] + positions[joint + 1 :]
+                assert others == pytest.approx([0.0] * (count - 1), abs=0.01)
+                ends[with_hulls, joint] = one.numbers.copy()
+    for (with_hulls, joint), numbers in ends.items():
+        assert numbers == pytest.approx(ends[False, joint], abs=1e-9), (with_hulls, joint)
 
 
 def test_a_body_knows_whom_it_touches() -> None:
@@ -459,7 +551,7 @@ class StaticMovers(CompositionEngine):
             useMaximalCoordinates=True,
             physicsClientId=self._client,
         )
-        return _Made(made, body, (), (), True, None, ((-1, BODIES | SCENERY),), parking)
+        return _Made(made, body, (), (), True, None, ((-1, BODIES | SCENERY),), {-1: 0}, parking)
 
 
 def test_a_mover_pushes_a_box() -> None:

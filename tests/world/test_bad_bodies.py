@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -103,6 +104,58 @@ def test_objects(settings: dict[str, Any], what: str, tmp_path: Path) -> None:
     box = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"x": "3 m", "z": "10 cm"}, **settings}
     found = said(folder=tmp_path, objects={"a": box})
     assert found.partition(": ")[2].startswith(what), found
+
+
+PART: Final = (
+    '<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
+    '<collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
+    '<joint name="to_{name}" type="revolute"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 0.2"/>'
+    '<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="10" velocity="5"/></joint>'
+)
+THREE: Final = (
+    '<robot name="r"><link name="foot"/>'
+    + "".join(PART.format(name=name, parent=parent) for parent, name in pairwise(("foot", "upper", "fore", "hand")))
+    + "</robot>"
+)
+
+
+CLASHES: Final[dict[str, tuple[Any, Any, str]]] = {
+    "both name it": (["upper", "fore"], ["hand", "fore"], "arm.joints[1]: a joint that base commands already, 'fore'"),
+    "one commands all": (None, ["hand"], "arm.joints[0]: a joint that base commands already, with all others, 'hand'"),
+    "the other one does": (
+        ["hand"],
+        None,
+        "arm.kind: commands all joints, of which hand is one that base commands already, 'joint_position'",
+    ),
+    "both do": (None, None, "arm.kind: commands the motors that base commands already, 'joint_position'"),
+    "no one does": (["upper", "hand"], ["fore"], ""),
+}
+
+
+@pytest.mark.parametrize("case", CLASHES)
+def test_actuators_share_a_robot_but_no_joint(case: str, tmp_path: Path) -> None:
+    theirs, own, what = CLASHES[case]
+    kinds = {"base": ("joint_velocity", theirs), "arm": ("joint_position", own)}
+    actuators = {name: {"kind": kind} | ({"joints": its} if its else {}) for name, (kind, its) in kinds.items()}
+    found = said(THREE, folder=tmp_path, actuators=actuators)
+    assert found.partition("actuators.")[2] == what, found
+
+
+@pytest.mark.parametrize(
+    ("spare", "count", "what"),
+    [
+        ("", 17, "1: a link with 17 boxes, spheres, cylinders and capsules; at most 16 are valid, beside meshes, 'a'"),
+        ("", 16, ""),
+        ('<collision><geometry><mesh filename="s.obj"/></geometry></collision>', 16, ""),
+    ],
+)
+def test_a_link_has_no_more_shapes_than_the_engine_keeps(spare: str, count: int, what: str, tmp_path: Path) -> None:
+    """Of 17 in one link Bullet drops the last without a word."""
+    (tmp_path / "s.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n")
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    text = f'<robot name="r"><link name="a">{box * count}{spare}</link></robot>'
+    found = said(text, folder=tmp_path, actuators={})
+    assert found == (f"arm.urdf:{what}" if what else "")
 
 
 def test_an_engine_that_does_not_have_such_bodies(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ class World:
     def vehicle_height_m(self, name: str) -> float | None:
         """Return how high the hull of a vehicle is, without its antenna (m); None for what is no vehicle."""
         robot = self._deployment.robots.get(name)
-        if robot is None or not (VEHICLE in robot.tags or VEHICLE in registry.find_model(robot.model).tags):
+        if robot is None or not (VEHICLE in robot.tags or VEHICLE in registry.model_of(robot).tags):
             return None
         body = self._robot(name).body
         return None if body is None else shape_box(body.links[0].shapes[0])[1][2]

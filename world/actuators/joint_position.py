@@ -42,14 +42,15 @@ def _slots(settings: JointPositionSettings, carrier: Carrier) -> Mapping[str, in
     return set_points(settings, carrier)
 
 
-@actuator("joint_position", JointPositionSettings, JointPositions, slots=_slots, needs=("joint_positions",))
+@actuator(
+    "joint_position", JointPositionSettings, JointPositions, slots=_slots, needs=("joint_positions",), joints="joints"
+)
 class JointPositionActuator:
     """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
 
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
         self._gain = settings.gain
-        self.joints = self._group.indices
 
     @staticmethod
     def check(settings: JointPositionSettings, at: Mounting) -> None:

@@ -20,13 +20,14 @@ class JointEfforts(Struct, frozen=True):
     efforts: Many
 
 
-@actuator("joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",))
+@actuator(
+    "joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",), joints="joints"
+)
 class JointTorqueActuator:
     """Motors that apply the last efforts that they were told, up to the greatest speeds of their joints."""
 
     def __init__(self, settings: JointTorqueSettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
-        self.joints = self._group.indices
 
     @staticmethod
     def check(settings: JointTorqueSettings, at: Mounting) -> None:

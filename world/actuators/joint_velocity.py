@@ -20,13 +20,19 @@ class JointVelocities(Struct, frozen=True):
     velocities: Many
 
 
-@actuator("joint_velocity", JointVelocitySettings, JointVelocities, slots=set_points, needs=("joint_positions",))
+@actuator(
+    "joint_velocity",
+    JointVelocitySettings,
+    JointVelocities,
+    slots=set_points,
+    needs=("joint_positions",),
+    joints="joints",
+)
 class JointVelocityActuator:
     """Motors that keep the last speeds that they were told."""
 
     def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
-        self.joints = self._group.indices
 
     @staticmethod
     def check(settings: JointVelocitySettings, at: Mounting) -> None:

@@ -64,10 +64,8 @@ def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
         for name, one in entities.items():
-            named = one.felt_surfaces if hasattr(one, "felt_surfaces") else {"surface": getattr(one, "surface", None)}
-            for key, surface in named.items():
-                if surface is not None:
-                    made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))
+            for key, surface in one.felt_surfaces.items():
+                made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))
     for location, what, surfaces, known in made:
         for surface in dict.fromkeys(surfaces):
             if surface != FELT_BY_NOBODY and surface not in known:

@@ -17,6 +17,7 @@ from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
 from foosim.common.json_text import encode_json
 from foosim.world.assembly.world import NO_TEXT, World, initial_numbers, model_of, rules_of, world_status, world_texts
+from foosim.world.bodies.limits import size_problem
 from foosim.world.components.fitted import FittedActuator, FittedSensor, actuators_of, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, WritableView
@@ -222,6 +223,10 @@ def _check_body(model: Any, entity: Entity) -> None:
         _need(not lacking, "a model with position and orientation, which has a free body", lacking)
     for link in body.links:
         _check_shapes(link.shapes)
+    if entity.is_rigid:
+        problem = size_problem([link.shapes for link in body.links])
+        if problem:
+            raise _Unmet(problem)
 
 
 def _check_plausible(model: Any, numbers: Sequence[float]) -> None:

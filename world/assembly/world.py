@@ -46,7 +46,8 @@ from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_mo
 from foosim.world.scene import Body, Scene, Vector
 from foosim.world.spec import WorldSpec
 
-NO_MOTORS: Final[Motors] = ()
+NO_FORCE: Final = (0.0, 0.0)
+"""What is asked of the motor of a joint that nothing drives."""
 NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose marks cannot be told."""
@@ -276,7 +277,8 @@ class World:
             index: actuators for index, actuators in fitted.items() if actuators
         }
         """What moves each robot that has actuators, by the entity's index."""
-        self._only = {index: its[0] for index, its in fitted.items() if len(its) == 1}
+        self._only = {index: its[0] for index, its in fitted.items() if len(its) == 1 and its[0].joints is None}
+        """The actuators that alone command all motors of their robots, by the entity's index."""
         self._motions = _motions_of(spec, layout)
         self._moving = _Moving([], [])
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
@@ -409,10 +411,7 @@ class World:
         found: list[Motors] = []
         for entity in entities:
             one = self._only.get(entity.index)
-            if entity.index in self._powers and not self._has_power(entity, view):
-                found.append(self._motors_without_power(entity, view))
-                continue
-            if one is None:
+            if one is None or (entity.index in self._powers and not self._has_power(entity, view)):
                 found.append(self._motors_of_several(entity, view))
                 continue
             try:
@@ -431,11 +430,11 @@ class World:
             return NO_DRIVES
         motors = [FREE] * entity.counts.get("joint_positions", 0)
         wrench: Wrench | None = None
-        has_power = entity.index not in self._powers or self._has_power(entity, view)
+        has_power = self._has_power(entity, view)
         for one in fitted:
             try:
                 asked = one.actuator.command(view) if has_power else _without_power(one, view)
-                joints = getattr(one.actuator, "joints", None) or range(len(asked))
+                joints = range(len(asked)) if one.joints is None else one.joints
                 for joint, motor in zip(joints, asked, strict=True):
                     motors[joint] = Motor(*motor)
                 if has_power and hasattr(one.actuator, "wrench"):
@@ -446,7 +445,7 @@ class World:
 
     def _has_power(self, entity: Entity, view: View) -> bool:
         """Whether all rules of an entity that say so say that its drives have power."""
-        for label, rule in self._powers[entity.index]:
+        for label, rule in self._powers.get(entity.index, ()):
             try:
                 answer = rule.has_power(view)
                 if answer is not True and answer is not False:
@@ -456,15 +455,6 @@ class World:
             if not answer:
                 return False
         return True
-
-    def _motors_without_power(self, entity: Entity, view: View) -> Motors:
-        asked = NO_MOTORS
-        for one in self.actuators.get(entity.index, ()):
-            try:
-                asked += _without_power(one, view)
-            except BaseException as error:
-                raise one.failed(view.tick, error) from error
-        return asked
 
     def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
         """Let the models of these rigid bodies write what follows from their new state, where that is finite."""
@@ -493,13 +483,22 @@ class World:
                 raise actuators[0].failed(tick, error) from error
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
-        asked = NO_MOTORS
-        for one in self.actuators.get(entity.index, ()):
+        """Return what all actuators of an entity ask; joints that none of them commands are free."""
+        has_power = self._has_power(entity, view)
+        fitted = self.actuators.get(entity.index, ())
+        by_joint = any(one.joints is not None for one in fitted)
+        asked: list[tuple[float, ...]] = [NO_FORCE] * entity.counts.get("joint_positions", 0) if by_joint else []
+        for one in fitted:
             try:
-                asked += one.actuator.command(view)
+                motors = one.actuator.command(view) if has_power else _without_power(one, view)
+                if one.joints is None:
+                    asked.extend(motors)
+                    continue
+                for joint, motor in zip(one.joints, motors, strict=True):
+                    asked[joint] = motor
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
-        return asked
+        return tuple(asked)
 
     def apply_entity_rules(
         self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int

@@ -16,13 +16,12 @@ from functools import lru_cache
 from typing import Final
 
 from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
+from foosim.world.bodies.limits import size_problem
 from foosim.world.bodies.urdf_joints import JointPart, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, materials_of, mesh_paths, read_link
 from foosim.world.bodies.xml_tree import Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Quaternion, Shape, Vector, multiply, rotate
 
-LINKS_MAX: Final = 128
-"""Bullet's multibodies have at most so many."""
 SHAPES_MAX: Final = 256
 KEPT: Final = 32
 """Files whose robots are remembered."""
@@ -144,9 +143,11 @@ def _links(robot: Element, files: Mapping[str, bytes]) -> list[LinkPart]:
             raise element.error(f"a link with the name of that of line {links[link.name].line}", link.name)
         links[link.name] = link
         shapes += len(link.shapes)
-        for count, most, what in ((len(links), LINKS_MAX, "links"), (shapes, SHAPES_MAX, "collision shapes")):
-            if count > most:
-                raise element.error(f"more than {most} {what}")
+        if shapes > SHAPES_MAX:
+            raise element.error(f"more than {SHAPES_MAX} collision shapes")
+        problem = size_problem([one.shapes for one in links.values()])
+        if problem:
+            raise element.error(problem, link.name)
     if not links:
         raise robot.error("a robot without links")
     if shapes == 0:

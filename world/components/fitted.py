@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
+from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import (
     Actuator,
     ComponentError,
@@ -133,6 +134,8 @@ class FittedActuator:
     """The place of the robot's count of clamped commands."""
     moves: bool = True
     """Whether it commands the motors of its robot."""
+    joints: tuple[int, ...] | None = None
+    """The numbers of the joints whose motors it commands; None for all of them."""
 
     @property
     def has_waiting(self) -> bool:
@@ -252,10 +255,17 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         codec = codec_of(settings.kind, "actuator")
         bounds = called(f"actuator {channel}", robot.name, 0, CommandBounds, made, codec)
         counter = robot.offsets["clamped"]
+        joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
         fitted.append(
-            FittedActuator(robot.name, channel, made, codec, modifiers, size, bounds, counter, component.moves)
+            FittedActuator(robot.name, channel, made, codec, modifiers, size, bounds, counter, component.moves, joints)
         )
     return tuple(fitted)
+
+
+def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting) -> tuple[int, ...] | None:
+    """Return the joints that the settings of an actuator name; None where they name none. Raises Misfit."""
+    named = component.joints_named(settings)
+    return None if named is None else joint_indices(mounting, named, component.joints)
 
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:

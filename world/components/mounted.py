@@ -21,6 +21,20 @@ OF_TWIST = ("linear_velocity", "angular_velocity")
 """Fields of a free body without which nobody knows how its places move."""
 
 
+def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -> tuple[int, ...]:
+    """Return the numbers of the joints of a robot that a setting of a component names. Raises Misfit for one that the
+    robot does not have, or that is named twice."""
+    body = body_at(at)
+    names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
+    for place, name in enumerate(named):
+        if name not in names:
+            what = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
+            raise Misfit((setting, place), what, name, quoted(nearest_name(name, names)))
+        if name in named[:place]:
+            raise Misfit((setting, place), "named twice", name)
+    return tuple([names.index(name) for name in named])
+
+
 class Mounted:
     """A place on a robot. What it keeps follows from deployment and layout."""
 

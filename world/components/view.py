@@ -302,9 +302,11 @@ class Sensor(Protocol):
 class Modifier(Protocol):
     """What is asked of a modifier. It is made from its settings and its mounting; it works on numbers alone.
 
-    A class may have two more methods: the static `together(modifiers)`, which returns an object whose `apply(values,
-    view)` does the same to an array of shape (modifiers, numbers), and for commands `accept`, which takes one in place
-    of `apply`, with `due(view)`, which returns one that had to wait and takes effect at this tick, or None.
+    A class may have further methods: the static `check(settings, numbers)`, which raises BadValue where the settings do
+    not fit the numbers that it is on (`forms.per_field.Numbers`); the static `together(modifiers)`, which returns an
+    object whose `apply(values, view)` does the same to an array of shape (modifiers, numbers), and for commands
+    `accept`, which takes one in place of `apply`, with `due(view)`, which returns one that had to wait and takes effect
+    at this tick, or None.
     """
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
@@ -314,13 +316,18 @@ class Modifier(Protocol):
 class Actuator(Protocol):
     """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
 
-    A class may have five more methods: `bounds()`, which returns the least and the greatest value of each number of a
-    command, where that is numbers whose fields have several each; `within(command)`, which returns the command that is
-    carried out instead, where limits are of several numbers together; `names()`, what the numbers of a command are
-    called; `unpowered()`, which returns what is asked of the
-    motors of a robot without power; where there is none, that is a speed of 0 with the force or acceleration of
-    `command`. The static `together(actuators)` returns an object whose `command(view)` gives what several ask, of
-    robots that move by kinematics, as an array of shape (actuators, motors, 2), with the same bits.
+    The setting `joints` of its registration names the joints that it commands, so that several may share a robot.
+    `steady = True` of a class says that what it asks follows from the state and its slots alone, whatever the tick is:
+    a rod that such actuators have left as it was stays so, unsolved.
+
+    A class may have six more methods: `wrench(view)`, which returns a force (N) at the centre of mass of a free rigid
+    base and a torque (N m), both in its principal axes; `bounds()`, which returns the least and the greatest value of
+    each number of a command, where that is numbers whose fields have several each; `within(command)`, which returns the
+    command that is carried out instead, where limits are of several numbers together; `names()`, what the numbers of a
+    command are called; `unpowered()`, which returns what is asked of the motors of a robot without power; where there is
+    none, that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns an
+    object whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape
+    (actuators, motors, 2), with the same bits.
     """
 
     def accept(self, command: Any, view: WritableView) -> bool:

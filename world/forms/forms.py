@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -178,7 +178,9 @@ class Component(Form):
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
     that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
-    `moves` says that an actuator commands the motors of its robot: one of a robot may.
+    `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
+    joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
+    motor is commanded by two actuators.
     `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
@@ -193,6 +195,7 @@ class Component(Form):
     speaks: str = ""
     shown_as: str = ""
     moves: bool = False
+    joints: str = ""
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
@@ -201,6 +204,13 @@ class Component(Form):
         if not callable(self.slots):
             return self.slots
         return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
+
+    def joints_named(self, settings: Any) -> Sequence[str] | None:
+        """Return the joints that an actuator with these settings commands; None for all. Raises BadValue."""
+        named = getattr(settings, self.joints) if self.joints else None
+        if named is None or (isinstance(named, list | tuple) and all(isinstance(name, str) for name in named)):
+            return named or None
+        raise BadValue(f"the setting {self.joints} of {self.name} is a list of the names of joints, or None", named)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

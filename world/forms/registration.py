@@ -88,12 +88,14 @@ def _component(found: Any) -> Iterator[str]:
     if not callable(found.slots):
         yield from _slots(found.slots, is_sensor=found.form == "sensor")
     yield from _names("needs", found.needs)
-    for key in ("several", "speaks"):
+    for key in ("several", "speaks", "joints"):
         if not isinstance(getattr(found, key), str) and not (key == "several" and callable(found.several)):
             yield f"{key} is a name, not {show(getattr(found, key))}"
     yield from shown_problems(found)
-    if isinstance(found.several, str) and found.several and found.several not in found.settings.model_fields:
-        yield f"several names no setting, {show(found.several)}"
+    for key in ("several", "joints"):
+        name = getattr(found, key)
+        if isinstance(name, str) and name and name not in found.settings.model_fields:
+            yield f"{key} names no setting, {show(name)}"
     if not isinstance(found.per_field, Mapping):
         yield f"per_field is a mapping of settings to least values, not {show(found.per_field)}"
         return

@@ -117,6 +117,7 @@ def actuator(
     needs: tuple[str, ...] = (),
     kit: str = "",
     moves: bool = True,
+    joints: str = "",
 ) -> Callable[[Made], Made]:
     """Register an actuator: a class with the methods of `components.view.Actuator`."""
 
@@ -131,6 +132,7 @@ def actuator(
             needs=needs,
             kit=kit,
             moves=moves,
+            joints=joints,
         )
 
     return _registering(describe)

@@ -61,6 +61,11 @@ class EntitySettings(SpecBase):
     model: str
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
 
+    @property
+    def felt_surfaces(self) -> Mapping[str, str]:
+        """The surfaces that rigid bodies feel of it, by the setting that names them."""
+        return {}
+
 
 class RobotSettings(EntitySettings):
     """What the settings of every robot have: sensors and actuators by the names of their channels, rules by name.

@@ -59,6 +59,11 @@ class UrdfRobot(RobotSettings):
     surface: Surface = "default"
     speed_limit: SpeedLimit = default("30 m/s")
 
+    @property
+    def felt_surfaces(self) -> Mapping[str, str]:
+        """The surface of all its shapes."""
+        return {"surface": self.surface}
+
     def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
         """Return the URDF file, and the meshes of collision shapes that it names."""
         return (self.file, *meshes_of(self.file, files[self.file])) if self.file in files else (self.file,)

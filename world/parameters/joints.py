@@ -10,11 +10,8 @@ from msgspec import Meta
 from pydantic import Field
 
 from foosim.common.errors import BadValue
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
 from foosim.common.spec_base import Name
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.mounted import body_at
+from foosim.world.components.mounted import body_at, joint_indices
 from foosim.world.components.view import Mounting, Slot, View
 from foosim.world.forms.forms import JOINTS_MAX, Carrier
 from foosim.world.forms.settings import ActuatorSettings
@@ -52,14 +49,10 @@ class JointGroup:
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
         """Raises Misfit for a joint that the robot does not have."""
         body = body_at(at)
-        names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
-        for place, name in enumerate(settings.joints or ()):
-            if name not in names:
-                problem = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-                raise Misfit(("joints", place), problem, name, quoted(nearest_name(name, names)))
-        links = tuple(settings.joints or names)
-        self.indices = tuple(names.index(name) for name in links)
-        self.names = tuple(f"joint of {name}" for name in links)
+        everything = range(len(body.joints))
+        self.indices = tuple(everything) if settings.joints is None else joint_indices(at, settings.joints)
+        links = [body.joints[index].name.removeprefix(f"{body.name}/") for index in self.indices]
+        self.names = tuple(f"joint of {link}" for link in links)
         """What the numbers of a command are of."""
         self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
         self.set_point: Slot = at.slot("set_point")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Final
 
 from pydantic import Field
@@ -45,6 +45,11 @@ class ObjectSettings(EntitySettings):
     speed_limit: SpeedLimit = default("10 m/s")
     material: Material = Field(default_factory=Material)
     radio: Radio | None = None
+
+    @property
+    def felt_surfaces(self) -> Mapping[str, str]:
+        """The surface of all its shapes."""
+        return {"surface": self.surface}
 
 
 class RigidObject:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import Annotated
 
@@ -38,6 +39,11 @@ class QuadrotorRobot(RobotSettings):
     drag_factor: Annotated[float, Field(ge=0, le=1)] = 1.5e-7
     surface: Name = DEFAULT
     speed_limit: SpeedLimit = default("30 m/s")
+
+    @property
+    def felt_surfaces(self) -> Mapping[str, str]:
+        """The surface of all its shapes."""
+        return {"surface": self.surface}
 
     @property
     def side(self) -> float:

@@ -30,6 +30,7 @@ from foosim.common.spec_base import (
     Torque,
 )
 from foosim.common.units import Quantity
+from foosim.world.bodies.limits import PRIMITIVES_MAX
 from foosim.world.spec import WorldSpec
 
 TABLE: Final = "table"
@@ -154,11 +155,15 @@ class Rod(SpecBase):
         return STEEL_DENSITY * section * self.length
 
 
+FIGURES_MAX: Final = PRIMITIVES_MAX // 2
+"""Figures of a rod: foot and body of each are boxes of one link."""
+
+
 class Line(SpecBase):
     """One of a team's four lines: where its rod stands for red (blue's is mirrored) and what is on it."""
 
     x: Position
-    figures: Annotated[int, Field(ge=1, le=11)]
+    figures: Annotated[int, Field(ge=1, le=FIGURES_MAX)]
     pitch: LengthOrNone
     half_stroke: Length
 

@@ -12,7 +12,7 @@ from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
 from foosim.common.plain_data import PlainData, mm
 from foosim.world.forms import registry
-from foosim.world.parameters.table import LINE_NAMES, TABLE
+from foosim.world.parameters.table import FIGURES_MAX, LINE_NAMES, TABLE
 
 
 def table_findings(data: PlainData) -> Iterator[Finding]:
@@ -71,7 +71,7 @@ def _lines(data: PlainData) -> Iterator[Finding]:
             continue
         location = (*at, "half_stroke")
         value = data.get(*location)
-        if foot is not None and pitch is not None and isinstance(figures, int) and 1 <= figures <= 11:
+        if foot is not None and pitch is not None and isinstance(figures, int) and 1 <= figures <= FIGURES_MAX:
             free = (width - pitch * (figures - 1) - foot) / 2
             if stroke > free:
                 yield Finding(location, "figures would reach the side wall", value, _millimetres(free))

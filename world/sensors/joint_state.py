@@ -8,11 +8,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final
 from msgspec import Meta, Struct
 from pydantic import Field
 
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
 from foosim.common.spec_base import Name
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.mounted import body_at
+from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.forms import JOINTS
 from foosim.world.forms.registry import sensor
@@ -57,14 +54,14 @@ class JointStates:
 
     def __init__(self, settings: JointStateSettings, at: Mounting) -> None:
         slots = [at.slot(field) for field in JOINTS]
-        chosen = _chosen(settings, at) if settings.joints else range(slots[0].size)
+        chosen = joint_indices(at, settings.joints) if settings.joints else range(slots[0].size)
         self.places = [slot.at + joint for slot in slots for joint in chosen]
 
     @staticmethod
     def check(settings: JointStateSettings, at: Mounting) -> None:
         """Raise Misfit for a joint that the robot does not have, or that is named twice."""
         if settings.joints:
-            _chosen(settings, at)
+            joint_indices(at, settings.joints)
 
     def sample(self, view: View) -> JointState:
         numbers = [view.numbers[place] for place in self.places]
@@ -89,16 +86,3 @@ class JointStateBatch:
         """Return the numbers, of shape (sensors, 3 joints)."""
         numbers: NDArray[np.float64] = view.values[self._places]
         return numbers
-
-
-def _chosen(settings: JointStateSettings, at: Mounting) -> list[int]:
-    """Return the numbers of the joints that are named. Raises Misfit."""
-    body = body_at(at)
-    names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
-    for place, name in enumerate(settings.joints):
-        if name not in names:
-            what = f"{body.name} has no such joint; there are {', '.join(names)}"
-            raise Misfit(("joints", place), what, name, quoted(nearest_name(name, names)))
-        if name in settings.joints[:place]:
-            raise Misfit(("joints", place), "named twice", name)
-    return [names.index(name) for name in settings.joints]
