@@ -142,8 +142,8 @@ def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
         ("writes=('contact',)", "rule of entities that writes contact: a rod has joint_positions, joint_velocities, "
          "joint_efforts, quarantined, down, contacts, refused, unmoved, clamped, nearest to contact is contacts"),
         ("needs=('contact',)", "rule of entities that a rod cannot carry, which has no contact (valid on: none; a rod "
-         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, unmoved, clamped, "
-         "nearest to contact is contacts)"),
+         "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, unmoved, "
+         "clamped, nearest to contact is contacts)"),
     ],
 )  # fmt: skip
 def test_a_rule_of_robots_reads_and_writes_fields_that_there_are(site: Path, about: str, told: str) -> None:

@@ -324,9 +324,9 @@ class Actuator(Protocol):
     base and a torque (N m), both in its principal axes; `bounds()`, which returns the least and the greatest value of
     each number of a command, where that is numbers whose fields have several each; `within(command)`, which returns the
     command that is carried out instead, where limits are of several numbers together; `names()`, what the numbers of a
-    command are called; `unpowered()`, which returns what is asked of the motors of a robot without power; where there is
-    none, that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns an
-    object whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape
+    command are called; `unpowered()`, which returns what is asked of the motors of a robot without power; where there
+    is none, that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns
+    an object whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape
     (actuators, motors, 2), with the same bits.
     """
 
