@@ -42,11 +42,11 @@ class Driver:
         self._is_several = fields[-1].is_several
         bounds = parameters["bounds"]
         names = [fields[-1].name] * len(bounds) if self._is_several else [field.name for field in fields]
-        layout = build_layout(deployment)
+        layout = None if deployment.lacks_files else build_layout(deployment)  # players have no URDF files
         self._bounds: dict[str, list[float]] = {}
         for robot in self._robots:
-            its = [one.actuator.limits() for one in actuators_of(deployment, layout, layout[robot])]
-            limits = next((one for one in its if one), {})
+            its = () if layout is None else actuators_of(deployment, layout, layout[robot])
+            limits = next((found for one in its if (found := one.actuator.limits())), {})
             most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
             self._bounds[robot] = list(map(min, bounds, most))
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
