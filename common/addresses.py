@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from ipaddress import ip_address
+from ipaddress import IPv6Address, ip_address
 from typing import Final, Literal
 
 from foosim.common.errors import BadValue, Refused
@@ -64,13 +64,22 @@ def parse_address(text: str, secured: bool | None = None) -> Address:
     match = _ADDRESS.fullmatch(text)
     port = int(match["port"] or 0) if match is not None else 0
     if match is None or port > PORT_MAX:
-        raise BadValue("not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT)", text)
+        raise BadValue("not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT)", text, _in_brackets(text))
     said = match["protocol"]
     if secured is True and said == "tcp":
         raise BadValue("not an address for certificates", text, f"tls/{match['host']}:{port}")
     if secured is False and said == "tls":
         raise BadValue("an address that needs certificates: give their folder by --pki DIR", text)
     return Address(match["host"], port, "tls" if secured or said == "tls" else "tcp")
+
+
+def _in_brackets(text: str) -> str | None:
+    """Return a bare IPv6 address as it is written here; None for what is none."""
+    protocol, slash, host = text.rpartition("/")
+    try:
+        return repr(f"{protocol}{slash}[{IPv6Address(host)}]")
+    except ValueError:
+        return None
 
 
 def check_listen(text: str, insecure: bool, ports: int = 1, secured: bool = False) -> Address:

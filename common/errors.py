@@ -76,14 +76,14 @@ def describe(what: str, value: object, nearest: str | None = None) -> str:
 
 
 def show(value: object, length: int = 48) -> str:
-    """A value formatted for a message: one line, bounded, with control characters escaped."""
+    """A value formatted for a message: one line, bounded, as typed, with characters that cannot be printed escaped."""
     if isinstance(value, dict):
         return f"a mapping of {len(value)}"
     if isinstance(value, list | tuple):
         return f"a list of {len(value)}"
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
-    text = ascii(value) if isinstance(value, str) else str(value)
+    text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= length else text[: length - 4] + "..." + text[-1]
 
 

@@ -57,8 +57,12 @@ class Dimension:
     @property
     def refusal(self) -> str:
         """Error text for a value of another form."""
-        article = "an" if self.name[0] in "aeiou" else "a"
-        return f"not {article} {self.name} ({self.form})"
+        return f"not {self.one} ({self.form})"
+
+    @property
+    def one(self) -> str:
+        """Its name with the indefinite article."""
+        return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name}"
 
 
 def _sizes(**units: str) -> dict[str, Fraction]:
@@ -111,14 +115,23 @@ def parse(text: object, dimension: Dimension) -> Fraction:
         raise BadValue(dimension.refusal, text)
     number, unit = match[1], match[2]
     if unit not in dimension.units:
+        other = None if unit is None else _other_dimension(unit, dimension)
+        if other is not None:
+            raise BadValue(f"{dimension.refusal}; {unit} measures {other.one}", text)
         close = (dimension.usual or dimension.base) if unit is None else _nearest_unit(unit, dimension)
         nearest = None if close is None else repr(f"{number} {close}")
         raise BadValue(dimension.refusal, text, nearest)
     return Fraction(number) * dimension.units[unit]
 
 
+def _other_dimension(unit: str, dimension: Dimension) -> Dimension | None:
+    """What a unit of another kind measures; the base unit tells kinds apart, so that MHz is one of a rate, too."""
+    others = [other for other in globals().values() if isinstance(other, Dimension) and unit in other.units]
+    return next((other for other in others if other.base not in dimension.units), None)
+
+
 def _nearest_unit(unit: str, dimension: Dimension) -> str | None:
-    """The unit that was probably meant: one of equal length first, so that `ms` for a length suggests `mm`."""
+    """The unit that was probably meant: one of equal length first, so that `MM` for a length suggests `mm`."""
     plain = unit[:32].translate(_SIGNS)
     equal = [candidate for candidate in dimension.units if len(candidate) == len(plain)]
     return nearest_name(plain, equal, 0.5) or nearest_name(plain, dimension.units, 0.5)

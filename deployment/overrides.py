@@ -152,6 +152,10 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
             raise _Misplaced(steps[index][1], describe("set inside a value that is no mapping", steps[index][0]))
         key, used = _key(node.values, steps, index) or _key(taken.names(), steps, index) or (steps[index][0], 1)
         if index + used == len(steps):
+            if taken.steps[:1] == [TEMPLATES] and _is_null(value) and key in node.values:
+                del node.keys[key], node.values[key]  # a null of a template with nothing below it would stay
+                if key not in taken.names():
+                    return
             node.keys[key] = _place(number, steps[index][1])
             node.values[key] = value
             return
@@ -160,6 +164,10 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
         node = node.values[key]
         index += used
         taken.steps.append(key)
+
+
+def _is_null(value: Tree) -> bool:
+    return isinstance(value, Leaf) and value.value is None
 
 
 @dataclass(slots=True)

@@ -96,6 +96,7 @@ def read_files(
     `known` are those that were read before: there is a limit of all together.
     """
     files: dict[str, bytes] = {}
+    where = (folder / assets).absolute()
     left = limits.ASSETS_BYTES_MAX - sum(map(len, known.values()))
     try:
         root = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -103,7 +104,7 @@ def read_files(
         raise AssetError(f"{folder}: {error.strerror}") from None
     try:
         for path in wanted:
-            files[path] = _read_file(root, "" if assets == "." else f"{assets}/", path)
+            files[path] = _read_file(root, "" if assets == "." else f"{assets}/", path, where)
             left -= len(files[path])
             if left < 0:
                 raise AssetError(f"{path}: the files up to this one have more than {limits.ASSETS_BYTES_MAX} bytes")
@@ -112,8 +113,8 @@ def read_files(
     return files
 
 
-def _read_file(root: int, prefix: str, path: str) -> bytes:
-    """The content of a file below an open folder."""
+def _read_file(root: int, prefix: str, path: str, where: Path) -> bytes:
+    """The content of a file below an open folder; `where` is the asset folder in messages."""
     problem = path_problem(path)
     if problem:
         raise AssetError(f"{path!r}: {problem}")
@@ -128,15 +129,17 @@ def _read_file(root: int, prefix: str, path: str) -> bytes:
         opened.append(file)
         return _content(file, path)
     except OSError as error:
-        raise AssetError(f"{path}: {_reason(error)}") from None
+        raise AssetError(f"{path}: {_reason(error, where)}") from None
     finally:
         for descriptor in opened:
             with suppress(OSError):
                 os.close(descriptor)
 
 
-def _reason(error: OSError) -> str:
-    """The error of a component that was not opened. A link is neither a folder nor a file."""
+def _reason(error: OSError, where: Path) -> str:
+    """The error of a component that was not opened, below the folder `where`. A link is neither a folder nor a file."""
+    if error.errno == errno.ENOENT:
+        return f"{error.strerror} in {where}"
     if error.errno in (errno.ELOOP, errno.ENOTDIR):
         return "a symbolic link, or no folder, on the way; neither is followed"
     return error.strerror or str(error)

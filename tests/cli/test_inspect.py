@@ -12,7 +12,9 @@ from typing import Final
 
 import pytest
 
+from foosim.deployment.assets import read_robot
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.world.bodies.urdf_text import snippet
 
 ROOT: Final = Path(__file__).parents[2]
 ARM: Final = ROOT / "deploy" / "models" / "arm.urdf"
@@ -85,3 +87,17 @@ def test_a_file_without_permission_is_bad_input(tmp_path: Path) -> None:
     (tmp_path / "a.urdf").chmod(0)
     done = inspected("a.urdf", folder=tmp_path)
     assert done.returncode == 2 and "a.urdf: Permission denied" in done.stderr
+
+
+def test_what_has_wheels_is_not_proposed_to_be_fixed(tmp_path: Path) -> None:
+    """A last joint that turns without end is that of an arm; two that end in nothing else are wheels."""
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links = "".join(f'<link name="{name}">{inertial}{ball}</link>' for name in "abc")
+    for parents, fixed in (("aa", "false"), ("ab", "true")):
+        joints = "".join(
+            f'<joint name="j{child}" type="continuous"><parent link="{parent}"/><child link="{child}"/></joint>'
+            for parent, child in zip(parents, "bc", strict=True)
+        )
+        (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+        assert f"fixed: {fixed}, " in snippet(read_robot(tmp_path / "r.urdf", None))

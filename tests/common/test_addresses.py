@@ -30,6 +30,16 @@ def test_what_is_none_is_refused(text: str) -> None:
         parse_address(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "written"), [("::1", "[::1]"), ("tcp/::1", "tcp/[::1]"), ("fe80::0:1", "[fe80::1]")]
+)
+def test_a_bare_address_of_ipv6_is_shown_as_it_is_written(text: str, written: str) -> None:
+    with pytest.raises(BadValue, match="not an address") as refused:
+        parse_address(text)
+    assert refused.value.nearest == repr(written)
+    assert parse_address(written).host == written.removeprefix("tcp/")
+
+
 @pytest.mark.parametrize("text", ["127.0.0.1", "127.8.9.1:5", "localhost:5", "[::1]:7"])
 def test_this_machine_alone_reaches_a_loopback_address(text: str) -> None:
     assert check_listen(text, insecure=False) == parse_address(text)

@@ -124,7 +124,8 @@ def test_places_are_added_exactly_and_rounded_once(start: str, step: str, count:
          ["8:39: robots.r.spacing: not a mapping, '1 m'"]),
         ("r: {like: rover, count: 3, spacing: {heading: 1 m, x: 1 kg}, x: 1 m, y: 1 m}",
          ["8:40: robots.r.spacing: not one of x, y, z, 'heading'",
-          "8:57: robots.r.spacing.x: not a length (a number and one of m, cm, mm, um, km), '1 kg', nearest is '1 km'"]),
+          "8:57: robots.r.spacing.x: not a length (a number and one of m, cm, mm, um, km); "
+          "kg measures a mass, '1 kg'"]),
         ("r: {like: rover, count: 3, spacing: {z: 1 m, y: 1 m}, x: 1 m, y: 1 m}",
          ["8:40: robots.r.spacing: unknown key (there are: x, y), 'z'"]),
         ("r: {like: rover, count: 3, spacing: {z: 1 m, y: 1 m}, x: 1 m, y: 1 m}\n  r-3: {z: 4 m, charge: 9 %}",

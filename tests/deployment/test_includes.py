@@ -96,7 +96,7 @@ def test_problems_are_in_the_file_that_they_are_written_in(files: Files) -> None
         "a/a.yaml:5:32: templates.rover.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, "
         "'60 Hz', nearest is '50 Hz'",
         "a/a.yaml:7:11: templates.other: unknown key, 'modl'",
-        "b.yaml:2:40: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km), '1 kg', nearest is '1 km'",
+        "b.yaml:2:40: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km); kg measures a mass, '1 kg'",
         "b.yaml:4:10: scenery.shelf: missing key, 'width'",
         "b.yaml:4:36: scenery.shelf: unknown key, 'widht', nearest is 'width'",
     ]
@@ -155,7 +155,7 @@ def test_what_cannot_be_read_is_said_where_it_is_included(files: Files, tmp_path
     include = "".join(f"  - {name}{'' if name in ('folder', 'out/passwd') else '.yaml'}\n" for name in names)
     refused_link = "a symbolic link, or no folder, on the way; neither is followed"
     assert unreadable(files, f=f"include:\n{include}" + hall(ROVER + ROBOTS)) == [
-        "f.yaml:2:5: include[0]: cannot be included, absent.yaml: No such file or directory",
+        f"f.yaml:2:5: include[0]: cannot be included, absent.yaml: No such file or directory in {tmp_path}",
         "f.yaml:3:5: include[1]: cannot be included, folder: no regular file",
         f"f.yaml:6:5: include[4]: cannot be included, link.yaml: {refused_link}",
         f"f.yaml:7:5: include[5]: cannot be included, out/passwd: {refused_link}",

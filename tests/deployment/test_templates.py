@@ -56,6 +56,15 @@ def test_null_takes_away_what_the_template_has() -> None:
     assert problems_of(hall(ROVER + null)) == ["7:60: robots.a.sensors.other: not a mapping, null"]
 
 
+def test_a_setting_of_null_takes_away_what_a_template_has_itself_or_by_another_one() -> None:
+    robots = "robots: {a: {like: slow, x: 1 m, y: 2 m}}\n"
+    for battery in ("", f", sensors: {{battery: {BATTERY}}}"):
+        text = hall(ROVER + f"  slow: {{like: rover{battery}}}\n" + robots)
+        for template in ("rover", "slow") if not battery else ("slow",):
+            changed = apply_sets(text, "f.yaml", [f"templates.{template}.sensors.battery=null"])
+            assert [*load_deployment(changed, "f.yaml").robots["a"].sensors] == ["pose"]
+
+
 def test_a_template_may_be_like_another_one() -> None:
     heavy = "  heavy: {like: rover, charge: 40 %, sensors: {battery: {offset: 20 ms}}}\n  slow: {like: heavy, y: 2 m}\n"
     robot: Any = long_robot("1 m", "2 m", charge="40 %")
@@ -121,7 +130,7 @@ def test_what_an_entry_has_beside_its_template_is_wrong_there() -> None:
     bad = TWENTY.replace("r7: {like: rover, x: -3 m", "r7: {like: rover, x: -3 mm/s")
     bad = bad.replace("r8: {like: rover, x: -2 m, ", "r8: {like: rover, sensors: {pose: {rate: 60 Hz}}, ")
     assert problems_of(hall(ROVER + bad)) == [
-        "15:24: robots.r7.x: not a length (a number and one of m, cm, mm, um, km), '-3 mm/s', nearest is '-3 mm'",
+        "15:24: robots.r7.x: not a length (a number and one of m, cm, mm, um, km); mm/s measures a speed, '-3 mm/s'",
         "16:7: robots.r8: missing key, 'x'",
         "16:44: robots.r8.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
         "nearest is '50 Hz'",
@@ -185,8 +194,8 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
         ("  other: {class: 'a.b:C', rate: 1 Hx}\n",
          ["7:33: templates.other.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', nearest is '1 Hz'"]),
         ("  other: {shape: box, length: 1 kg}\n",
-         ["7:31: templates.other.length: not a length (a number and one of m, cm, mm, um, km), '1 kg', "
-          "nearest is '1 km'"]),
+         ["7:31: templates.other.length: not a length (a number and one of m, cm, mm, um, km); "
+          "kg measures a mass, '1 kg'"]),
         ("  other: {like: rovr}\n", ["7:17: templates.other.like: unknown template, 'rovr', nearest is 'rover'"]),
         ("  other: {model: rover}\n  third: {x: 1 m}\n", []),
     ],

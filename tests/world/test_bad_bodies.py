@@ -66,7 +66,7 @@ def test_a_mesh_that_is_missing(tmp_path: Path) -> None:
     text = ARM.replace('<link name="grip"/>', MESH)
     assert text != ARM
     line, what = line_of('<link name="grip"/>'), "a mesh that cannot be read: gripper.stl: No such file or directory"
-    assert said(text, folder=tmp_path) == f"arm.urdf:{line}: {what}"
+    assert said(text, folder=tmp_path) == f"arm.urdf:{line}: {what} in {tmp_path}"
     assert said(folder=tmp_path) == "", "the arm itself is good"
 
 

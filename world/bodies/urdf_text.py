@@ -11,6 +11,8 @@ from foosim.world.bodies.urdf import Robot, free_base_problem
 from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Shape, Sphere
 
 MOST_DIGITS = 6
+WHEELS_MIN = 2
+"""One joint that turns without end may be the last one of an arm."""
 
 
 def as_json(robot: Robot) -> dict[str, Any]:
@@ -92,8 +94,23 @@ def lines(robot: Robot) -> Iterator[str]:
 def snippet(robot: Robot) -> str:
     """Return what a deployment says of a robot, as YAML."""
     name = robot.name if is_robot_name(robot.name) else "robot"
+    is_fixed = "true" if len(_wheels(robot)) < WHEELS_MIN or free_base_problem(robot) else "false"
     actuators = ", actuators: {joints: {kind: joint_position}}" if robot.moving else ""
-    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, at: {{x: 0 m, y: 0 m}}, fixed: true{actuators}}}\n"
+    placed = f"at: {{x: 0 m, y: 0 m}}, fixed: {is_fixed}"
+    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, {placed}{actuators}}}\n"
+
+
+def _wheels(robot: Robot) -> list[str]:
+    """Return the joints of what may be wheels: links that turn without end, and on which nothing else moves."""
+    carriers = set()
+    for link in robot.links:
+        if link.joint in MOVING:
+            parent = link.parent
+            while parent >= 0:
+                carriers.add(parent)
+                parent = robot.links[parent].parent
+    turning = [number for number, link in enumerate(robot.links) if link.joint == "continuous"]
+    return [robot.joints[number] for number in turning if number not in carriers]
 
 
 def _joint_text(link: Link) -> str:

@@ -21,6 +21,16 @@ DEPTH_MAX: Final = 32
 ATTRIBUTES_MAX: Final = 32
 TEXT_LENGTH_MAX: Final = 1000
 """Of a name and of a value."""
+_CUT_OFF: Final = tuple(
+    expat.errors.codes[text]
+    for text in (
+        expat.errors.XML_ERROR_NO_ELEMENTS,
+        expat.errors.XML_ERROR_UNCLOSED_TOKEN,
+        expat.errors.XML_ERROR_PARTIAL_CHAR,
+        expat.errors.XML_ERROR_UNCLOSED_CDATA_SECTION,
+    )
+)
+"""Errors of a content that ends too early. Of an unclosed tag or comment expat has the line in which it begins."""
 
 
 @dataclass(slots=True)
@@ -70,8 +80,8 @@ def read_xml(name: str, content: bytes) -> Element:
     try:
         reading.parser.Parse(content, True)
     except expat.ExpatError as error:
-        what = expat.ErrorString(error.code)
-        raise AssetError(f"{name}:{error.lineno}: no XML, {what}") from None
+        what = reading.cut_off() if error.code in _CUT_OFF else f"no XML, {expat.ErrorString(error.code)}"
+        raise AssetError(f"{name}:{error.lineno}: {what}") from None
     except (LookupError, ValueError) as error:  # an encoding that is not there, or has several bytes a character
         raise AssetError(f"{name}:1: no XML, {describe('an encoding that is not read', str(error))}") from None
     assert reading.root is not None, "expat refuses a document without an element"
@@ -90,6 +100,13 @@ class _Reading:
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.StartDoctypeDeclHandler = self._doctype
+
+    def cut_off(self) -> str:
+        """Return where in the tree the content ends too early."""
+        if not self._open:
+            return "the file ends here, without an element"
+        inner = self._open[-1]
+        return f"the file ends here, in the {inner.tag} of line {inner.line}, which is not closed"
 
     def _refuse(self, what: str, value: object = ABSENT) -> AssetError:
         return AssetError(f"{self.name}:{self.parser.CurrentLineNumber}: {describe(what, value)}")
