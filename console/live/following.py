@@ -5,6 +5,7 @@ Pure.
 
 from __future__ import annotations
 
+import re
 from base64 import b64decode
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
@@ -30,6 +31,8 @@ from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import build_layout
 
 ASKERS_KEPT: Final = 256
+_OWN_NAME: Final = re.compile(r"(operator|viewer)-([0-9]+)-[0-9a-f]{7}")
+_CERTIFIED: Final = re.compile(r"\.[0-9a-f]{7}$")
 LINKS_EVERY: Final = 2
 """Statuses: the vHub counts links anew twice a second."""
 Files = Callable[[Deployment], Mapping[str, bytes]]
@@ -43,6 +46,12 @@ class World:
     drawing: Drawing
     links: Links
     first: Frame | None
+
+
+def readable(name: str) -> str:
+    """Return an operator's name without what makes it unique: `operator (process 4711)`, or that of its certificate."""
+    alone = _OWN_NAME.fullmatch(name)
+    return f"{alone[1]} (process {alone[2]})" if alone else _CERTIFIED.sub("", name)
 
 
 class Following:
@@ -193,7 +202,7 @@ class Following:
     def take_status(self, status: dict[str, Any]) -> list[dict[str, Any]]:
         """Return the messages that a status makes, itself among them."""
         requests = [
-            {**asked, "who": self._askers.get((asked["who"], asked["tick"], asked["verb"]), asked["who"])}
+            {**asked, "who": self._askers.get((asked["who"], asked["tick"], asked["verb"]), readable(asked["who"]))}
             for asked in status["requests"]
         ]
         status = {**status, "requests": requests}

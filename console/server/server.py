@@ -45,6 +45,7 @@ WRITE_BYTES: Final = 64 * 1024
 REASON_BYTES_MAX: Final = 123
 """Of a WebSocket's close frame (RFC 6455, 5.5)."""
 WRONG_TOKEN: Final = 4401
+NO_HELLO: Final = 4408
 WRONG_ORIGIN: Final = 4403
 TOO_SLOW: Final = 4408
 ENDED: Final = 4410
@@ -204,7 +205,11 @@ class ConsoleServer:
             await _close(connection, TOO_MANY, f"{READERS_MAX} browsers look on already, which are all that may")
             return
         with contextlib.suppress(ConnectionClosed):
-            role = await self._role_of(connection)
+            try:
+                role = await self._role_of(connection)
+            except TimeoutError:
+                await _close(connection, NO_HELLO, f"no token came within {HELLO_S:g} s")
+                return
             if role is None:
                 await _close(connection, WRONG_TOKEN, "the address has no valid token: open the one that was printed")
                 return
@@ -212,11 +217,11 @@ class ConsoleServer:
             await self._serve_reader(connection, f"browser {self._counted}", role)
 
     async def _role_of(self, connection: ServerConnection) -> Role | None:
-        """Return the role that a browser's first message proves."""
+        """Return the role that a browser's first message proves. Raises TimeoutError."""
         try:
             async with asyncio.timeout(HELLO_S):
                 hello = read_message(await connection.recv())
-        except (TimeoutError, Malformed):
+        except Malformed:
             return None
         return self._tokens.role(hello.token) if isinstance(hello, Hello) else None
 

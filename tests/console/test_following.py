@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from foosim.console.live.following import Following, World
+from foosim.console.live.following import Following, World, readable
 from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.source import About, Wanted
 from foosim.deployment.loader import load_deployment
@@ -183,3 +183,9 @@ def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None
     assert ways.max() <= sensor.range + 1e-3
     heading = frame.at("rover01", "heading")
     np.testing.assert_allclose(np.arctan2(rays[0, 1], rays[0, 0]), heading, atol=1e-3)
+
+
+def test_an_operator_is_shown_by_a_readable_name() -> None:
+    assert readable("operator-4711-0a1b2c3") == "operator (process 4711)"
+    assert readable("operator.alice.0a1b2c3") == "operator.alice"
+    assert readable("tester") == "tester"

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 
+from foosim.console.server import server
 from foosim.console.server.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table
 
@@ -164,6 +165,18 @@ def test_who_may_not_look_is_told_why(said: dict[str, str], code: int, reason: s
         assert ended.value.rcvd is not None
         assert ended.value.rcvd.code == code
         assert reason in ended.value.rcvd.reason
+
+    play(part)
+
+
+def test_a_right_token_that_comes_late_is_not_called_invalid(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def part(stage: Console) -> None:
+        monkeypatch.setattr(server, "HELLO_S", 0.0)
+        with pytest.raises(ConnectionClosedError) as ended:
+            async with stage.browser() as browser:
+                await browser.hear("welcome")
+        assert ended.value.rcvd is not None
+        assert (ended.value.rcvd.code, ended.value.rcvd.reason) == (server.NO_HELLO, "no token came within 0 s")
 
     play(part)
 

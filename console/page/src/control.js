@@ -18,7 +18,7 @@ export class Control {
   constructor(store, desk) {
     this.store = store;
     this.desk = desk;
-    this.play = button("Pause", () => this.toggle(), { id: "play", class: "primary", title: "Pause or resume (Space)" });
+    this.play = button("Pause", () => this.toggle(), { id: "play", class: "primary", title: "Pause, resume or play (Space)" });
     this.step = button("Step", () => this.stepBy(1), { id: "step", title: "One tick (.)" });
     this.steps = button("…", () => this.askSteps(), { title: "Several ticks (Shift + .)", "aria-label": "Several ticks" });
     this.pace = select([], "", { id: "pace", "aria-label": "Pace", title: "How fast simulated time goes", onchange: () => this.setPace() });
@@ -56,14 +56,15 @@ export class Control {
     setText(byId("run"), status?.run ?? info.name);
     byId("run").title = info.name;
     setText(byId("seed"), status?.seed === undefined ? "" : `seed ${status.seed}`);
-    setText(byId("state"), `${SIGNS[state] ?? ""} ${state}`);
+    const recorded = info.kind === "live" ? "" : "recording, ";
+    setText(byId("state"), `${SIGNS[state] ?? ""} ${recorded}${state}`);
     byId("state").dataset.state = state;
     setText(byId("time"), time(source.seconds(source.tick)));
     setText(byId("tick"), `tick ${Math.round(source.tick)}`);
     byId("speed").title = "Simulated time for each second of the wall, since the start";
     setText(byId("speed"), status?.rtf === undefined || status.rtf === null ? "" : `${status.rtf.toFixed(2)}×`);
     const held = state === "paused" || (info.kind !== "live" && source.paused);
-    setText(this.play, held ? "Resume" : "Pause");
+    setText(this.play, !held ? "Pause" : recorded ? "Play" : "Resume");
     this.play.disabled = !this.desk.may(held ? "resume" : "pause") && !this.desk.may("play");
     for (const part of [this.step, this.steps]) part.disabled = !this.desk.may("step");
     this.end.hidden = !source.may("down");

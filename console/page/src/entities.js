@@ -19,11 +19,12 @@ export class Entities {
     this.facts = h("dl", { class: "facts" });
     this.filter = h("input", { type: "search", placeholder: "Find an entity", "aria-label": "Find an entity", oninput: () => this.draw() });
     this.list = h("ul", { class: "entities", "aria-label": "Entities" });
+    const heads = h("div", { class: "heads" }, ...["Entity", "Model", "Computed by"].map((name) => h("span", {}, name)));
     this.detail = h("section", { class: "detail", "aria-label": "Selected entity" });
     this.add = button("Add …", () => this.askAdd(), { id: "add" });
     byId("panel-world").append(
       h("section", {}, h("h2", {}, "State"), this.facts),
-      h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Entities"), this.filter, this.add), this.list),
+      h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Entities"), this.filter, this.add), heads, this.list),
       this.detail,
     );
     for (const name of ["scene", "status", "selected", "sources", "connected"]) store.on(name, () => this.draw());

@@ -19,6 +19,17 @@ export class Log {
     store.on("status", () => this.draw());
   }
 
+  /** What to try where nothing was tried yet. */
+  invitation() {
+    const source = this.store.main;
+    const tries = [
+      source?.may("push") && "push the body that is selected (World)",
+      source?.may("add") && "add an entity (World)",
+      source?.may("network") && "cut a link (Network, Partition)",
+    ].filter(Boolean);
+    return `None so far.${tries.length ? ` A first experiment: ${tries.join(", ")}.` : ""}`;
+  }
+
   draw() {
     if (byId("panel-log").hidden) return;
     const requests = [...(this.store.main?.status?.requests ?? [])].reverse();
@@ -26,7 +37,7 @@ export class Log {
       this.requests, requests, (one) => JSON.stringify(one),
       (one) => h("tr", { class: one.accepted ? "" : "refused" }, h("td", { class: "left" }, one.tick), h("td", { class: "left" }, one.who), h("td", { class: "left" }, one.verb), h("td", { class: "left" }, one.accepted ? one.text : `refused: ${one.text}`)),
     );
-    if (!requests.length) this.requests.replaceChildren(h("tr", {}, h("td", { class: "left hint", colspan: 4 }, "None so far.")));
+    if (!requests.length) this.requests.replaceChildren(h("tr", {}, h("td", { class: "left hint", colspan: 4 }, this.invitation())));
     const notes = this.store.notes.slice(-SHOWN).reverse();
     keyed(
       this.notes, notes, (note) => `${note.at.getTime()} ${note.text}`,
