@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
+from foosim.client.loading import look_in
 from foosim.common.addresses import check_listen
 from foosim.common.errors import BadValue
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import launched_options
 from foosim.process.roles import Roles, run_roles
-from foosim.runtime.command import PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import PathOption, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import die_with_parent, end_with_stack
 from foosim.runtime.run_folder import open_run
@@ -37,6 +38,7 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     node: Annotated[list[str] | None, typer.Option(help="Run this node; may be repeated.")] = None,
     player: Annotated[list[str] | None, typer.Option(help="Run this player; may be repeated.")] = None,
     radio: Annotated[str, typer.Option(help="Address of the vHub's radio plane elsewhere, or run:NAME.")] = "",
+    path: PathOption = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
@@ -52,6 +54,8 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     end_with_stack()
     if not (run or vhub_listen or node or player):
         raise BadValue("a role is missing: --run, --vhub-listen, --node or --player", name)
+    if path is not None:
+        look_in(str(path.absolute()))
     supervisor = None
     if run is not None:
         folder = open_run(run)

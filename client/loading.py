@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import pkgutil
 import sys
@@ -29,6 +30,13 @@ class ClassPathError(PlayerError):
     def __init__(self, path: str, problem: str, nearest: str | None = None) -> None:
         super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest!r}" if nearest else ""))
         self.problem, self.nearest = problem, nearest
+
+
+def look_in(folder: str) -> None:
+    """Have modules be found in a folder, too, after everywhere else: in that of a deployment's file."""
+    if folder not in sys.path:
+        sys.path.append(folder)
+        importlib.invalidate_caches()
 
 
 def load_player(path: str) -> Callable[..., Any]:
@@ -74,7 +82,7 @@ def _not_found(path: str, missing: str) -> ClassPathError:
         hint = "" if folders is not None else f" ({parent} is a module, not a package)"
     else:
         folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
-        hint = " (is the folder that it is in on PYTHONPATH?)"
+        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
     nearest = nearest_name(last, [module.name for module in pkgutil.iter_modules(folders)] if folders else ())
     found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
     return ClassPathError(path, f"there is no module {missing}{hint}", found)

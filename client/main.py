@@ -17,14 +17,14 @@ import typer
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import report_failure
-from foosim.client.loading import load_player
+from foosim.client.loading import load_player, look_in
 from foosim.client.player import PlayerLoop
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
-from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, VersionOption, new_app, run_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
@@ -99,7 +99,7 @@ def run_players(
 ) -> int:
     """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
 
-    Raises Refused when no vHub can be reached, PlayerError when a class cannot be loaded or fails.
+    Raises Refused when no vHub can be reached.
     """
     for name in names:
         if not is_name(name):
@@ -119,7 +119,10 @@ def run_players(
             session, credentials = links[-1]
             process.add(PlayerShell(process, name, session, world, credentials))
         stop.then(process.stop)
-        return process.run()
+        try:
+            return process.run()
+        except PlayerError:  # its text is in the log
+            return FAILED
 
 
 app = new_app()
@@ -131,6 +134,7 @@ def player(
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT, or run:NAME.")],
     world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
+    path: PathOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
@@ -143,6 +147,8 @@ def player(
     """
     die_with_parent()
     end_with_stack()
+    if path is not None:
+        look_in(str(path.absolute()))
     raise typer.Exit(run_players(name, connect, world, pki, progress_file))
 
 

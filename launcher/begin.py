@@ -10,7 +10,8 @@ from pathlib import Path
 from foosim.deployment.schema import places
 from foosim.launcher.console_child import Page
 from foosim.launcher.display import Display
-from foosim.launcher.new_capture import check_capture, check_rooms, default_capture
+from foosim.launcher.hosts.port_check import check_free
+from foosim.launcher.new_capture import check_capture, check_rooms, check_texts, default_capture
 from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome
 from foosim.launcher.plan import (
     Plan,
@@ -40,9 +41,11 @@ def begin(
     `captures` is whether a capture is written; without a `capture` its path is the default.
     """
     plan = make_plan(options)
+    found = capture or default_capture(plan.deployment.world, plan.stamp)
+    check_texts(options.file, options.pki, found, runs_folder())
+    check_free([plan.address] if VHUB in places(plan.deployment) else [plan.address, plan.address.next_port()])
     check_models_here(plan)
     check_players_here(plan)
-    found = capture or default_capture(plan.deployment.world)
     path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
     look_for_room(plan, path, runs_folder(), display)
     _prepare(plan, display, None)

@@ -49,14 +49,14 @@ class Commands:
             return ["foosim-vhub", "--connect", simulation, *address, *insecure, *pki, *self._records(remote)]
         if role in self._plan.deployment.nodes:
             return ["foosim-node", "--name", role, "--connect", simulation, *pki]
-        return ["foosim-player", "--name", role, "--connect", radio, *pki]
+        return ["foosim-player", "--name", role, "--connect", radio, *self._path(remote), *pki]
 
     def _shared(self, process: Process, info: RunInfo | None, remote: Remote | None) -> list[str]:
         deployment, roles = self._plan.deployment, process.roles
         simulation, radio = self._addresses(info)
         if all(role in deployment.players for role in roles):
             words = [word for role in roles for word in ("--name", role)]
-            return ["foosim-player", *words, "--connect", radio, *self._pki(remote)]
+            return ["foosim-player", *words, "--connect", radio, *self._path(remote), *self._pki(remote)]
         command = [PROCESS, process.name]
         if SUPERVISOR in roles:
             command += ["--run", self._folder.name]
@@ -68,7 +68,12 @@ class Commands:
             command += ["--insecure"] if self._plan.options.insecure else []
         for option, declared in (("--node", set(deployment.nodes)), ("--player", set(deployment.players))):
             command += [word for role in roles if role in declared for word in (option, role)]
-        return command
+        has_players = any(role in deployment.players for role in roles)
+        return command + self._path(remote) if has_players else command
+
+    def _path(self, remote: Remote | None) -> list[str]:
+        """Return where players' modules are found, too: in the deployment's folder, which another machine has not."""
+        return ["--path", str(self._plan.options.file.parent.absolute())] if remote is None else []
 
     def _addresses(self, info: RunInfo | None) -> tuple[str, str]:
         """Return where the routers of both planes listen."""

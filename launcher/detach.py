@@ -27,7 +27,7 @@ def launcher_command(plan: Plan, capture: Path | None, run: str) -> list[str]:
 
 def detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
     """Launch a run in the background; return its folder when clients can find it. Raises Failed if it ends before."""
-    folder = create_run(plan.deployment.world, run)
+    folder = create_run(plan.deployment.world, run, plan.stamp)
     path = folder.log("up")
     process = _launch(launcher_command(plan, capture, folder.name), path)
     while True:

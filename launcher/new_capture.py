@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foosim.capture.parts import parts_at
-from foosim.common import wall_clock
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue, Refused
 from foosim.deployment.schema import Capture
 from foosim.runtime.disk import Level, Room, room_on_disk
 
@@ -17,11 +16,21 @@ class CaptureExists(Refused):
     """A capture is never overwritten."""
 
 
-def default_capture(world: str) -> Path:
-    """Return the default path of a run's capture."""
-    stem = f"{world}-{wall_clock.now_stamp()}"
+def default_capture(world: str, stamp: str) -> Path:
+    """Return the default path of a run's capture; `stamp` is the time in its name."""
+    stem = f"{world}-{stamp}"
     names = (stem if number == 1 else f"{stem}-{number}" for number in range(1, 1000))
     return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not parts_at(path))
+
+
+def check_texts(*paths: Path | None) -> None:
+    """Raise BadValue for a path that is not UTF-8: files of the run, its messages and its capture have it as a text."""
+    for path in paths:
+        text = "" if path is None else str(path.absolute())
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise BadValue("a path that is not UTF-8", text) from None
 
 
 def check_capture(path: Path, *, is_split: bool = False) -> Path:

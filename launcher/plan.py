@@ -50,6 +50,8 @@ class Plan:
     files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     processes: Mapping[str, Process] = field(default_factory=dict)
     """By name, that of the supervisor first."""
+    stamp: str = field(default="", compare=False)
+    """The time in the names of the run and of its capture."""
 
     @property
     def start(self) -> Start | None:
@@ -94,9 +96,14 @@ def check_models_here(plan: Plan) -> None:
 
 
 def check_players_here(plan: Plan) -> None:
-    """Raise DeploymentError for players' classes that cannot be loaded. Other machines have their own classes."""
-    from foosim.client.class_check import player_findings
+    """Raise DeploymentError for players' classes that cannot be loaded, here or from the deployment's folder.
 
+    Other machines have their own classes.
+    """
+    from foosim.client.class_check import player_findings
+    from foosim.client.loading import look_in
+
+    look_in(str(plan.options.file.parent.absolute()))
     deployment, elsewhere = plan.deployment, places(plan.deployment)
     findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
     if findings:
@@ -138,7 +145,8 @@ def make_plan(options: RunOptions) -> Plan:
         branch = read_branch(options.branch, deployment)
     shape = "deployed" if options.processes is None else read_at("--processes", parse_shape, options.processes)
     processes = processes_of(deployment, shape)
-    return Plan(options, text, deployment, pace, ticks, address, branch, files, processes)
+    stamp = wall_clock.now_stamp()
+    return Plan(options, text, deployment, pace, ticks, address, branch, files, processes, stamp)
 
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:

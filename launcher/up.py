@@ -87,7 +87,7 @@ class Up:
         remotes = {
             name: machines[process.roles[0]] for name, process in plan.processes.items() if process.roles[0] in machines
         }
-        self.folder: RunFolder = resumed or create_run(plan.deployment.world, run)
+        self.folder: RunFolder = resumed or create_run(plan.deployment.world, run, plan.stamp)
         self.folder.hold_launcher()
         self.folder.write_launch(launch_of(plan.options, capture))
         units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
@@ -210,6 +210,8 @@ class Up:
         if self.plan.deployment.launch_of(name) == "manual":
             is_player = name in self.plan.deployment.players
             what, where = ("player", "in a terminal of its own") if is_player else ("node", "on its machine")
+            if not is_player and self.plan.options.pki is not None:
+                command, where = [*command[:-1], "DIR"], f"{where}, DIR being the folder of its certificate there"
             self.display.say(f"waiting for {what} {name}; start it {where}: {command_line(command)}")
         else:
             self._launch(name, command)
@@ -533,7 +535,11 @@ class Up:
             has_failed = blamed.exit_code not in (None, DONE)
             how = f"{name} {blamed.ending}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
-        return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
+        reason = result["reason"]
+        is_said = child.ending in reason or child.name in self._restarts.failed
+        how = f"the log of {child.name} is" if is_said else f"{child.name} {child.ending}; its log is"
+        end = [f"    {line}" for line in child.last_lines() if not reason or reason not in line]
+        return [f"{how} {child.log}", *end]
 
     def _capture_lines(self) -> list[str]:
         """Report the capture's path, and whether it is finished, which a process that was killed did not do."""

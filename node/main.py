@@ -60,11 +60,15 @@ class NodeShell:
     def finish(self) -> int:
         """Perform the last actions; return the exit code."""
         self._watch.stop()
+        ended = self.core.ended
+        how = "leaves the run" if ended is None else f"the run has ended at tick {ended.tick}: {ended.reason}"
+        if not self.core.member.refusal:
+            self.core.actions.append(Log("info", how))
         self.role.perform()
         self._solver.close()
         if self.core.member.refusal:
             return REFUSED
-        return DONE if self.core.ended is not None else FAILED
+        return DONE if ended is not None else FAILED
 
     def leave(self) -> None:
         """Close the engines."""
@@ -83,6 +87,7 @@ class NodeShell:
         if core.member.build is not None and not self._is_present:
             self._is_present = True
             self._wire.declare_alive()
+            core.actions.append(Log("info", f"takes part in run {core.member.build.run}"))
         if self._orphan.is_over(core.deployment, now_ns) and not self.is_over():
             core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
@@ -139,6 +144,8 @@ class NodeShell:
             return
         if not is_alive:
             self.core.actions.append(Log("warning", "lost the supervisor: waits until it is back"))
+        elif self._orphan.is_alone:
+            self.core.actions.append(Log("info", "the supervisor is back"))
         self._orphan.hear(is_alive, time.monotonic_ns())
 
 

@@ -46,6 +46,12 @@ PkiOption = Annotated[
 ]
 
 
+PathOption = Annotated[
+    Path | None,
+    typer.Option("--path", help="Folder in which players' modules are found, too, after Python's own path."),
+]
+
+
 def new_app() -> typer.Typer:
     """Return a command with foosim's habits: help on no arguments, no shell completion to install, plain tracebacks."""
     return typer.Typer(

@@ -195,8 +195,11 @@ def runs_folder() -> Path:
     return platformdirs.user_state_path("foosim") / "runs"
 
 
-def create_run(world: str, name: str | None = None) -> RunFolder:
-    """Make the folder of a new run, by default named by world and time; the oldest ones that are over go."""
+def create_run(world: str, name: str | None = None, stamp: str = "") -> RunFolder:
+    """Make the folder of a new run, by default named by world and time; the oldest ones that are over go.
+
+    `stamp` is that time, by default now.
+    """
     if name is not None and not is_name(name):
         raise BadValue(f"--run: {NAME_RULE}", name)
     parent = runs_folder()
@@ -204,23 +207,22 @@ def create_run(world: str, name: str | None = None) -> RunFolder:
         return RunFolder(parent / name)  # made for us, by who waits for the run
     parent.mkdir(parents=True, exist_ok=True)
     _forget_old(parent)
-    path = _make(parent, world, name)
+    path = _make(parent, name or f"{world[:12]}-{stamp or wall_clock.now_stamp()}", is_free=name is None)
     folder = RunFolder(path)
     folder.logs.mkdir()
     folder.journals.mkdir()
     return folder
 
 
-def _make(parent: Path, world: str, name: str | None) -> Path:
-    """Make the folder itself: a name that is taken is refused when it was asked for, else it gets a number."""
-    stem = name or f"{world[:12]}-{wall_clock.now_stamp()}"
+def _make(parent: Path, stem: str, *, is_free: bool) -> Path:
+    """Make the folder itself: a name that is taken gets a number where it is free, else it is refused."""
     for number in range(1, 100):
         path = parent / (stem if number == 1 else f"{stem}-{number}")
         try:
             path.mkdir()
         except FileExistsError:
-            if name is not None:
-                raise Refused(f"there is a run {name} already, in {path}") from None
+            if not is_free:
+                raise Refused(f"there is a run {stem} already, in {path}") from None
             continue
         return path
     raise Refused(f"no free name for a run in {parent}")

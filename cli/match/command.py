@@ -16,6 +16,7 @@ import typer
 from foosim.analysis.new_file import check_absent, check_name, new_file
 from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
 from foosim.cli.run_command import with_options
+from foosim.client.loading import look_in
 from foosim.common import units
 from foosim.common.errors import BadValue, Failed, UnknownName, read_at
 from foosim.common.json_text import encode_json
@@ -107,6 +108,7 @@ def _checked(options: MatchOptions) -> Match:
         check_name("--picture", drawing, "the picture", (".svg",))
     if options.worse_for not in SIDES:
         raise UnknownName("--worse-for: not a side", options.worse_for, SIDES)
+    look_in(str(options.deployment.parent.absolute()))
     entrants = entrant("A", options.a), entrant("B", options.b)
     links = _links(options.delay, options.loss)
     text = apply_sets(read_source_file(options.deployment), name, options.sets)

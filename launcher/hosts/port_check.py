@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import errno
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
 from foosim.common.addresses import Address
+from foosim.common.errors import Failed
 
 REACH_S: Final = 3.0
 BACKLOG: Final = 64
@@ -36,6 +37,17 @@ def listen(address: Address) -> socket.socket:
         listener.close()
         raise
     return listener
+
+
+def check_free(addresses: Iterable[Address]) -> None:
+    """Raise Failed for the first address that cannot be listened on, with the remedy."""
+    for address in addresses:
+        try:
+            listen(address).close()
+        except OSError as error:
+            remedy = REMEDIES.get(error.errno or 0, "take another address")
+            what = f"cannot listen on {address}: {error.strerror}"
+            raise Failed(f"{what}; {remedy} (--listen HOST:PORT, or `listen:` in the deployment)") from None
 
 
 @contextmanager

@@ -35,7 +35,7 @@ def commands() -> list[list[str]]:
 def run(words: list[str], folder: Path) -> tuple[int, str]:
     """Run a command as it is installed here; return its exit code and all that it printed."""
     program = sys.executable if words[0] == "python" else str(Path(sys.executable).parent / words[0])
-    environment = {**os.environ, "PYTHONPATH": ".", "XDG_STATE_HOME": str(folder / "state")}
+    environment = {**os.environ, "PYTHONPATH": "", "XDG_STATE_HOME": str(folder / "state")}
     done = subprocess.run(
         [program, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )

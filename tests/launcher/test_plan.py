@@ -1,5 +1,8 @@
 """What is asked for, checked: a plan has everything that was asked for, and the child is asked for the same."""
 
+import io
+import os
+import socket
 import sys
 from pathlib import Path
 from typing import Any
@@ -7,10 +10,14 @@ from typing import Any
 import pytest
 
 from foosim.cli import supervisor
+from foosim.common import wall_clock
 from foosim.common.addresses import Address, Insecure
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, Refused
+from foosim.launcher.begin import begin
+from foosim.launcher.display import Display
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.launcher.up import Up
 from foosim.runtime.run_folder import RunFolder
 from foosim.supervisor import main as supervisor_main
 from foosim.supervisor.settings import RunSettings
@@ -75,3 +82,38 @@ def test_the_supervisors_process_makes_the_same_plan(
     plan = make_plan(options)
     assert name == "mine" and settings == plan.settings("mine") and address == plan.address
     assert pki == (None if plan.options.pki is None else plan.options.pki.absolute())
+
+
+def test_ports_that_are_taken_and_paths_that_are_no_text_are_refused_before_anything_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The port of the vHub, which listens later than the supervisor, is one of them."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+
+    def refusal(options: RunOptions, capture: Path | None = None) -> str:
+        with pytest.raises(Refused) as refused:
+            begin(options, capture, True, None, False, Display(io.StringIO()), None)
+        return str(refused.value)
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = int(taken.getsockname()[1])
+        for first in (port, port - 1):
+            said = refusal(RunOptions(TABLE, listen=f"127.0.0.1:{first}"))
+            assert said.startswith("cannot listen on tcp/127.0.0.1:") and "take another port (--listen" in said
+    name = os.fsdecode(b"caf\xe9")
+    assert "a path that is not UTF-8, '" in refusal(RunOptions(TABLE), Path(f"{name}.mcap"))
+    (tmp_path / f"{name}.yaml").write_bytes(TABLE.read_bytes())
+    assert "a path that is not UTF-8, '" in refusal(RunOptions(Path(f"{name}.yaml")))
+    assert [one.name for one in tmp_path.iterdir()] == [f"{name}.yaml"]
+
+
+def test_run_and_capture_have_the_same_time_in_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(wall_clock, "now_stamp", map("20260301-13000{}".format, range(10)).__next__)
+    up = begin(RunOptions(TABLE), None, True, None, False, Display(io.StringIO()), None)
+    assert isinstance(up, Up) and up.capture is not None
+    assert up.folder.name == up.capture.stem == "table-20260301-130000"
