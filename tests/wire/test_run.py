@@ -214,17 +214,25 @@ def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House, monk
     assert "no licence here" in out
 
 
-def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> None:
-    with socket.socket() as taken:
-        port = free_port()
-        taken.bind(("127.0.0.1", port + 1))
-        taken.listen()
-        code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, "--listen", f"127.0.0.1:{port}", each=True))
+NO_HUB = """
+import os, sys
+
+if any("foosim-vhub" in word for word in sys.orig_argv):
+    print("no licence here", file=sys.stderr, flush=True)
+    os._exit(1)
+"""
+"""What every Python reads at its start."""
+
+
+def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    (house.folder / "sitecustomize.py").write_text(NO_HUB)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, each=True))
     content = last_json(out)
     assert code == 1
     assert (content["reason"], content["failed"]) == ("lost vhub: it ended with exit code 1", True)
     assert "the run has ended: lost vhub: it ended with exit code 1\n" in err
-    assert f"cannot listen on tcp/127.0.0.1:{port + 1}: Address already in use" in err
+    assert "the log of vhub is " in err and "\n    no licence here\n" in err
 
 
 def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> None:
