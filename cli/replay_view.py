@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated, Final
@@ -66,7 +67,7 @@ def view(  # a command's options
     with reading():
         sources = open_sources(file, second, offset_ns, pki)
     options = ServeOptions(listen, certificate, key, open=open_browser)
-    serve_sources(lambda: (sources, ()), options, lambda text: print(text, flush=True))
+    serve_sources(lambda: (sources, ()), options)
 
 
 def open_sources(file: Path, second: Path | None = None, offset_ns: int = 0, pki: Path | None = None) -> list[Source]:
@@ -101,7 +102,7 @@ def _followed(played: PlayedSource, second: Path, offset_ns: int) -> list[Source
     except Refused:
         played.close()
         raise
-    print(compared_text(second, both), flush=True)
+    print(compared_text(second, both), file=sys.stderr)
     return [leader, other]
 
 

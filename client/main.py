@@ -119,10 +119,15 @@ def run_players(
             session, credentials = links[-1]
             process.add(PlayerShell(process, name, session, world, credentials))
         stop.then(process.stop)
-        try:
-            return process.run()
-        except PlayerError:  # its text is in the log
-            return FAILED
+        return run_to_end(process)
+
+
+def run_to_end(process: Process) -> int:
+    """Run a process with players; return the exit code. A player that fails has its text in the log."""
+    try:
+        return process.run()
+    except PlayerError:
+        return FAILED
 
 
 app = new_app()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -68,7 +69,7 @@ def foosim_console(  # noqa: PLR0913, PLR0917  # a command's options
     ended = partial(how_ended, open_run(name))
     live = LiveSource(name, viewing, None if view_only else operating, ended)
     sources = [live] if second is None else _followed(live, name, second, offset_ns)
-    serve_sources(lambda: (sources, ()), options, _say)
+    serve_sources(lambda: (sources, ()), options)
 
 
 def _followed(live: LiveSource, name: str, second: Path, offset_ns: int) -> list[Source]:
@@ -84,12 +85,8 @@ def _followed(live: LiveSource, name: str, second: Path, offset_ns: int) -> list
         follower, both = open_follower(second, leader, deployment, offset_ns, added=added)
     except CaptureError as error:
         raise BadValue(f"--second: {error}") from None
-    _say(compared_text(second, both))
+    print(compared_text(second, both), file=sys.stderr)
     return [leader, follower]
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
 
 
 def main() -> None:

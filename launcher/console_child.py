@@ -6,7 +6,6 @@ the run's folder, where only the owner can read them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,6 +15,7 @@ import msgspec
 from foosim.common.errors import BadValue, Failed, read_at
 from foosim.common.units import parse_offset_ns
 from foosim.launcher.children.processes import Launcher
+from foosim.launcher.display import Display
 from foosim.runtime.run_folder import UNREADABLE, RunFolder
 
 CONSOLE: Final = "console"
@@ -65,8 +65,8 @@ def page_of(console: bool, opens: bool, second: Path | None, offset: str | None,
 class ConsoleChild:
     """The console of one run."""
 
-    def __init__(self, folder: RunFolder, report: Callable[[str], None], page: Page | None) -> None:
-        self._folder, self._report, self._page = folder, report, page
+    def __init__(self, folder: RunFolder, display: Display, page: Page | None) -> None:
+        self._folder, self._display, self._page = folder, display, page
         self._launcher = Launcher(folder.name)
         self._has_addresses = self._has_ended = False
         """The addresses and the ending that were reported."""
@@ -87,7 +87,7 @@ class ConsoleChild:
         try:
             self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
         except Failed as failed:
-            self._report(f"{failed}; the run continues without it")
+            self._display.release(f"{failed}; the run continues without it")
 
     def look(self) -> None:
         """Report its addresses once they are known, and its ending."""
@@ -97,15 +97,18 @@ class ConsoleChild:
         text = "" if self._has_addresses else self._addresses()
         if text:
             self._has_addresses = True
-            self._report(text)
+            self._display.release(text)
         if child.exit_code is not None:
             self._has_ended = True
-            self._report(
+            self._display.release(
                 f"console {child.ending}, the run continues; foosim-console {self._folder.name} starts another one; "
                 f"its log is {child.log}"
             )
 
     def __enter__(self) -> ConsoleChild:
+        """Have its addresses be the first lines of the run."""
+        if self._page is not None:
+            self._display.hold()
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -277,6 +277,8 @@ class Display:
         self._live: Live | None = None
         self._shown: tuple[float, float] | None = None
         """Wall and simulated time of the last status, in s."""
+        self._held: list[str] | None = None
+        """Lines that wait for the first one."""
         self.is_live = self._console.is_terminal
         self.every_s = self.EVERY_S_LIVE if self.is_live else self.EVERY_S_PLAIN
 
@@ -287,6 +289,7 @@ class Display:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.release()
         if self._live is not None:
             self._live.stop()
             self._live = None
@@ -312,4 +315,17 @@ class Display:
 
     def say(self, line: str) -> None:
         """Show one line that stays."""
-        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+        if self._held is None:
+            self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+        else:
+            self._held.append(line)
+
+    def hold(self) -> None:
+        """Keep all lines until `release`, except in a terminal."""
+        self._held = None if self.is_live else []
+
+    def release(self, *first: str) -> None:
+        """Show the lines that were kept, after the `first` ones."""
+        held, self._held = self._held or [], None
+        for line in (*first, *held):
+            self.say(line)

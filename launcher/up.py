@@ -96,7 +96,7 @@ class Up:
         self._launcher = Launcher(self.folder.name, remotes, units)
         self._commands = Commands(plan, self.folder, capture)
         self._process_of = process_of(plan.processes)
-        self._console = ConsoleChild(self.folder, display.say, console)
+        self._console = ConsoleChild(self.folder, display, console)
         self._not_home = ""
         """Why the capture was not fetched from the machine on which it was written."""
         self._interrupts = 0
@@ -477,6 +477,7 @@ class Up:
         self._end_stalled_supervisor(supervisor)
         self._show_starved()
         if self._interrupts and not self._ending_s:
+            self.display.release()
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._ending_s = now_s
         if not self._has_ended and not self._ending_s:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from foosim.client.main import PlayerShell
+from foosim.client.main import PlayerShell, run_to_end
 from foosim.common.addresses import Address
 from foosim.launcher.journal_check import supervisor_records
 from foosim.launcher.plan import Plan
@@ -97,7 +97,7 @@ def run_roles(roles: Roles) -> int:
         if roles.vhub is None:
             add_players(None)
         stop.then(process.stop)
-        code = process.run()
+        code = run_to_end(process)
     if code == DONE and roles.supervisor is not None:
         remove_journal(roles.supervisor[1].journals, SUPERVISOR)
     return code

@@ -45,9 +45,9 @@ WRITE_BYTES: Final = 64 * 1024
 REASON_BYTES_MAX: Final = 123
 """Of a WebSocket's close frame (RFC 6455, 5.5)."""
 WRONG_TOKEN: Final = 4401
-NO_HELLO: Final = 4408
 WRONG_ORIGIN: Final = 4403
 TOO_SLOW: Final = 4408
+NO_HELLO: Final = 4409
 ENDED: Final = 4410
 TOO_MANY: Final = 4429
 GOING: Final = 1001

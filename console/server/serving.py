@@ -41,10 +41,13 @@ class ServeOptions:
     """A file for the addresses, readable by its owner only: the operator's address permits requests."""
 
 
-def serve_sources(make: MakeSources, options: ServeOptions, say: Callable[[str], None]) -> None:
-    """Serve until a signal ends it. Raises BadValue, Insecure, and Failed if the address cannot be used."""
+def serve_sources(make: MakeSources, options: ServeOptions) -> None:
+    """Serve until a signal ends it; the first line on standard output is the address.
+
+    Raises BadValue, Insecure, and Failed if the address cannot be used.
+    """
     address, tls = listening_at(options)
-    asyncio.run(_serve(make, options, address, tls, say))
+    asyncio.run(_serve(make, options, address, tls))
 
 
 def listening_at(options: ServeOptions) -> tuple[Address, ssl.SSLContext | None]:
@@ -72,7 +75,6 @@ async def _serve(
     options: ServeOptions,
     address: Address,
     tls: ssl.SSLContext | None,
-    say: Callable[[str], None],
 ) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
 
@@ -86,7 +88,7 @@ async def _serve(
     try:
         async with server.listening(address.host.strip("[]"), address.port, tls) as port:
             stem = f"{'http' if tls is None else 'https'}://{address.host}:{port}/"
-            _announce(options, stem, tokens, say)
+            _announce(options, stem, tokens)
             running = asyncio.create_task(server.run_sources())
             waiting = asyncio.create_task(ended.wait())
             await asyncio.wait((running, waiting), return_when=asyncio.FIRST_COMPLETED)
@@ -100,7 +102,7 @@ async def _serve(
         raise Failed(f"{address}: cannot be listened on, {error.strerror}") from None
 
 
-def _announce(options: ServeOptions, stem: str, tokens: Tokens, say: Callable[[str], None]) -> None:
+def _announce(options: ServeOptions, stem: str, tokens: Tokens) -> None:
     """Report the addresses of the page."""
     view = f"{stem}#view={tokens.view}"
     operate = "" if options.view_only else f"{stem}#operate={tokens.operate}"
@@ -108,7 +110,7 @@ def _announce(options: ServeOptions, stem: str, tokens: Tokens, say: Callable[[s
     if options.announce is not None:
         write_private(options.announce, encode_json({"view": view, "operate": operate, "text": text}))
         text = f"console: {stem}"  # others may read the log
-    say(text)
+    print(text, flush=True)
     if options.open:
         webbrowser.open(operate or view)
 

@@ -30,9 +30,7 @@ def test_what_is_none_is_refused(text: str) -> None:
         parse_address(text)
 
 
-@pytest.mark.parametrize(
-    ("text", "written"), [("::1", "[::1]"), ("tcp/::1", "tcp/[::1]"), ("fe80::0:1", "[fe80::1]")]
-)
+@pytest.mark.parametrize(("text", "written"), [("::1", "[::1]"), ("tcp/::1", "tcp/[::1]"), ("fe80::0:1", "[fe80::1]")])
 def test_a_bare_address_of_ipv6_is_shown_as_it_is_written(text: str, written: str) -> None:
     with pytest.raises(BadValue, match="not an address") as refused:
         parse_address(text)

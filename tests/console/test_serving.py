@@ -16,7 +16,7 @@ from foosim.common.addresses import Insecure
 from foosim.common.errors import BadValue
 from foosim.console.server import server as server_module
 from foosim.console.server.server import ConsoleServer, new_tokens
-from foosim.console.server.serving import ServeOptions, listening_at, write_private
+from foosim.console.server.serving import ServeOptions, _announce, listening_at, write_private
 from foosim.launcher.pki import certificates
 from tests.console.memory import TOKENS, Browser, MemorySource, table
 
@@ -41,6 +41,14 @@ def test_addresses_are_written_for_their_owner_alone(tmp_path: Path) -> None:
         assert path.read_bytes() == content
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("view_only", [True, False])
+def test_the_line_that_is_printed_has_the_addresses(capsys: pytest.CaptureFixture[str], view_only: bool) -> None:
+    _announce(ServeOptions(view_only=view_only), "http://127.0.0.1:1/", TOKENS)
+    view, operate = (f"http://127.0.0.1:1/#{what}" for what in (f"view={TOKENS.view}", f"operate={TOKENS.operate}"))
+    line = f"console: {view}" if view_only else f"console: {operate}, to look only: {view}"
+    assert capsys.readouterr().out == f"{line}\n"
 
 
 def test_nobody_guesses_a_token_and_each_has_its_role() -> None:

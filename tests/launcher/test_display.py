@@ -187,6 +187,20 @@ def test_a_display_that_is_no_terminal_prints_lines_with_the_speed_since_the_las
     assert not display.is_live
 
 
+def test_lines_that_were_held_follow_the_first_or_the_end() -> None:
+    stream = io.StringIO()
+    with Display(stream) as display:
+        display.hold()
+        display.say("run table-1")
+        assert stream.getvalue() == ""
+        display.release("console: http://127.0.0.1:1/")
+        display.say("2")
+        assert stream.getvalue() == "console: http://127.0.0.1:1/\nrun table-1\n2\n"
+        display.hold()
+        display.say("3")
+    assert stream.getvalue().endswith("\n2\n3\n"), "nothing is lost"
+
+
 @pytest.mark.parametrize("state", ["lost", "stopped"])
 def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: str) -> None:
     running["processes"]["blue"][state] = True

@@ -17,6 +17,7 @@ from foosim.client import control
 from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
 from foosim.launcher.children.processes import Child
 from foosim.launcher.children.restarts import WAITS_S
+from foosim.launcher.console_child import ADDRESSES, Page
 from foosim.launcher.display import Display
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
@@ -157,6 +158,59 @@ def test_the_console_ends_last_when_it_is_known_how_the_run_ended(
     outcome = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run").run()
     told = msgspec.json.decode(seen.read_bytes())
     assert told["reason"] == outcome.result["reason"] == "lost red: it ended with exit code 1"
+
+
+def test_without_a_terminal_the_address_of_the_page_comes_before_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    display = Display(said)
+    console = Up(make_plan(RunOptions(TABLE, processes="each")), None, display, "run", console=Page())._console
+    console._launcher.start("console", ["sleep", "100"], tmp_path / "log")
+    with display, console:
+        display.say("run run")
+        console.look()
+        assert said.getvalue() == ""
+        (console._folder.path / ADDRESSES).write_text('{"text": "console: http://127.0.0.1:1/"}')
+        console.look()
+        assert said.getvalue() == "console: http://127.0.0.1:1/\nrun run\n"
+
+
+def test_the_command_that_is_printed_for_another_machine_has_no_path_of_this_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither that of the certificates nor that of the deployment."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    options = RunOptions(TABLE, sets=("nodes.blue.launch=manual",), pki=tmp_path / "pki", processes="each")
+    up = Up(make_plan(options), None, Display(said), "run")
+    up._begin(up.plan.processes["blue"], RunInfo("run", "table", str(TABLE), 1, "", "tls/192.0.2.7:7400"))
+    assert said.getvalue() == (
+        "waiting for node blue; start it on its machine, DIR being the folder of its certificate there: "
+        "foosim-node --name blue --connect tls/192.0.2.7:7400 --pki DIR\n"
+    )
+
+
+def test_one_failure_is_printed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a player that fails: in the reason, not again as the end of its log."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up._has_begun = True
+    reason = "player-red failed at tick 5: ValueError: too much (own.py:4: raise)"
+    log = f"Traceback (most recent call last):\n{reason}"
+    for name, ends in ((SUPERVISOR, "true"), ("player-red", f"echo '{log}'; exit 1")):
+        up._launch(name, ["sh", "-c", ends])
+        up._launcher.children[name].process.wait()
+    up._look_for_lost(0.0)
+    for result, head in (
+        (reason, f"player-red ended with exit code 1; its log is {up.folder.log('player-red')}"),
+        ("lost player-red: it ended with exit code 1", f"the log of player-red is {up.folder.log('player-red')}"),
+    ):
+        lines = up._lost_lines({"reason": result})
+        assert lines[0] == head
+        assert [result, *lines].count(f"    {reason}") == (result != reason) and "    Traceback" in lines[1]
+    up._launcher.close()
 
 
 @pytest.mark.parametrize(

@@ -81,12 +81,15 @@ def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
         asyncio.run(look(played.address))
 
 
-def test_a_recording_follows_a_replay_on_its_plane(run: Path, tmp_path: Path) -> None:
+def test_a_recording_follows_a_replay_on_its_plane(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     csv = tmp_path / "poses.csv"
     assert replay("export", run, "--what", "poses", "-o", csv).code == 0
 
     async def look(address: str) -> None:
         one, other = open_sources(Path(address), csv, 40_000_000)
+        assert capsys.readouterr().out == "", "the first line is the address of the page"
         for source in (one, other):
             source.want(Wanted(1, 50.0))
         async with running(one) as played, running(other) as real:

@@ -60,6 +60,8 @@ SHAPES = 60
 CARRIED = """[
   document.querySelector(".chip.dragged")?.textContent, document.querySelector(".node.target")?.dataset.node,
 ]"""
+WIDER = "(one) => one.scrollWidth > one.clientWidth"
+CAUSES = "table.links td:last-child", "#panel-network .bar > span"
 NOWHERE = 2.0, 2.0
 TRIES = 50
 """What comes meanwhile may move a thing from below the pointer; that often in a row it does not."""
@@ -193,6 +195,9 @@ def cut_and_heal(page: Page) -> None:
     send(page)
     assert "partition" in page.until("document.querySelector('.drops details')?.textContent")
     page.until("document.querySelector('table.links tr[aria-selected=true]').textContent.includes('partition')")
+    for cut in CAUSES:
+        assert page.get(f"[...document.querySelectorAll({cut!r})].filter((one) => one.textContent).length")
+        assert page.get(f"[...document.querySelectorAll({cut!r})].filter({WIDER}).map((one) => one.textContent)") == []
     page.click("#heal")
     send(page)
     page.until("document.querySelector('.disturbances').textContent.includes('heal all')")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 from websockets.asyncio.client import connect
 
 from tests.console.memory import Browser
@@ -123,6 +124,10 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert house.read_until(up.stderr, "console: ").strip() == addresses["text"]
     assert addresses["operate"] not in (house.live().logs / "console.log").read_text()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("foosim.console.main.serve_sources", lambda make, options: None)
+        code, out, err = house.ask("foosim-console", "--second", "walk.csv")
+    assert (code, out, err) == (0, "", "second: walk.csv, compared by ball\n"), "the first line is the address"
     asyncio.run(look(addresses, house.kill))
     ((console, _),) = house.processes_with(f"--announce {path}").items()
     os.kill(console, signal.SIGKILL)

@@ -125,6 +125,9 @@ def test_a_player_that_raises_in_a_process_with_the_others_ends_the_run_in_order
     content = last_json(out)
     assert code == 1 and content["failed"] and content["reason"].startswith("player-red failed at tick ")
     assert "ValueError: too much" in content["reason"], err
+    (log,) = (house.folder / "state" / "foosim" / "runs").glob("*/logs/one.log")
+    told = [line for line in log.read_text().splitlines() if line.endswith(content["reason"])]
+    assert len([line for line in told if " player-red: " in line or line == content["reason"]]) == 1, told
     assert open_capture(house.folder / content["capture"]).about.finished
 
 

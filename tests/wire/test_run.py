@@ -183,11 +183,13 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
     place = f'({house.folder / "own_trips.py"}:{raised}: raise SystemExit(0) from LookupError("tripped"))'
     said, _, where = content["reason"].partition(": SystemExit: 0 ")
     assert (code, content["failed"], where) == (1, True, place), err
+    assert err.count(content["reason"]) == 1, "a failure is printed once"
     assert said.startswith("player-red failed at tick ") and content["reason"] in err
     assert "player-blue was killed by SIGKILL" in err and "restarts in 0.5 s" in err
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     log = (run / "logs" / "player-red.log").read_text()
     assert "Traceback (most recent call last):" in log and "LookupError: tripped" in log
+    assert log.count(content["reason"]) == 1
     assert verify_capture(house.folder / content["capture"]).equal
 
 
@@ -212,17 +214,25 @@ def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House, monk
     assert "no licence here" in out
 
 
-def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> None:
-    with socket.socket() as taken:
-        port = free_port()
-        taken.bind(("127.0.0.1", port + 1))
-        taken.listen()
-        code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, "--listen", f"127.0.0.1:{port}", each=True))
+NO_HUB = """
+import os, sys
+
+if any("foosim-vhub" in word for word in sys.orig_argv):
+    print("no licence here", file=sys.stderr, flush=True)
+    os._exit(1)
+"""
+"""What every Python reads at its start."""
+
+
+def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    (house.folder / "sitecustomize.py").write_text(NO_HUB)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    code, out, err = house.end(house.up("--json", *NO_CAPTURE_TO_CLOSE, each=True))
     content = last_json(out)
     assert code == 1
     assert (content["reason"], content["failed"]) == ("lost vhub: it ended with exit code 1", True)
     assert "the run has ended: lost vhub: it ended with exit code 1\n" in err
-    assert f"cannot listen on tcp/127.0.0.1:{port + 1}: Address already in use" in err
+    assert "the log of vhub is " in err and "\n    no licence here\n" in err
 
 
 def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> None:
@@ -408,14 +418,17 @@ def test_a_run_waits_for_what_is_started_by_hand_and_ends_in_order_when_a_requir
     blue = house.start(*command)
     house.ticking(5)
     house.kill("red")
-    for ours in (blue, player):
-        code, _, err = house.end(ours)
-        assert code == 0, err
+    code, _, err = house.end(player)
+    assert code == 0, err
+    code, _, log = house.end(blue)
+    assert code == 0, log
     code, out, err = house.end(up)
     assert code == 1 and f"the run has ended: lost red: {CLOSED}" in err, err
     content = last_json(out)
     assert content["reason"].startswith(f"lost red: {CLOSED}")
     assert content["failed"]
+    for line in (f"takes part in run {content['run']}\n", f"the run has ended at tick {content['ticks']}: lost red: "):
+        assert f" INFO    blue: {line}" in log, "a node that was started by hand says what it does"
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     journals = {path.name for path in (run / "journals").iterdir()}
     assert journals >= {"supervisor-000001.journal", "vhub-000001.journal"}

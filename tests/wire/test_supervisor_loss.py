@@ -62,6 +62,9 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
     back = [entry for entry in content["recoveries"] if entry["what"] == "supervisor"]
     assert len(back) == 3 and all(entry["outage_ms"] > 0 for entry in back)
     assert err.count("the supervisor was started again") == 3
+    (log,) = (house.folder / "state" / "foosim" / "runs").glob("*/logs/red.log")
+    told = [log.read_text().count(text) for text in ("lost the supervisor: waits", "the supervisor is back")]
+    assert told == [3, 3]
     assert content["reason"] == "stopped" and content["moves"] == 1
     assert open_capture(house.folder / content["capture"]).about.finished
     assert house.processes_with(str(house.folder)) == {}

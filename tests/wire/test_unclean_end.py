@@ -70,7 +70,7 @@ def test_a_run_whose_capture_gets_full_ends_with_all_of_it_captured(
     code, out, err = house.end(house.up(*arguments, "--set", "capture.reserve=256 KiB", players=True))
     content = last_json(out)
     assert code == 1 and content["failed"], err
-    assert content["reason"].startswith(f"lost the capture: {path}: 0.") and "left on its disk" in content["reason"]
+    assert content["reason"].startswith(f"lost the capture: {path}: ") and "KiB left on its disk" in content["reason"]
     recording = content["recording"]
     assert recording["state"] == "full" and recording["refused"] == 0
     assert recording["offered"] == recording["written"] > 0

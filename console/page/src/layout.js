@@ -103,7 +103,7 @@ export class Layout {
       splitter.setAttribute("aria-valuenow", String(width));
       return width;
     };
-    let width = set(this.memory.get("panel", Math.min(480, window.innerWidth * 0.42)));
+    let width = set(this.memory.get("panel", Math.min(520, window.innerWidth * 0.42)));
     const keep = (/** @type {number} */ px) => this.memory.set("panel", (width = set(px)));
     splitter.addEventListener("pointerdown", (event) => splitter.setPointerCapture(event.pointerId));
     splitter.addEventListener("pointermove", (event) => {

@@ -23,7 +23,7 @@ export class Log {
   invitation() {
     const source = this.store.main;
     const tries = [
-      source?.may("push") && "push the body that is selected (World)",
+      source?.may("push") && "push the selected body (World)",
       source?.may("add") && "add an entity (World)",
       source?.may("network") && "cut a link (Network, Partition)",
     ].filter(Boolean);
