@@ -23,7 +23,7 @@ from foosim.replay.verify import verify_capture
 from foosim.runtime.journal import journal_files, read_records
 from foosim.runtime.run_folder import RunFolder, open_run
 from tests.wire.conftest import LONG, SLOW
-from tests.wire.test_run import last_json
+from tests.wire.test_run import NO_HUB, last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -115,7 +115,9 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     shutil.copytree(house.folder / "whole", folder.journals)
 
 
-def test_a_run_that_does_not_come_up_says_why(house: House) -> None:
-    wrong = ("--set", "nodes.red.launch=manual", "--listen", "203.0.113.1:7400", "--insecure")
-    code, _, err = house.run("foosim-supervisor", "up", house.table, *BARE, *wrong, "--detach", "--run", "lame")
-    assert code == 1 and "run lame has ended with exit code" in err and "203.0.113.1" in err
+def test_a_run_that_does_not_come_up_says_why(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    (house.folder / "sitecustomize.py").write_text(NO_HUB)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    alone = ("--processes", "each", "--detach", "--run", "lame")
+    code, _, err = house.run("foosim-supervisor", "up", house.table, *BARE, *alone)
+    assert code == 1 and "run lame has ended with exit code" in err and "no licence here" in err
