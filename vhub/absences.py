@@ -20,7 +20,8 @@ class Absences:
 
     def __init__(self) -> None:
         self._away: dict[str, tuple[str, str, int]] = {}
-        """By player: the boot of its process, empty where it is not known, the reason, and the tick that was closed next at its disconnect."""
+        """By player: the boot of its process, empty where that is not known, reason, and the tick that was closed next
+        at its disconnect."""
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False
