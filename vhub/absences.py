@@ -60,10 +60,12 @@ class Absences:
                 self._note("player", name, reason, tick)
 
     def leave(self, name: str, tick: int) -> None:
-        """End an absence without a return: the run continues without the player from `tick` on, which is journalled."""
+        """End an absence without a return: the run continues without the player from `tick` on, which is journalled.
+
+        Whether its process is lost, or will return with its memory, is not known."""
         if name in self._away:
             _, reason, _ = self._away.pop(name)
-            self._note("player", name, f"{reason}; the run goes on without it", tick)
+            self._note("away", name, reason, tick)
 
     def come_back(self, name: str, tick: int) -> None:
         """Add the return of a player that had left; it takes part from `tick` on, which is journalled."""
