@@ -278,8 +278,10 @@ class EpochRow(Row, frozen=True):
 class RecoveryRow(Row, frozen=True):
     """A process that was lost or came behind frame `tick`, and the `epoch` that is the first without or with it.
 
-    `what` is `node` (a node was lost), `join` (one came), `supervisor` (it was started again) or `vhub` (it was lost,
-    and is back). `wall_outage_ns` is the wall time without a commit, by the supervisor's clock.
+    `what` is `node` (a node was lost), `join` (one came), `supervisor` (it was started again), `vhub` (it was lost,
+    and is back), `player` (a new process continues for one that was lost), `away` (the run continues without a player
+    whose connection closed) or `return` (it takes part again). `wall_outage_ns` is the wall time without a commit, by
+    the supervisor's clock.
     """
 
     what: str

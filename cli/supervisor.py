@@ -6,10 +6,9 @@ Each imports what it calls, so `--help` and the commands that need little start 
 
 from __future__ import annotations
 
-import signal
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -21,6 +20,7 @@ from foosim.cli.run_command import with_options
 from foosim.common.errors import BadValue, Failed, Refused, read_at
 from foosim.launcher.run_options import RunOptions
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.early_signals import interrupting_signals, raise_noted
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.usage import BadUsage
 
@@ -86,9 +86,10 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 
     --resume continues a run whose launcher died, from its last committed frame and with its options.
     """
-    context.with_resource(_interrupting_signals())
+    context.with_resource(interrupting_signals())
     begun: Up | Outcome | None = None
     try:
+        raise_noted()
         from foosim.launcher.begin import begin, go_on
         from foosim.launcher.console_child import page_of
         from foosim.launcher.display import Display, unfailing_output
@@ -126,31 +127,17 @@ class BeforeRun(Failed):
     """A signal has ended `up` before its run began."""
 
 
-@contextmanager
-def _interrupting_signals() -> Iterator[None]:
-    """Raise KeyboardInterrupt at each Ctrl-C, SIGTERM or SIGHUP until the run handles them."""
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt(f"{signal.Signals(number).name} ended foosim-supervisor up before the run began")
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, interrupt) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _print_unended(
     error: BaseException, begun: Up | Outcome | None, resumed: str | None, run: str | None, json: bool
 ) -> None:
     """Print the result of a run that an error has ended. Raises BeforeRun where that was a signal."""
-    from foosim.launcher.outcome import refused_result
-    from foosim.launcher.up import Up
+    from foosim.launcher.outcome import Outcome, refused_result
 
     reason = "too little memory" if isinstance(error, MemoryError) else str(error)
-    result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
+    if begun is None or isinstance(begun, Outcome):
+        result = refused_result(resumed, run, reason)
+    else:
+        result = begun.unended(reason)
     _print_result(result, json)
     if isinstance(error, KeyboardInterrupt):
         raise BeforeRun(reason) from None

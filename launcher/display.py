@@ -66,6 +66,7 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "supervisor": "the supervisor was started again",
         "vhub": f"lost the vHub ({entry['reason']})",
         "player": f"lost {name} ({entry['reason']})",
+        "away": f"continues without {name} ({entry['reason']})",
         "return": f"{name} takes part again",
     }
     what = texts[entry["what"]]

@@ -5,11 +5,14 @@ Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused, 130 for a secon
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import gc
+import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NoReturn
 
 import typer
 
@@ -75,20 +78,33 @@ def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadU
     if gc.get_freeze_count() == 0:
         gc.freeze()
     try:
-        sys.exit(_run(app, name, words))
+        code = _run(app, name, words)
     except BadUsage as problem:
         if refusing is not None:
             refusing(words, problem)
         print(str(problem), file=sys.stderr)
-        sys.exit(problem.exit_code)
+        code = problem.exit_code
     except Refused as refused:
         print(str(refused), file=sys.stderr)
-        sys.exit(refused.exit_code)
+        code = refused.exit_code
     except MemoryError:
         print(f"{name}: too little memory (MemoryError)", file=sys.stderr)
-        sys.exit(FAILED)
+        code = FAILED
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        code = INTERRUPTED
+    _end(code)
+
+
+def _end(code: int) -> NoReturn:
+    """End the process, also where a thread is inside Zenoh still, which would abort it at Python's own end."""
+    session = sys.modules.get("foosim.runtime.transport.session")  # many commands end without it
+    if session is not None and not session.end_all():
+        atexit._run_exitfuncs()  # a terminal gets its settings back, among others
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:

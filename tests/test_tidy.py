@@ -128,6 +128,7 @@ SHELLS = {
     "cli/replay_whatif.py",
     "replay/verify.py",
     "runtime/children.py",
+    "runtime/early_signals.py",
     "cli/supervisor.py",
     "launcher/console_child.py",
     "client/control.py",

@@ -20,7 +20,8 @@ class Absences:
 
     def __init__(self) -> None:
         self._away: dict[str, tuple[str, str, int]] = {}
-        """By player: the boot of its process, the reason, and the tick that was closed next at its disconnect."""
+        """By player: the boot of its process, empty where that is not known, reason, and the tick that was closed next
+        at its disconnect."""
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False
@@ -47,28 +48,24 @@ class Absences:
         self._away.setdefault(name, (boot, reason, tick))
         self.is_new = True
 
-    def end(self, name: str, boot: str) -> None:
-        """End an absence with the player's return. The same `boot` means that only its connection was cut: no entry."""
+    def end(self, name: str, boot: str, returns: int) -> None:
+        """End an absence with the player's return: no entry where only its connection was cut, and it has its memory.
+
+        That is so where the same process returns; where it is not known which was away, one that had lost a vHub.
+        """
         if name in self._away:
             before, reason, tick = self._away.pop(name)
             self.is_new = True
-            if before != boot:
+            if before != boot and (before or not returns):
                 self._note("player", name, reason, tick)
 
-    def deny(self, name: str) -> None:
-        """Cancel the absence of a player that a late hello of another process had wrongly reported."""
-        self._away.pop(name)
-        self.is_new = True
-
-    def is_away(self, name: str) -> bool:
-        """Whether a player is away."""
-        return name in self._away
-
     def leave(self, name: str, tick: int) -> None:
-        """End an absence without a return: the run continues without the player from `tick` on, which is journalled."""
+        """End an absence without a return: the run continues without the player from `tick` on, which is journalled.
+
+        Whether its process is lost, or will return with its memory, is not known."""
         if name in self._away:
             _, reason, _ = self._away.pop(name)
-            self._note("player", name, f"{reason}; the run goes on without it", tick)
+            self._note("away", name, reason, tick)
 
     def come_back(self, name: str, tick: int) -> None:
         """Add the return of a player that had left; it takes part from `tick` on, which is journalled."""

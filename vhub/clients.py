@@ -140,7 +140,6 @@ class Clients:
             self.repeated += 1
             return
         if session is not None and not session.boot and not hello.returns and known is not None and known.active:
-            session.is_missed = not self.absences.is_away(hello.name)
             self._miss(hello.name, "", LOST_MEANWHILE)
         self._sessions.hello(hello, build, self._deployment, self._state, self._said(hello.name))
 
@@ -159,8 +158,7 @@ class Clients:
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         _check_timing(join)
         self._sessions.catch_up(session, self.waits_for(join.name), now_ns)
-        self.absences.end(join.name, join.boot)
-        session.is_missed = False
+        self.absences.end(join.name, join.boot, session.returns)
         self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -232,9 +230,7 @@ class Clients:
         if not self._sessions.take_over(join, self._state.deployment, self._state, self._said(join.name)):
             return None
         known = self._state.members.get(join.name)
-        if session.returns and session.is_missed and self.absences.is_away(join.name):
-            self.absences.deny(join.name)
-        elif not session.returns and known is not None and known.active:
+        if not session.returns and known is not None and known.active:
             self._miss(join.name, "", LOST_MEANWHILE)
         return session
 
@@ -274,7 +270,7 @@ class Clients:
         if self._is_waited_for(name):
             session.why_gone = session.closed(now_ns)
             session.leave(self._back_ns(name), now_ns)
-            self._miss(name, session.boot, session.why_gone)
+            self._miss(name, session.boot if session.is_present else "", session.why_gone)
             return
         self._leave(name)
 

@@ -73,8 +73,6 @@ class Session:
     """How often its process had lost the vHub, by its last hello."""
     before: dict[str, None] = field(default_factory=dict)
     """Boots of the last processes that have ended: their late messages are dropped."""
-    is_missed: bool = False
-    """Whether its hello showed that the process before it was lost while the vHub was down."""
     claims: dict[str, Claim] = field(default_factory=dict)
     """The last processes that were welcomed to the name and may still run, by boot."""
     away_ns: int = -1

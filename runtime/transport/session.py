@@ -98,7 +98,7 @@ class _Attempt:
         """Return the session, or None as soon as `give_up` says so. Raises ZError when there is none."""
         if give_up():
             return None
-        threading.Thread(target=self._connect, name="connect", daemon=True).start()
+        _start_inside(self._connect, "connect")
         try:
             while True:
                 with contextlib.suppress(queue.Empty):
@@ -311,8 +311,7 @@ class Session:
         self._closed = True
         for inbox in self._inboxes:
             inbox.detach()
-        closer = threading.Thread(target=self._close, name="close", daemon=True)
-        closer.start()
+        closer = _start_inside(self._close, "close")
         closer.join(CLOSE_S)
         return not closer.is_alive()
 
@@ -345,6 +344,7 @@ class Session:
 
 
 _sessions: weakref.WeakSet[Session] = weakref.WeakSet()
+_inside: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 
 
 class _Receiver:
@@ -516,8 +516,24 @@ def _locators(session: zenoh.Session) -> list[str]:
     return []
 
 
+def _start_inside(target: Callable[[], None], name: str) -> threading.Thread:
+    """Start a thread whose call of Zenoh may last longer than the process."""
+    thread = threading.Thread(target=target, name=name, daemon=True)
+    _inside.add(thread)
+    thread.start()
+    return thread
+
+
+def end_all() -> bool:
+    """Close all sessions; False when a thread is inside Zenoh still: a process ends by `os._exit` then.
+
+    A thread that Python ends inside Zenoh, as it does at exit, aborts the process.
+    """
+    _close_all()
+    return not any(thread.is_alive() for thread in _inside)
+
+
 def _close_all() -> None:
-    """Close open sessions. A thread that Python ends inside Zenoh, as it does at exit, aborts the process."""
     for session in list(_sessions):
         if session.pid == os.getpid():
             session.close()

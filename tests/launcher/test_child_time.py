@@ -1,4 +1,4 @@
-"""The clock of a child, on observations that were recorded from real processes, and what reads them."""
+"""The clock of a child, on observations such as real processes give, and what reads them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ STARVED: Final = (
     *((0.0, 0.02), (0.2, 0.03), (0.4, 0.04), (0.6, 0.04), (0.8, 0.05), (1.0, 0.06), (1.2, 0.07), (1.4, 0.08)),
     *((1.6, 0.08), (1.8, 0.09)),
 )
-"""A busy loop under a quota of 4 % of a core: time, and processor time, in s."""
+"""Such as of a busy loop under a quota of 4 % of a core: time, and processor time, in s."""
 BUSY: Final = ((0.0, 1.31), (1.0, 2.30), (2.0, 3.30), (3.0, 4.29), (4.0, 5.28))
-"""The same loop with a core of its own."""
+"""The same loop with a core of its own: not recorded, each second has the processor time of about a second."""
 
 
 def passed(*looks: tuple[float, Observed | None]) -> float:

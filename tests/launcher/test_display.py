@@ -219,6 +219,10 @@ def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: 
             {"what": "join", "name": "blue", "reason": "back", "outage_ms": None, "tick": 9, "epoch": 3},
             "tick 9: node blue takes part, epoch 3",
         ),
+        (
+            {"what": "away", "name": "r", "reason": "its connection closed", "outage_ms": None, "tick": 9, "epoch": 3},
+            "tick 9: continues without r (its connection closed), epoch 3",
+        ),
     ],
 )
 def test_losses_and_returns_are_lines(entry: dict[str, Any], text: str) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -288,6 +290,29 @@ def test_a_signal_while_up_imports_leaves_a_result(
     assert content["reason"] == f"{number.name} ended foosim-supervisor up before the run began"
     assert (done.code, done.err, content["failed"]) == (FAILED, f"{content['reason']}\n", True)
     assert signal.getsignal(number) is before
+
+
+AMID_AN_IMPORT = """
+import signal, sys
+
+class Signals:
+    def find_spec(self, name, path, target=None):
+        if name == sys.argv[-1]:
+            signal.raise_signal(signal.SIGTERM)
+
+sys.meta_path.insert(0, Signals())
+from foosim.cli import foosim_supervisor
+foosim_supervisor()
+"""
+
+
+@pytest.mark.parametrize("module", ["typer", "foosim.launcher.begin"])
+def test_a_signal_while_the_command_itself_is_imported_leaves_a_result(module: str) -> None:
+    words = "up", str(TABLE), "--no-capture", "--json", "--run", module
+    done = subprocess.run([sys.executable, "-c", AMID_AN_IMPORT, *words], capture_output=True, text=True, check=False)
+    content = msgspec.json.decode(done.stdout.splitlines()[-1])
+    reason = "SIGTERM ended foosim-supervisor up before the run began"
+    assert (done.returncode, done.stderr, content["reason"], content["run"]) == (FAILED, f"{reason}\n", reason, module)
 
 
 def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_that_is_done(run: Run, left: Left) -> None:

@@ -129,8 +129,8 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
     assert 100 <= left[0] <= 105 and left[0] < back[0]
     assert sets or left[0] % 5 == back[0] % 5 == 0
     lost, came = run.json["recoveries"]
-    assert lost["reason"] == "its connection closed; the run goes on without it"
-    assert (lost["what"], lost["tick"], came["what"], came["tick"]) == ("player", left[0], "return", back[0])
+    assert lost["reason"] == "its connection closed"
+    assert (lost["what"], lost["tick"], came["what"], came["tick"]) == ("away", left[0], "return", back[0])
     assert lost["outage_ms"] == pytest.approx(200, abs=15), "deadlines.client_back, whenever that is told"
     assert came["outage_ms"] < 15
     found = [decode_any(HubRecord, raw) for raw in run.records]
@@ -184,8 +184,8 @@ def test_a_line_of_the_account_outlives_the_vhub_that_was_to_tell_it(tmp_path: P
     )
     assert len(again) == 1
     (_, *events) = run.comings()
-    on = "; the run goes on without it" if pace == "realtime" else ""
-    assert (lost["what"], lost["name"], lost["reason"]) == ("player", RED, f"its connection closed{on}")
+    on = pace == "realtime"
+    assert (lost["what"], lost["name"], lost["reason"]) == ("away" if on else "player", RED, "its connection closed")
     assert [(entry["what"], entry["name"]) for entry in came] == ([("return", RED)] if on else [])
     assert [entry["tick"] for entry in (lost, *came)] == ([tick for tick, _ in events] if on else [lost["tick"]])
 

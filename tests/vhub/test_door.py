@@ -210,6 +210,22 @@ def test_the_account_tells_of_the_process_that_joins(
     assert (report["away"], len(report["over"])) == ([], entries)
 
 
+@pytest.mark.parametrize(("living", "entries"), [(("one", 2), 0), (("two", 0), 1)])
+@pytest.mark.parametrize("said", [None, ("one", 1), ("dead", 0)], ids=["nothing", "its hello", "a late hello"])
+def test_a_player_that_only_loses_its_connection_again_is_not_lost(
+    said: tuple[str, int] | None, living: tuple[str, int], entries: int
+) -> None:
+    """The connection to a vHub that was started again closes before the player joins."""
+    hub = restarted(playing())
+    if said is not None:
+        hello(hub, RED, *said)
+    hub.core.client_gone(RED, 0)
+    assert len(hello(hub, RED, *living)) == 1
+    assert join(hub, RED, living[0]) == []
+    report = hub.core.clients.absences.report()
+    assert (report["away"], len(report["over"])) == ([], entries)
+
+
 def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None:
     """It may be of a dead one, whose numbers the living one would not know of."""
     hub = restarted(playing())

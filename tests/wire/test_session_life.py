@@ -159,6 +159,58 @@ def test_a_process_that_forgets_to_close_ends_with_its_own_code(router: Session,
     assert (done.returncode, done.stderr) == (code, "")
 
 
+CLOSE_AT_A_STANDSTILL = """
+import atexit, os, signal, sys, time, typer
+from foosim.runtime.command import new_app, run_app
+from foosim.runtime.transport import session as sessions
+
+app = new_app()
+
+@app.command()
+def main(address: str, router: int, way: str) -> None:
+    atexit.register(print, "at exit")
+    session = sessions.Session.client(address, 900.0)
+    os.kill(router, signal.SIGSTOP)
+    sessions.CLOSE_S = 0.0
+    if way == "closes":
+        assert not session.close()
+    else:
+        asked = iter([False, True])
+        try:
+            sessions.Session.client(address, 900.0, give_up=lambda: next(asked))
+        except sessions.ConnectError:
+            pass
+    raise typer.Exit(5)
+
+class Lingering:
+    def __del__(self, sleep=time.sleep):
+        sleep(0.8)  # the interpreter is ending: a thread that returns to it from Zenoh now aborts the process
+
+sys.modules["lingering"] = Lingering()
+run_app(app, "main")
+"""
+STANDS_STILL = """
+import os, sys
+from foosim.runtime.transport.session import Session
+with Session.router("tcp/127.0.0.1:0") as session:
+    print(session.locator, os.getpid(), flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("way", ["closes", "gives up"])
+def test_a_command_whose_router_stands_still_ends_with_its_own_code(way: str) -> None:
+    """A thread of it is inside Zenoh still, which aborts a process that Python ends."""
+    command = [sys.executable, "-c", STANDS_STILL]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as router:
+        assert router.stdout is not None
+        try:
+            done = run_python(CLOSE_AT_A_STANDSTILL, *router.stdout.readline().split(), way)
+        finally:
+            router.kill()
+    assert (done.returncode, done.stdout, done.stderr) == (5, "at exit\n", "")
+
+
 FORK = """
 import os, sys
 from foosim.runtime.transport.inbox import Inbox

@@ -20,6 +20,7 @@ export function recoveryText(entry) {
     supervisor: "the supervisor was started again",
     vhub: `lost the vHub (${entry.reason})`,
     player: `lost ${entry.name} (${entry.reason})`,
+    away: `continues without ${entry.name} (${entry.reason})`,
     return: `${entry.name} takes part again`,
   });
   const after = entry.outage_ms === null ? "" : `, went on after ${number(entry.outage_ms, 2)} ms`;
