@@ -202,35 +202,47 @@ _COMMAND_FIELDS: Final = (
 )
 
 
-def _command_units(deployment: Deployment) -> dict[str, str]:
-    """Return the numbers of all commands of a deployment's robots, in the order of their kinds, with their units."""
+def _value_columns(deployment: Deployment) -> dict[str, Column]:
+    """Return the columns of the fields of all commands of a deployment's robots, in the order of their kinds.
+
+    Of what is not one number the value is JSON. A field that is called as a column of packets begins with `command_`.
+    """
     kinds = {settings.kind for robot in deployment.robots.values() for settings in robot.actuators.values()}
-    fields = [field for kind in sorted(kinds) for field in codec_of(kind, "actuator").fields]
-    return {field.name: field.unit for field in fields if field.is_number}
+    found: dict[str, Column] = {}
+    for field in (field for kind in sorted(kinds) for field in codec_of(kind, "actuator").fields):
+        name = f"command_{field.name}" if field.name in _COMMAND_FIELDS else field.name
+        column = Column(name, "number" if field.is_number else "json", field.unit)
+        known = found.get(field.name, column)
+        is_number, unit = known.kind == column.kind == "number", known.unit if known.unit == column.unit else ""
+        found[field.name] = Column(name, "number" if is_number else "json", unit)
+    return found
 
 
 def _command_columns(deployment: Deployment) -> tuple[Column, ...]:
     known = {column.name: column for column in _columns(PacketRow)}
-    numbers = (Column(name, "number", unit) for name, unit in _command_units(deployment).items())
-    return (*(known[name] for name in _COMMAND_FIELDS), *numbers)
+    return (*(known[name] for name in _COMMAND_FIELDS), *_value_columns(deployment).values())
 
 
 class _Commands(_Decoded):
-    """Packets to robots on the channels that move them, with their numbers; a number that a robot has not is empty."""
+    """Packets to robots on the channels that move them, with their values; a field that a robot has not is empty."""
 
     _decoder = msgspec.json.Decoder(PacketRow)
     _fields = attrgetter(*_COMMAND_FIELDS)
 
     def __init__(self, deployment: Deployment) -> None:
         super().__init__(deployment)
-        self._numbers = tuple(_command_units(deployment))
+        self._columns = _value_columns(deployment)
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
         robot = self._deployment.robots.get(row.destination)
         if robot is not None and row.channel in robot.actuators:
-            numbers = self.numbers(self.codec(row.destination, row.channel), row.payload)
-            yield (*self._fields(row), *(numbers.get(name) for name in self._numbers))
+            values = self.numbers(self.codec(row.destination, row.channel), row.payload)
+            yield (*self._fields(row), *(_cell(column, values.get(name)) for name, column in self._columns.items()))
+
+
+def _cell(column: Column, value: Any) -> Any:
+    return value if value is None or column.kind == "number" else encode_json(msgspec.to_builtins(value)).decode()
 
 
 # --- poses -----------------------------------------------------------------------------------------------------------

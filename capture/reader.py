@@ -169,6 +169,8 @@ class Scan:
                 yield content
             else:
                 self._take(content)
+        if not checked and not file.finished:
+            self._check_cut(file)
         self._check(file)
         self.about.library = file.library
         self.about.finished = file.finished and NEXT not in self.about.end
@@ -196,6 +198,12 @@ class Scan:
             raise CaptureError(f"{self._path}: the capture has no deployment")
         if not file.is_checked:
             raise CaptureError(f"{self._path}: the capture lacks its metadata {CHECKS!r}")
+
+    def _check_cut(self, file: Joined) -> None:
+        """Refuse a file without rows that ends amid what describes it."""
+        is_described = file.is_checked and self.about.metadata and self.about.deployment_text
+        if file.profile in ("", PROFILE) and not is_described:
+            raise CaptureError(f"{self._path}: the capture is cut off before its first row")
 
     def _check_format(self, found: str) -> None:
         self.about.earlier = found in EARLIER_FORMATS

@@ -68,7 +68,7 @@ def foosim_rehearse(
     tick and the capture's path. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
     With --swarm the seed draws 3 to 5 nodes, their clocks, delay, loss and duplication of messages, and 8 to 20 faults
-    of at least three kinds in 208 ticks on the pure engine; --for simulates longer, with more faults. Faults are:
+    of at least three kinds in 208 ticks, on the pure engine if it has the bodies; --for simulates longer, with more faults. Faults are:
     killed, interrupted, paused, slow and stopped processes; partitions in one or both directions and clogs; jumps of
     memory and clocks; old messages; lost players (every eighth seed); moved robots; added, removed and pushed bodies;
     pauses of the run. Every record, message and committed tick is checked against the laws. At the end all faults
@@ -158,7 +158,7 @@ def _told(result: dict[str, Any]) -> str:
 def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
     """Rehearse under the faults of some seeds; return the exit code."""
     file, duration, first = options.file, options.duration, 1 if options.seed is None else options.seed
-    text = apply_sets(read_source_file(file), str(file), ())
+    text, files = pin_assets(apply_sets(read_source_file(file), str(file), ()), str(file), file.parent)
     ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration)).ticks
     if ticks < TICKS:
         raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
@@ -166,7 +166,7 @@ def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
     flown: list[Flown] = []
     told_s = time.monotonic()
     seeds = range(first, first + count)
-    with closing(fly_seeds(text, str(file), seeds, ticks, min(jobs, count))) as flights:
+    with closing(fly_seeds(text, str(file), seeds, ticks, min(jobs, count), tuple(files.items()))) as flights:
         try:
             for flight in flights:
                 flown.append(flight)

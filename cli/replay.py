@@ -15,9 +15,10 @@ import typer
 from foosim.capture.damage import Damage, damage_of
 from foosim.capture.info import CaptureInfo, capture_info
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.parts import FAILED_RUN, NEXT
+from foosim.capture.parts import FAILED_RUN, NEXT, whole_path
+from foosim.capture.reader import read_about
 from foosim.cli import replay_export, replay_play, replay_report, replay_view, replay_whatif
-from foosim.cli.options import Capture, Json, reading
+from foosim.cli.options import BadCapture, Capture, Json, reading
 from foosim.common import limits
 from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
@@ -33,7 +34,8 @@ app = new_app()
 def foosim_replay(version: VersionOption = False) -> None:
     """Look into a capture, play it, compare it, take parts of it, and simulate it again.
 
-    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one), 3 refused, or recovered with loss.
+    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one), 3 refused, or recovered with loss,
+    4 equal up to where an unfinished capture ends.
     """
 
 
@@ -106,8 +108,13 @@ def verify(
     Prints the first tick and the entities that differ. Any number of nodes gives the same result. A difference is
     explained on standard error when the capture's nodes had another arithmetic than this machine.
 
+    An unfinished capture, cut off or still being written, is compared up to its last whole tick, which is printed.
+
     A cut, and a later file of a split capture, is refused, since the ticks before its first frame are missing. With
     --from-first-frame the ticks after that frame are verified.
+
+    Exit codes: 0 equal, 1 a tick differs or is missing, 2 bad input (no capture, a damaged one), 4 equal up to where an
+    unfinished capture ends.
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
@@ -120,12 +127,13 @@ def verify(
             "they compute different worlds",
             err=True,
         )
-    raise typer.Exit(DONE if found.equal else FAILED)
+    raise typer.Exit(FAILED if not found.equal else DONE if found.finished else UNFINISHED)
 
 
 def _as_json(found: Verified) -> dict[str, Any]:
     return {
         "equal": found.equal,
+        "finished": found.finished,
         "first_tick": found.first_tick,
         "ticks": found.ticks,
         "nodes": found.nodes,
@@ -141,7 +149,8 @@ def _verdict(found: Verified) -> str:
     if found.equal:
         count = found.ticks - found.first_tick
         since = f" behind frame {found.first_tick}" if found.first_tick else ""
-        return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}"
+        end = "" if found.finished else f"; the capture is unfinished, it ends at tick {found.ticks}"
+        return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}{end}"
     if found.missing_tick >= 0:
         return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
@@ -166,7 +175,8 @@ def recover(
     unfinished. For a finished but damaged capture the damage and the undamaged ticks are printed.
 
     Exit codes: 0 everything that was recorded is in the new capture, or CAPTURE is finished, 1 CAPTURE is damaged or
-    cannot be recovered, 3 ticks that were in no journal are missing in the new capture.
+    cannot be recovered, 2 CAPTURE is no capture, or is cut off before its first row, 3 ticks that were in no journal
+    are missing in the new capture.
     """
     try:
         found = recover_capture(capture, journals, out)
@@ -174,7 +184,7 @@ def recover(
     except (CaptureError, JournalError) as error:
         damage = _damage_of(capture)
         if damage is None:
-            raise Failed(str(error)) from None
+            raise (Failed if _is_capture(capture) else BadCapture)(str(error)) from None
     if damage is not None:
         if json:
             content = {"finished_before": True, "whole": False, **msgspec.to_builtins(damage), "problem": str(damage)}
@@ -205,7 +215,18 @@ def _damage_of(capture: Path) -> Damage | None:
         return None
 
 
+def _is_capture(path: Path) -> bool:
+    try:
+        read_about(whole_path(path))
+    except CaptureError:
+        return False
+    return True
+
+
 WITH_LOSS: Final = 3
+"""Exit code of `recover`."""
+UNFINISHED: Final = 4
+"""Exit code of `verify`."""
 
 _COMMANDS: Final = (
     *(replay_play.play, replay_play.control),

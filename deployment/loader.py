@@ -56,7 +56,7 @@ from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine
+from foosim.world.forms.forms import Engine, Model
 from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
@@ -311,12 +311,18 @@ def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
     assert isinstance(engine, Engine), engine
     if engine.islands:
         return
+    for name, model in rigid_bodies(deployment):
+        what = f"the engine has no rigid bodies such as {name}, a {model.name} (bullet has bodies of any kind)"
+        yield Finding(("engine",), what, engine.name)
+        return
+
+
+def rigid_bodies(deployment: Deployment) -> Iterator[tuple[str, Model]]:
+    """Yield the robots and objects that need an engine with bodies of any kind, with their models."""
     for name, settings in (*deployment.robots.items(), *deployment.objects.items()):
         model = registry.model_of(settings)
         if model.is_rigid and model.couples:
-            what = f"the engine has no rigid bodies such as {name}, a {model.name} (bullet has bodies of any kind)"
-            yield Finding(("engine",), what, engine.name)
-            return
+            yield name, model
 
 
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:

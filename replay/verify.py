@@ -41,6 +41,8 @@ class Verified:
     other_arithmetic: tuple[str, ...] = ()
     """Those that the capture has and that are others."""
     first_tick: int = 0
+    finished: bool = True
+    """Whether the capture has its end: ticks of the run may follow one that has none."""
 
     @property
     def equal(self) -> bool:
@@ -62,7 +64,8 @@ def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool =
     text, name = about.deployment_text, about.deployment_name
     found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)
     kept = {epoch.arithmetic for epoch in capture.epochs}
-    return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
+    others = tuple(sorted(kept - {"", found.arithmetic}))
+    return replace(found, other_arithmetic=others, finished=capture.finished)
 
 
 def start_of(capture: CaptureData) -> Start | None:

@@ -20,6 +20,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue, Failed, UnknownName, read_at
 from foosim.common.json_text import encode_json
 from foosim.common.units import parse_ns
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.rehearsal.match.chart import picture
@@ -110,11 +111,12 @@ def _checked(options: MatchOptions) -> Match:
     entrants = entrant("A", options.a), entrant("B", options.b)
     links = _links(options.delay, options.loss)
     text = apply_sets(read_source_file(options.deployment), name, options.sets)
-    deployment = load_deployment(text, name)
+    text, files = pin_assets(text, name, options.deployment.parent)
+    deployment = load_deployment(text, name).with_assets(files)
     first, second = seats(deployment, name)
     ticks = max(1, round(options.minutes * 60e9 / deployment.tick_ns))
     classes = entrants[0].path, entrants[1].path
-    fixture = Fixture(text, name, options.deployment.parent, classes, ticks, SIDES[options.worse_for])
+    fixture = Fixture(text, name, options.deployment.parent, classes, ticks, SIDES[options.worse_for], files)
     games = [
         Game(seed, number % 2 == 1 and not options.keep_sides, link, _capture(options.captures, seed, link))
         for link in links

@@ -105,9 +105,13 @@ class Episodes:
 
         A seed begins a row of episodes: that of the first is the seed itself, those of further ones follow from it.
         Without one ever, the first has the deployment's. The option `start` is the frame to begin with, instead of that
-        of the environment; without a seed, draws are then the deployment's. Other options are nobody's: the check of
-        PettingZoo gives one. Raises BadValue for a seed that is none, and as `Simulation.reset` does.
+        of the environment; without a seed, draws are then the deployment's.
+
+        Raises BadValue for a seed that is none, UnknownName for another option, and as `Simulation.reset` does.
         """
+        for name in options or {}:
+            if name != START:
+                raise UnknownName("reset: no such option", name, [START], also="an argument of the environment itself")
         if seed is not None and not 0 <= seed <= COUNTER_MAX:
             raise BadValue(f"a seed is 0 to {COUNTER_MAX}", seed)
         if seed is not None:

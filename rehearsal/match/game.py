@@ -43,7 +43,10 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Fixture:
-    """What all games of a match have in common: the deployment's text and name, its folder, who plays, how long."""
+    """What all games of a match have in common: the deployment's text and name, its folder, who plays, how long.
+
+    The text has the digests of the deployment's files, whose contents by path are `files` (`pin_assets`).
+    """
 
     text: str
     name: str
@@ -52,6 +55,11 @@ class Fixture:
     ticks: int
     worse: tuple[int, ...] = (0,)
     """Which of the two play over the worse network."""
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+    def deployment(self, text: str) -> Deployment:
+        """Return the deployment of a game's text."""
+        return load_deployment(text, self.name).with_assets(self.files)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +98,7 @@ def play(fixture: Fixture, game: Game) -> Played:
     """
     sets = sets_of(fixture, game)
     text = apply_sets(fixture.text, fixture.name, sets)
-    look = _Looking(load_deployment(text, fixture.name))
+    look = _Looking(fixture.deployment(text))
     settings = Settings(run=f"match-{game.seed}", on_commit=look.commit)
     try:
         found: dict[str, Any] = rehearse(
@@ -121,7 +129,7 @@ def points_of(score: Mapping[str, int], *, is_swapped: bool) -> tuple[int, int]:
 
 def sets_of(fixture: Fixture, game: Game) -> list[str]:
     """Return the settings that make a game of the deployment."""
-    deployment = load_deployment(fixture.text, fixture.name)
+    deployment = fixture.deployment(fixture.text)
     seated = [*seats(deployment, fixture.name).values()][:: -1 if game.is_swapped else 1]
     sets = [f"players.{name}.class={path}" for name, path in zip(seated, fixture.classes, strict=True)]
     if game.link is not None:

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from typing import Final
+from typing import Final, TypeAlias
 
 from foosim.client.core import ClientCore
 from foosim.client.packets import Outgoing
 from foosim.common.errors import Refused
 from foosim.common.names import CHANNEL_ECHO
 from foosim.common.units import Pace
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import load_deployment, rigid_bodies
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.rehearsal.clock import Clock
@@ -64,11 +64,12 @@ WORLDS: Final = 4
 """Number of worlds; seed modulo this number selects one."""
 PROBER: Final = "prober"
 SMALL: Final[tuple[str, ...]] = (
-    "engine=pure",
     "substeps=1",
     f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
 )
 """Overrides that keep the computation, with fewer steps, and add echo channels."""
+PURE: Final[tuple[str, ...]] = ("engine=pure",)
+"""Worlds whose bodies the pure engine has are computed by it."""
 TABLE: Final = "table"
 OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
 """A table's game begins at once."""
@@ -83,6 +84,8 @@ PATIENT: Final[tuple[str, ...]] = (
 )
 """With a tenth of its messages lost, a process can need longer to join than on a lossless link."""
 RESTART_NS: Final = 500 * MS
+Files: TypeAlias = tuple[tuple[str, bytes], ...]
+"""The files that a deployment refers to: paths and contents."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +226,7 @@ def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
     deployment = load_deployment(text, name)
     of_world = list(OF_TABLE) if TABLE in deployment.kits else []
+    of_world += PURE if next(rigid_bodies(deployment), None) is None else ()
     if seed != WORLDS - 1:
         acting = [player for player in deployment.players if deployment.arrivals_of(player)]
         of_world += [f"players.{player}.{what}" for player in acting for what in BY_PERIOD]
@@ -233,14 +237,15 @@ def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
 class Flight:
     """One running seed: the system, its invariants, and its healing."""
 
-    def __init__(self, text: str, name: str, plan: Plan, settings: Settings) -> None:
+    def __init__(self, text: str, name: str, plan: Plan, settings: Settings, files: Files = ()) -> None:
         text, alone = worlds(text, name, plan.nodes, plan.seed % WORLDS)
         self.plan = plan
         self.seen = 0
         self._healed_ns = -1
         self._last_commit_ns = 0
-        self._replica = Replica(alone, name, load_deployment(alone, name))
-        self.laws = Laws(self._replica, load_deployment(text, name))
+        contents = dict(files)
+        self._replica = Replica(alone, name, load_deployment(alone, name).with_assets(contents))
+        self.laws = Laws(self._replica, load_deployment(text, name).with_assets(contents))
         chosen = replace(
             settings,
             node=WatchedNode if settings.node is NodeCore else settings.node,
@@ -254,7 +259,8 @@ class Flight:
             on_closing=self.laws.close,
             on_commit=self._committed,
         )
-        self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
+        run = RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks, files=contents)
+        self.system = System(run, chosen)
         self.laws.flipped = self.system.flipped
         for fault in plan.faults:
             self.system.at_tick(fault.tick, partial(fault.do, self.system))
@@ -269,8 +275,12 @@ class Flight:
                 raise Broken(f"the run ended: {'not at all' if end is None else end.reason}")
             self.laws.end(self.system, self.plan.nodes)
         finally:
-            self.system.close()
-            self._replica.close()
+            self.close()
+
+    def close(self) -> None:
+        """Free the engines."""
+        self.system.close()
+        self._replica.close()
 
     def _see(self, traced: Traced) -> None:
         self.seen += 1
@@ -310,25 +320,28 @@ class Flight:
 
 
 @lru_cache(maxsize=4 * WORLDS)
-def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
+def undisturbed(text: str, name: str, world: int, ticks: int, files: Files = ()) -> bytes:
     """Return the digest chain of a run without faults."""
-    flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
+    flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings(), files)
     flight.run()
     return flight.system.supervisor.state.chain
 
 
-def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
-    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores.
+def fly(
+    text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS, files: Files = ()
+) -> Flown:
+    """Rehearse a deployment under the faults of a seed, on the pure engine if it has the bodies.
 
+    The text has the digests of `files` (`pin_assets`). `settings` may plant faulty cores.
     Where no fault changes the world, it has to equal that of the run without faults (law 3).
     """
     plan = plan_of(seed, ticks)
     flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
-    flight = Flight(text, name, plan, settings or Settings())
+    flight = Flight(text, name, plan, settings or Settings(), files)
     try:
         flight.run()
         if not CHANGES_THE_WORLD & {*plan.kinds}:
-            same = flight.system.supervisor.state.chain == undisturbed(text, name, seed % WORLDS, ticks)
+            same = flight.system.supervisor.state.chain == undisturbed(text, name, seed % WORLDS, ticks, files)
             hold(same, "the world differs from that of the run without faults")
     except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
         flown.broken = f"{type(error).__name__}: {error}"  # an exception of a core would have ended its process

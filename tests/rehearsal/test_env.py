@@ -52,6 +52,8 @@ def played(env: FoosimParallelEnv, steps: int, seed: int | None, **options: Any)
 def test_checks_of_pettingzoo(network: bool) -> None:
     made = partial(parallel_env, TABLE, network=network, reward=Goals, seconds=0.12, bounds=CALM)
     env = made()
+    reset = env.reset
+    env.reset = lambda seed=None, options=None: reset(seed)  # type: ignore[method-assign]  # its option is unknown
     parallel_api_test(env, 20)
     env.close()
     parallel_seed_test(made, 10)
@@ -178,6 +180,9 @@ def test_actions_seeds_and_sets_that_are_not_valid() -> None:
     together = parallel_env(deployment)
     with pytest.raises(BadValue, match=r"a seed is 0 to .*, -1"):
         together.reset(seed=-1)
+    for option in ("sets", "strat"):
+        with pytest.raises(UnknownName, match=rf"reset: no such option \(there are: start, or .*\), '{option}'"):
+            together.reset(options={option: ["seed=2"]})
     together.reset(seed=2**63 - 1)
     with pytest.raises(UnknownName, match=r"an action of no agent.*player-red"):
         together.step({"red": np.zeros(8)})

@@ -16,6 +16,7 @@ from foosim.capture.reader import CapturedTick, open_capture
 from foosim.capture.rows import OwnerRow
 from foosim.cli.options import BadCapture
 from foosim.cli.rehearse import app as rehearse_app
+from foosim.cli.options import BadCapture
 from foosim.cli.replay import app
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
@@ -179,6 +180,23 @@ def test_the_command_says_what_it_found(captured: Captured, tmp_path: Path) -> N
         assert isinstance(shown.exception, BadCapture) and shown.exception.exit_code == 2
         assert str(shown.exception).startswith(f"{bad[1]}: ")
     assert load_deployment(open_capture(path).about.deployment_text, "x").world == "table"
+
+
+def test_a_capture_that_was_cut_off_is_equal_up_to_there(captured: Captured, tmp_path: Path) -> None:
+    path, _ = captured("pure")
+    runner, cut = CliRunner(), tmp_path / "cut.mcap"
+    content = path.read_bytes()
+    for share in (content[: len(content) * 2 // 3], content[:-1]):
+        cut.write_bytes(share)
+        done = runner.invoke(app, ["verify", str(cut)])
+        last = open_capture(cut).ticks[-1]
+        assert done.exit_code == 4 and done.output.endswith(f"; the capture is unfinished, it ends at tick {last}\n")
+        found = msgspec.json.decode(runner.invoke(app, ["verify", str(cut), "--json"]).output)
+        assert found["equal"] and not found["finished"] and found["ticks"] == last
+    for nothing in (b"", b"#!/bin/sh", content[:300]):
+        cut.write_bytes(nothing)
+        for command in ("verify", "recover"):
+            assert isinstance(runner.invoke(app, [command, str(cut)]).exception, BadCapture)
 
 
 def test_a_rehearsal_tells_people_its_packets_in_words() -> None:

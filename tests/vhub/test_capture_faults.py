@@ -129,6 +129,14 @@ def test_what_is_no_capture_is_told_so(tmp_path: Path, hub_run: HubRun) -> None:
         open_capture(mcap_with(path, "foosim", about, "format: 1\nworld: [\n"))
 
 
+def test_what_is_cut_off_before_its_first_row_is_named_so(chunked: bytes, tmp_path: Path) -> None:
+    """Up to its first chunk a capture has its description alone, or a part of it."""
+    path, described = tmp_path / "cut.mcap", chunked.index(b"foosim.digests")
+    for size in (*range(8, described, 97), described):
+        path.write_bytes(chunked[:size])
+        assert refused(path) == "FILE: the capture is cut off before its first row"
+
+
 def test_ticks_that_go_back_are_refused(hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capture_file.CaptureFile, "_has", lambda file, tick: False)
     path = tmp_path / "back.mcap"

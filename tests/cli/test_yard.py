@@ -1,0 +1,41 @@
+"""Each command that reads a deployment, with one whose robots are files: they are found from any folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.cli import net, rehearse, supervisor
+from foosim.cli.match import command as match
+from foosim.rehearsal.swarm import campaign
+from tests.conftest import Typed
+
+YARD: Final = Path(__file__).parents[2] / "deploy" / "yard.yaml"
+NO_SIDES: Final = f"{YARD}: a match needs a world with a rule that keeps the score of two sides\n"
+
+
+@pytest.mark.parametrize(
+    ("program", "main", "words", "code", "err"),
+    [
+        ("foosim-match", match.main, ("team", "team", "--deployment", YARD), 2, NO_SIDES),
+        ("foosim-net", net.main, ("lint", YARD), 0, ""),
+        ("foosim-supervisor", supervisor.main, ("validate", YARD), 0, ""),
+        ("foosim-rehearse", rehearse.main, (YARD, "--swarm", "--jobs", "1"), 0, ""),
+    ],
+)
+def test_files_of_robots_are_found(  # noqa: PLR0913  # the columns of the table
+    program: str,
+    main: Callable[[], object],
+    words: tuple[Any, ...],
+    code: int,
+    err: str,
+    typed: Typed,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(campaign.Flight, "run", campaign.Flight.close)  # a world that is built has its files
+    monkeypatch.setattr(campaign, "CHANGES_THE_WORLD", frozenset(campaign.FAULT_OF))
+    done = typed(program, main)(*words)
+    assert (done.code, done.err) == (code, err), done.out
