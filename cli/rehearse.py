@@ -68,11 +68,11 @@ def foosim_rehearse(
     tick and the capture's path. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
     With --swarm the seed draws 3 to 5 nodes, their clocks, delay, loss and duplication of messages, and 8 to 20 faults
-    of at least three kinds in 208 ticks, on the pure engine if it has the bodies; --for simulates longer, with more faults. Faults are:
-    killed, interrupted, paused, slow and stopped processes; partitions in one or both directions and clogs; jumps of
-    memory and clocks; old messages; lost players (every eighth seed); moved robots; added, removed and pushed bodies;
-    pauses of the run. Every record, message and committed tick is checked against the laws. At the end all faults
-    heal, and every process has to take part again.
+    of at least three kinds in 208 ticks, on the pure engine if it has the bodies; --for simulates longer, with more
+    faults. Faults are: killed, interrupted, paused, slow and stopped processes; partitions in one or both
+    directions and clogs; jumps of memory and clocks; old messages; lost players (every eighth seed); moved robots;
+    added, removed and pushed bodies; pauses of the run. Every record, message and committed tick is checked against
+    the laws. At the end all faults heal, and every process has to take part again.
 
     Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its disk is full, 130
     second Ctrl-C.

@@ -343,6 +343,7 @@ def validate(
     from foosim.common.json_text import encode_json
     from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan
+    from foosim.vhub.links.packet_sizes import warnings_of
 
     plan = make_plan(options)
     check_players_here(plan)
@@ -356,6 +357,8 @@ def validate(
         "nodes": sorted(deployment.nodes),
         "players": sorted(deployment.players),
     }
+    for warning in warnings_of(deployment):
+        typer.echo(f"{options.file}: warning: {warning}", err=True)
     described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
     print(encode_json(content).decode() if json else f"{options.file}: valid, world {deployment.world}, {described}")
 

@@ -26,7 +26,7 @@ NO_SIDES: Final = f"{YARD}: a match needs a world with a rule that keeps the sco
         ("foosim-rehearse", rehearse.main, (YARD, "--swarm", "--jobs", "1"), 0, ""),
     ],
 )
-def test_files_of_robots_are_found(  # noqa: PLR0913  # the columns of the table
+def test_files_of_robots_are_found(  # the columns of the table
     program: str,
     main: Callable[[], object],
     words: tuple[Any, ...],

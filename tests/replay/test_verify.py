@@ -16,7 +16,6 @@ from foosim.capture.reader import CapturedTick, open_capture
 from foosim.capture.rows import OwnerRow
 from foosim.cli.options import BadCapture
 from foosim.cli.rehearse import app as rehearse_app
-from foosim.cli.options import BadCapture
 from foosim.cli.replay import app
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from foosim.common.keyed_random import draw_key, draw_words
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
+from foosim.vhub.links.packet_sizes import warnings_of
 from foosim.vhub.links.summary import (
     SharedSettings,
     delay_of,
@@ -184,6 +185,19 @@ def test_who_offers_more_than_is_carried_is_warned_of() -> None:
     made = deployment("{links: [{id: thin, from: '*', to: '*', rate: 64 kbit/s}]}")
     (thin,) = summaries(made)
     assert thin.warnings == ("one sender offers 100 packets/s by what is declared; of 100 B it carries 80/s",)
+
+
+@pytest.mark.parametrize("limit", [16, 1023, 1024])
+def test_packets_that_are_longer_than_an_mtu_are_named(limit: int) -> None:
+    """A distance of each of 128 rays is 8 bytes; a rover hears speeds of its two wheels, or a way, in 16."""
+    path = TABLE.with_name("warehouse.yaml")
+    text = expanded_text(path.read_text(), path.name)
+    links = f"network.links=[{{id: thin, from: '*', to: '*', mtu: {limit} B}}]"
+    made = load_deployment(apply_sets(text, path.name, ["robots.rover01.sensors.proximity.rays=128", links]), path.name)
+    (warning,) = warnings_of(made) or [""]
+    assert ("rover01 proximity (1024 B)" in warning) == (limit < 1024)
+    assert ("rover02 proximity (128 B)" in warning) == (limit < 128) and " drive (" not in warning
+    assert warning in "\n".join(start_lines(summaries(made), "some.yaml"))
 
 
 def test_a_network_alone_is_shown_over_its_radios() -> None:

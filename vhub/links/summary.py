@@ -20,6 +20,7 @@ from foosim.deployment.network.traces import read_opportunities, read_table
 from foosim.deployment.radio_checks import unheeded
 from foosim.deployment.schema import Deployment
 from foosim.vhub.links.offered_load import flows_of, offered_hz, used_links
+from foosim.vhub.links.packet_sizes import long_packets
 from foosim.vhub.links.phase import phase_warnings
 from foosim.vhub.network.jitter import interpolate_ns, moments_ns, quantiles_ns
 from foosim.vhub.radio import errors
@@ -165,13 +166,16 @@ def uses_alone(network: Network) -> list[SharedSettings]:
 def summaries(deployment: Deployment) -> list[LinkSummary]:
     """Return the summary of a deployment's network; the deployment has its files."""
     uses = uses_of(deployment)
-    offered = offered_hz(flows_of(deployment, Profiles(deployment.network, deployment.carriers())))
+    flows = [*flows_of(deployment, Profiles(deployment.network, deployment.carriers()))]
+    offered, too_long = offered_hz(flows), long_packets(deployment, flows)
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
     for use in uses:
         summary = summary_of(use, files)
         warnings = [*summary.warnings, *phased.get((use.rule, use.radio), ())]
+        if (use.rule, use.radio) in too_long:
+            warnings.append(too_long[use.rule, use.radio])
         if use.links == 0:
             warnings.append("no link uses it")
         capacity_hz = _capacity_hz(summary)

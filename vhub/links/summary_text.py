@@ -76,8 +76,12 @@ def meaning_lines(summaries: Sequence[LinkSummary]) -> Iterator[str]:
 
 
 def start_lines(summaries: Sequence[LinkSummary], file: str) -> list[str]:
-    """Return the effective model for the start of a run: what links use, at most LINES_MAX lines."""
+    """Return the effective model for the start of a run: all warnings, and what links use, at most LINES_MAX lines if
+    there are not more warnings."""
     lines = [f"network {line.strip()}" for line in meaning_lines(summaries)]
-    if len(lines) <= LINES_MAX:
-        return lines
-    return [*lines[: LINES_MAX - 1], f"and {len(lines) - LINES_MAX + 1} more: foosim-net lint {file}"]
+    if len(lines) > LINES_MAX:
+        lines.sort(key=lambda line: not line.startswith("network warning: "))
+        warned = sum(len(summary.warnings) for summary in summaries)
+        kept = max(LINES_MAX - 1, warned)
+        return [*lines[:kept], f"and {len(lines) - kept} more: foosim-net lint {file}"]
+    return lines

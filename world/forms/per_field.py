@@ -102,6 +102,22 @@ def numbers_of(
     return Numbers(fields, getattr(component.value, GROUPS, {}), size)
 
 
+def payload_bytes(component: Component, settings: ComponentSettings, counts: Mapping[str, int]) -> int | None:
+    """Return how long a component's payload is at most; None where its type and settings do not limit it.
+
+    `counts` are how many numbers the fields of its robot have: a command has at most a number for each joint.
+    """
+    numbers = numbers_of(component, settings, counts)
+    if numbers is not None:
+        return 8 * numbers.size
+    fields = codec_of(component.name, component.form).fields
+    many = many_of(fields)
+    if not all(field.is_number for field in fields[: len(fields) - many]) or "joint_positions" not in component.needs:
+        return None
+    joints = len(getattr(settings, "joints", None) or ()) or counts["joint_positions"]
+    return 8 * (len(fields) - many + many * joints)
+
+
 def read_per_field(written: Any, numbers: Numbers, least: float | None = None) -> list[float | None]:
     """Return what was written for each number, in SI units; None for those of which nothing was.
 
