@@ -35,7 +35,7 @@ from foosim.capture.rows import (
     TickRow,
     delivered_of,
     edit_of,
-    row_schema,
+    json_schema,
 )
 from foosim.common.keyed_random import Slot, chance_threshold, draw_key, draw_words
 from foosim.deployment.assets import pin_assets
@@ -130,7 +130,7 @@ def test_rows_stand_at_their_simulated_times(hub_run: HubRun, entries: list[Entr
 def test_rows_are_valid_by_their_schemas(entries: list[Entry]) -> None:
     encoder = msgspec.json.Encoder()
     for topic, kind in ROW_TYPES.items():
-        schema = row_schema(kind)
+        schema = json_schema(kind)
         jsonschema.Draft202012Validator.check_schema(schema)
         validator = jsonschema.Draft202012Validator(schema)
         contents = [entry[4] for entry in entries if entry[0] == topic]
@@ -162,7 +162,7 @@ def parse_as_viewers_do(schema: Any, place: str) -> None:
 
 @pytest.mark.parametrize("topic", sorted(ROW_TYPES))
 def test_viewers_can_parse_the_schema(topic: str) -> None:
-    parse_as_viewers_do(row_schema(ROW_TYPES[topic]), topic)
+    parse_as_viewers_do(json_schema(ROW_TYPES[topic]), topic)
 
 
 def test_a_tick_holds_what_it_is_computed_from(hub_run: HubRun, entries: list[Entry]) -> None:
