@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import FrameRow, PacketRow
 from foosim.common.names import nearest_name
+from foosim.world.components.mounted import free_poses
 from foosim.world.frame import Frame
-from foosim.world.kinematics import forward_kinematics
+from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics
 from foosim.world.layout import Layout
-from foosim.world.scene import Body
+from foosim.world.scene import Body, Link, conjugate
 
 Integers: TypeAlias = NDArray[np.int64]
 Numbers: TypeAlias = NDArray[np.float64]
@@ -107,11 +108,18 @@ def _objects(values: Sequence[Any]) -> Objects:
     return column
 
 
+SLOT_OF_CENTRE: Final = {name: slot for slot, name in CENTRE_OF_SLOT.items()}
+
+
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index."""
+    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index.
+
+    `values` are slots: of a free body the `position`, `orientation` and `linear_velocity` of its centre of mass.
+    """
 
     layout: Layout
+    bodies: Mapping[str, Body]
     ticks: Integers
     values: Numbers
     outboxes: tuple[Mapping[int, bytes], ...]
@@ -124,9 +132,54 @@ class Frames:
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
     def column(self, entity: str, field: str, count: int = 1) -> Numbers:
-        """Return one field of an entity over time: (n,), or (n, count) for a field of several numbers."""
-        start = self.layout[entity].offsets[field]
-        return self.values[:, start] if count == 1 else self.values[:, start : start + count]
+        """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several.
+
+        Of a free body `position`, `orientation` and `linear_velocity` are those of the origin of its first link, as on
+        /tf and in its sensors' readings; `CENTRE_OF_SLOT` names those of the link's centre of mass. Raises CaptureError
+        for more numbers than the field has.
+        """
+        found = self._field(entity, field)
+        if not 1 <= count <= found.shape[1]:
+            raise CaptureError(f"{entity}: {field} has 1 to {found.shape[1]} numbers, not {count}")
+        return found[:, 0] if count == 1 else found[:, :count]
+
+    def fields(self, entity: str) -> list[str]:
+        """Return the names of an entity's columns, none of an entity that is not there."""
+        if entity not in self.layout:
+            return []
+        slots = self.layout[entity].offsets
+        of_centre = CENTRE_OF_SLOT.items() if self._free_link(entity) else ()
+        return [*slots, *(name for slot, name in of_centre if slot in slots)]
+
+    def _field(self, entity: str, field: str) -> Numbers:
+        """Return all numbers of a field over time, (n, count)."""
+        link = self._free_link(entity)
+        if link is None:
+            return self._slot(entity, field)
+        if field in SLOT_OF_CENTRE:
+            return self._slot(entity, SLOT_OF_CENTRE[field])
+        if link.is_centred or field not in CENTRE_OF_SLOT:
+            return self._slot(entity, field)
+        state = np.hstack((self._slot(entity, "position"), self._slot(entity, "orientation"))).T
+        back, centre = np.array(conjugate(link.principal)), np.array(link.centre_of_mass)
+        origins, turned = free_poses(state, back[:, np.newaxis], centre[:, np.newaxis])
+        if field != "linear_velocity":
+            return origins.T if field == "position" else turned.T
+        linear = self._slot(entity, "linear_velocity")
+        if "angular_velocity" not in self.layout[entity].offsets:
+            return linear
+        arms = origins - state[:3]
+        return linear + np.cross(self._slot(entity, "angular_velocity"), arms.T)
+
+    def _slot(self, entity: str, slot: str) -> Numbers:
+        at = self.layout[entity]
+        start = at.offsets[slot]
+        return self.values[:, start : start + at.counts[slot]]
+
+    def _free_link(self, entity: str) -> Link | None:
+        """Return the link of an entity that moves freely, which is its first one."""
+        body = self.bodies.get(entity)
+        return body.links[0] if body is not None and body.is_free else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,19 +218,19 @@ class AllFrames:
         raise IndexError(f"frame {index} of {len(self)}")
 
     def column(self, entity: str, field: str, count: int = 1) -> Numbers:
-        """Return one field of an entity over time: (n,), or (n, count) for a field of several numbers.
+        """Return one field of an entity over time, as `Frames.column` does.
 
         Where the entity was not there the numbers are NaN. Raises CaptureError for an entity or a field that no frame
         has.
         """
-        known = [block.layout[entity].offsets if entity in block.layout else {} for block in self.blocks]
-        if not any(field in offsets for offsets in known):
+        known = [field in block.fields(entity) for block in self.blocks]
+        if not any(known):
             raise self._unknown(entity, field)
         shape = () if count == 1 else (count,)
         return np.concatenate(
             [
-                block.column(entity, field, count) if field in offsets else np.full((len(block), *shape), np.nan)
-                for block, offsets in zip(self.blocks, known, strict=True)
+                block.column(entity, field, count) if is_there else np.full((len(block), *shape), np.nan)
+                for block, is_there in zip(self.blocks, known, strict=True)
             ]
         )
 
@@ -188,7 +241,7 @@ class AllFrames:
         return self.blocks[0]
 
     def _unknown(self, entity: str, field: str) -> CaptureError:
-        names = {known.name: known.offsets for block in self.blocks for known in block.layout.entities}
+        names = {known.name: block.fields(known.name) for block in self.blocks for known in block.layout.entities}
         what, of = (field, sorted(names[entity])) if entity in names else (entity, sorted(names))
         nearest = nearest_name(what, of)
         hint = f", nearest is {nearest}" if nearest else ""
@@ -197,12 +250,17 @@ class AllFrames:
         return CaptureError(f"{self.name}: no frame has an entity {entity!r}{hint}")
 
 
-def frames_of(layout: Layout, rows: Sequence[FrameRow]) -> Frames:
-    """Return the rows of one layout's frames as arrays; their sizes are the layout's."""
+def frame_of(layout: Layout, row: FrameRow) -> Frame:
+    """Return the row of a frame, whose size is the layout's, as a frame."""
+    return Frame(row.tick, layout, np.frombuffer(row.values), {box.index: box.packets for box in row.outboxes})
+
+
+def frames_of(layout: Layout, bodies: Mapping[str, Body], rows: Sequence[FrameRow]) -> Frames:
+    """Return the rows of one layout's frames, which has these bodies, as arrays; their sizes are the layout's."""
     ticks = np.array([row.tick for row in rows], dtype=np.int64)
     values = np.frombuffer(b"".join(row.values for row in rows), dtype=np.float64).reshape(len(rows), layout.size)
     outboxes = tuple({box.index: box.packets for box in row.outboxes} for row in rows)
-    return Frames(layout, ticks, values, outboxes)
+    return Frames(layout, bodies, ticks, values, outboxes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
-from foosim.capture.foxglove import VIEW_TYPES
+from foosim.capture.foxglove import VIEW_TYPES, view_schema
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import (
@@ -25,7 +25,8 @@ from foosim.capture.parts import (
     PART,
     parts_at,
 )
-from foosim.capture.rows import ROW_TYPES, row_schema
+from foosim.capture.rows import ROW_TYPES, json_schema
+from foosim.capture.shown_readings import TopicSchema
 from foosim.common.json_text import encode_json
 from foosim.protocol.messages import End
 from foosim.world.start import Origin
@@ -39,7 +40,7 @@ CHUNK_BYTES: Final = 4 * 1024 * 1024
 _LIBRARIES: Final = (
     *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
 )
-NO_READINGS: Final[Mapping[str, Any]] = MappingProxyType({})
+NO_READINGS: Final[Mapping[str, TopicSchema]] = MappingProxyType({})
 CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
 """Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
 metadata `foosim`."""
@@ -62,20 +63,13 @@ def ending_metadata(end: End) -> dict[str, str]:
     return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
 
 
-def declare_topics(mcap: McapWriter, readings: Mapping[str, Any] = NO_READINGS) -> dict[str, int]:
+def declare_topics(mcap: McapWriter, readings: Mapping[str, TopicSchema] = NO_READINGS) -> dict[str, int]:
     """Declare all topics, also those that stay empty; return their channels.
 
-    `readings` are the topics of readings that are shown (`shown_readings.shown_topics`), each with its message.
+    `readings` are the topics of readings that are shown (`shown_readings.shown_topics`).
     """
-    shown = [(topic, "protobuf", _view_schema(message)) for topic, message in readings.items()]
-    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in (*_topics(), *shown)}
-
-
-@cache
-def _view_schema(message: Any) -> tuple[str, str, bytes]:
-    """Return name, encoding and content of the schema of a Foxglove message."""
-    schema = message.get_schema()
-    return schema.name, schema.encoding, schema.data
+    its = [(topic, encoding, schema) for topic, (encoding, schema) in readings.items()]
+    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in (*_topics(), *its)}
 
 
 @cache
@@ -83,10 +77,10 @@ def _topics() -> tuple[tuple[str, str, tuple[str, str, bytes]], ...]:
     """Return each topic with its encoding and schema, made once: a run waits while another file is begun."""
     topics = []
     for topic, kind in ROW_TYPES.items():
-        schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
+        schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(json_schema(kind)))
         topics.append((topic, "json", schema))
     for topic, message in VIEW_TYPES.items():
-        topics.append((topic, "protobuf", _view_schema(message)))
+        topics.append((topic, "protobuf", view_schema(message)))
     return tuple(topics)
 
 

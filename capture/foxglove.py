@@ -8,6 +8,7 @@ decode them.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any, Final
 
 from foxglove.messages import (
@@ -51,6 +52,13 @@ VIEW_TYPES: Final[dict[str, Any]] = {SCENE: SceneUpdate, POSES: FrameTransforms,
 
 _LEVELS: Final = {"info": LogLevel.Info, "warning": LogLevel.Warning, "error": LogLevel.Error}
 _SECOND_NS: Final = 1_000_000_000
+
+
+@cache
+def view_schema(message: Any) -> tuple[str, str, bytes]:
+    """Return name, encoding and content of the schema of a Foxglove message."""
+    schema = message.get_schema()
+    return schema.name, schema.encoding, schema.data
 
 
 class View:

@@ -20,7 +20,17 @@ import numpy as np
 from mcap import records
 from numpy.typing import NDArray
 
-from foosim.capture.columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
+from foosim.capture.columns import (
+    AllFrames,
+    Frames,
+    Integers,
+    Packets,
+    Poses,
+    frame_of,
+    frames_of,
+    packet_columns,
+    poses_of,
+)
 from foosim.capture.contents import ASSETS, CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, DEPLOYMENT, VERSIONS
 from foosim.capture.mcap.checks import CHECKS, CaptureError
 from foosim.capture.mcap.format import Message
@@ -274,7 +284,7 @@ class CaptureData:
                 blocks.append((layout, []))
             else:
                 blocks[-1][1].append(row)
-        return tuple(frames_of(layout, rows) for layout, rows in blocks)
+        return tuple(frames_of(layout, build_scene(self.deployment, layout).bodies, rows) for layout, rows in blocks)
 
     def each_frame(self) -> Iterator[Frame]:
         """Yield the captured frames one by one."""
@@ -318,7 +328,7 @@ class CaptureData:
         link = ""
         names: set[str] = set()
         for frames in self.frame_blocks:
-            for body in build_scene(self.deployment, frames.layout).bodies.values():
+            for body in frames.bodies.values():
                 links = [part.name for part in body.links]
                 names.update((body.name, *links))
                 if name == body.name or name in links:
@@ -406,7 +416,7 @@ class FrameReader:
     def frame(self, message: Message) -> Frame | None:
         """Return the frame that a message of `TOPICS` brings; None where that is a layout. Raises CaptureError."""
         layout, row = self.row(message)
-        return None if row is None else frames_of(layout, [row]).frame(0)
+        return None if row is None else frame_of(layout, row)
 
     def row(self, message: Message) -> tuple[Layout, FrameRow | None]:
         """Return the layout that a message brings, or the row of a frame with its layout. Raises CaptureError."""

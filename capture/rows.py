@@ -314,8 +314,11 @@ ROW_TYPES: Final[Mapping[str, type[Row]]] = {
 """The type of the rows of each topic."""
 
 
-def row_schema(kind: type[Row]) -> dict[str, Any]:
-    """Return the JSON Schema of a row, in the part of JSON Schema that viewers parse: everything in its place."""
+def json_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the JSON Schema of a row or a reading, in the part of JSON Schema that viewers parse.
+
+    Everything is in its place; what contains itself may be anything there.
+    """
     schema = msgspec.json.schema(kind)
     definitions: dict[str, Any] = schema["$defs"]
     content: dict[str, Any] = _in_place(schema, definitions)
@@ -329,7 +332,9 @@ def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
     if not isinstance(schema, dict):
         return schema
     if "$ref" in schema:
-        return _in_place(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+        name = schema["$ref"].rpartition("/")[2]
+        others = {key: value for key, value in definitions.items() if key != name}
+        return _in_place(definitions.get(name, {}), others)
     typed = {"type": "string", **schema} if "enum" in schema else schema
     return {key: _in_place(value, definitions) for key, value in typed.items() if key != "$defs"}
 

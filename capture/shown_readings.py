@@ -1,20 +1,24 @@
-"""The readings of sensors that name a Foxglove message (`forms.shown`), as this message, for viewers.
+"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`forms.shown`), of any other sensor
+that is not foosim's own as JSON.
 
-Each such sensor of a deployment has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it:
-after modifiers, before the network.
+Each of them has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it: after modifiers,
+before the network.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final, TypeAlias
 
 from foxglove.messages import LaserScan, LocationFix, Pose, PoseInFrame, Quaternion, Timestamp, Vector3
 
-from foosim.capture.foxglove import WORLD_FRAME
+from foosim.capture.foxglove import WORLD_FRAME, view_schema
+from foosim.capture.rows import json_schema
 from foosim.common.errors import Malformed
+from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.used_forms import OWN
 from foosim.world.assembly.world import build_scene
 from foosim.world.components.mounted import link_index
 from foosim.world.forms.payloads import PayloadCodec
@@ -36,13 +40,31 @@ MESSAGE_TYPES: Final[Mapping[str, Any]] = {
 assert MESSAGE_TYPES.keys() == MESSAGES.keys()
 _SECOND_NS: Final = 1_000_000_000
 
-Make: TypeAlias = Callable[[Timestamp, Any], Any]
+Make: TypeAlias = Callable[[Timestamp, Any], bytes]
 """Makes the message of a reading."""
+TopicSchema: TypeAlias = tuple[str, tuple[str, str, bytes]]
+"""The encoding of a topic's messages; name, encoding and content of their schema."""
 
 
-def shown_topics(deployment: Deployment) -> dict[str, Any]:
-    """Return the topics of a deployment's readings that are shown, each with the type of its messages."""
-    return {_topic(*where): MESSAGE_TYPES[message] for where, message in _shown(deployment).items()}
+def shown_topics(deployment: Deployment) -> dict[str, TopicSchema]:
+    """Return the topics of a deployment's readings that are shown."""
+    return {
+        _topic(robot, channel): ("protobuf", view_schema(MESSAGE_TYPES[message]))
+        if message
+        else ("json", _json_schema(deployment.robots[robot].sensors[channel].kind))
+        for (robot, channel), message in _shown(deployment).items()
+    }
+
+
+@cache
+def _json_schema(kind: str) -> tuple[str, str, bytes]:
+    """Return that of a kind of sensor's readings: an object with their fields, each number with its `unit`."""
+    codec = codec_of(kind, "sensor")
+    schema = json_schema(codec.kind)
+    for field in codec.fields:
+        if field.unit:
+            schema["properties"][field.name]["unit"] = field.unit
+    return f"foosim.reading.{kind}", "jsonschema", encode_json(schema)
 
 
 class ShownReadings:
@@ -56,7 +78,7 @@ class ShownReadings:
         frames = _Frames(deployment) if LASER_SCAN in shown.values() else None
         for (robot, channel), message in shown.items():
             settings: Any = deployment.robots[robot].sensors[channel]
-            make: Make = _location if message == LOCATION_FIX else _pose
+            make: Make = _MAKES.get(message, _fields)
             if message == LASER_SCAN:
                 assert frames is not None
                 make = partial(_scan, *frames.of(robot, settings), settings.bearings)
@@ -77,7 +99,7 @@ class ShownReadings:
                 reading = codec.decode(packet.payload)
             except Malformed:
                 continue
-            yield topic, make(at, reading).encode()
+            yield topic, make(at, reading)
 
 
 def _topic(robot: str, channel: str) -> str:
@@ -85,13 +107,13 @@ def _topic(robot: str, channel: str) -> str:
 
 
 def _shown(deployment: Deployment) -> dict[tuple[str, str], str]:
-    """Return the name of the message of each sensor that names one, by robot and channel."""
+    """Return the name of the message of each sensor that is shown, by robot and channel; empty for JSON."""
     found = {}
     for robot, its in sorted(deployment.robots.items()):
         for channel, settings in sorted(its.sensors.items()):
-            message = find_component("sensor", settings.kind).shown_as
-            if message:
-                found[robot, channel] = message
+            sensor = find_component("sensor", settings.kind)
+            if sensor.shown_as or not sensor.module.startswith(OWN):
+                found[robot, channel] = sensor.shown_as
     return found
 
 
@@ -113,22 +135,31 @@ class _Frames:
 # --- messages --------------------------------------------------------------------------------------------------------
 
 
-def _pose(at: Timestamp, reading: Any) -> PoseInFrame:
+def _fields(at: Timestamp, reading: Any) -> bytes:
+    return encode_json(reading)
+
+
+def _pose(at: Timestamp, reading: Any) -> bytes:
     if set(POSE) <= set(reading.__struct_fields__):
         place, turned = (reading.x, reading.y, reading.z), (reading.qx, reading.qy, reading.qz, reading.qw)
     else:
         place, turned = (reading.x, reading.y, 0.0), from_rpy(0.0, 0.0, reading.heading)
-    return PoseInFrame(timestamp=at, frame_id=WORLD_FRAME, pose=_placed(place, turned))
+    return PoseInFrame(timestamp=at, frame_id=WORLD_FRAME, pose=_placed(place, turned)).encode()
 
 
-def _location(at: Timestamp, reading: Any) -> LocationFix:
-    return LocationFix(timestamp=at, latitude=reading.latitude, longitude=reading.longitude, altitude=reading.altitude)
+def _location(at: Timestamp, reading: Any) -> bytes:
+    place = {name: getattr(reading, name) for name in ("latitude", "longitude", "altitude")}
+    return LocationFix(timestamp=at, **place).encode()
 
 
-def _scan(link: str, pose: Pose, bearings: tuple[float, float], at: Timestamp, reading: Any) -> LaserScan:
+def _scan(link: str, pose: Pose, bearings: tuple[float, float], at: Timestamp, reading: Any) -> bytes:
     first, last = bearings
     ranges = list(reading.distances)
-    return LaserScan(timestamp=at, frame_id=link, pose=pose, start_angle=first, end_angle=last, ranges=ranges)
+    scan = LaserScan(timestamp=at, frame_id=link, pose=pose, start_angle=first, end_angle=last, ranges=ranges)
+    return scan.encode()
+
+
+_MAKES: Final[Mapping[str, Make]] = {LOCATION_FIX: _location, POSE_IN_FRAME: _pose}
 
 
 def _placed(place: Vector, turned: Turn) -> Pose:

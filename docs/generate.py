@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import typer.main
 
-from foosim.capture.rows import ROW_TYPES, row_schema
+from foosim.capture.rows import ROW_TYPES, json_schema
 from foosim.cli.doctor import app as doctor_app
 from foosim.cli.guard import app as guard_app
 from foosim.cli.match.command import app as match_app
@@ -280,7 +280,7 @@ def write_channels() -> Iterator[str]:
 def write_rows() -> Iterator[str]:
     """Yield the fields of every kind of row."""
     for topic, kind in ROW_TYPES.items():
-        schema = row_schema(kind)
+        schema = json_schema(kind)
         yield f"### `{topic}`\n\n{_cell(schema['description'])}\n\n| field | type |\n|---|---|\n"
         for name, value in schema["properties"].items():
             yield f"| `{name}` | {_row_type(value)} |\n"

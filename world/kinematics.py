@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from foosim.world.layout import Entity
 from foosim.world.scene import (
@@ -21,6 +22,16 @@ from foosim.world.scene import (
     rotate,
     turn,
 )
+
+CENTRE_OF_SLOT: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "position": "centre_of_mass_position",
+        "orientation": "centre_of_mass_orientation",
+        "linear_velocity": "centre_of_mass_velocity",
+    }
+)
+"""What people call the slots of a free body that have the pose (centre of mass, principal axes) and the velocity of its
+first link's centre of mass: by their own names they know those of the link's origin and frame."""
 
 
 def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> list[Pose]:

@@ -116,6 +116,11 @@ class Link:
     speed: float = inf
     damping: float = 0.0
 
+    @property
+    def is_centred(self) -> bool:
+        """Whether its frame is that of its centre of mass and its principal axes."""
+        return self.centre_of_mass == ORIGIN and self.principal == UPRIGHT
+
 
 MOVING: Final = frozenset(("prismatic", "revolute", "continuous"))
 """The joints that have a position, a speed and a motor."""

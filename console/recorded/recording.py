@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.capture.columns import frames_of
+from foosim.capture.columns import frame_of
 from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.checks import CaptureError
@@ -169,7 +169,7 @@ class Recording:
         layout = self.worlds[self.world_at(row.tick)].layout
         if len(row.values) != 8 * layout.size or any(box.index >= len(layout.entities) for box in row.outboxes):
             raise CaptureError(f"{self.path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
-        return frames_of(layout, [row]).frame(0)
+        return frame_of(layout, row)
 
     def frame_up_to(self, tick: int) -> Frame | None:
         """Return the newest captured frame at or before a tick. Raises CaptureError."""

@@ -39,7 +39,7 @@ class Poser:
         row = 0
         for name, body in scene.bodies.items():
             entity, joints = layout[name], [link.joint for link in body.links]
-            if joints == ["free"]:
+            if joints == ["free"] and body.links[0].is_centred:
                 position, orientation = entity.offsets["position"], entity.offsets["orientation"]
                 rows.append(row)
                 slots.append([*range(position, position + 3), *range(orientation, orientation + 4)])

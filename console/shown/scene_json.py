@@ -14,6 +14,7 @@ from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import addition, mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
+from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
@@ -57,7 +58,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "links": links,
         "scenery": scenery,
         "bodies": bodies,
-        "fields": _fields(deployment, layout),
+        "fields": _fields(deployment, layout, scene),
         "commands": _commands(deployment, layout),
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
@@ -112,10 +113,12 @@ def _mesh(mesh: Mesh) -> dict[str, str]:
     }
 
 
-def _fields(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
+def _fields(deployment: Deployment, layout: Layout, scene: Scene) -> list[dict[str, Any]]:
     """Return the runs of numbers of a frame: those of one unit, by their first index."""
     fields = []
     for entity in layout.entities:
+        body = scene.bodies.get(entity.name)
+        names = {} if body is None or body.links[0].is_centred else CENTRE_OF_SLOT
         commanded = {f"{channel}.set_point": codec for channel, codec in _actuators(deployment, entity.name)}
         for name, start in entity.offsets.items():
             codec = commanded.get(name)
@@ -124,7 +127,7 @@ def _fields(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
                 fields.append(
                     {
                         "entity": entity.name,
-                        "field": name,
+                        "field": names.get(name, name),
                         "unit": units[min(place, len(units) - 1)],
                         "index": start + place,
                         "count": count,

@@ -13,6 +13,7 @@ from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
 from tests.console.memory import table
+from tests.forms.worlds import SOLIDS
 
 
 def check(deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> None:
@@ -36,6 +37,10 @@ def test_poses_of_a_table_with_two_balls() -> None:
 
 def test_poses_of_a_hall(fleet_text: Callable[..., str]) -> None:
     check(load_deployment(fleet_text(4), "hall"))
+
+
+def test_poses_of_bodies_with_their_centre_of_mass_elsewhere() -> None:
+    check(load_deployment(SOLIDS.text(), "solids.yaml"))
 
 
 def test_every_number_of_a_frame_belongs_to_one_field() -> None:

@@ -15,12 +15,17 @@ import pytest
 
 from foosim.analysis import export as export_module
 from foosim.analysis.export import export_capture
-from foosim.analysis.tables import table_names
+from foosim.analysis.tables import table_names, table_of
+from foosim.capture.mcap.format import Message
 from foosim.capture.reader import open_capture
+from foosim.capture.rows import PacketRow
 from foosim.common.errors import BadValue, Failed
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
-from tests.replay.conftest import TICK_NS, damaged, messages_of, replay, rewritten, with_row
+from tests.own_forms import folder_on_path, written
+from tests.replay.conftest import TABLE, TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 KINDS: Final = {
     "ball": ("ball", "sensor"),
@@ -62,6 +67,71 @@ def test_commands_have_their_numbers(run: Path, tmp_path: Path) -> None:
     assert [Command(float(line["slide"]), float(line["spin"])) for line in lines] == numbers
     assert [int(line["due_ns"]) for line in lines] == commands.due_ns.tolist()
     assert "payload" not in lines[0]
+
+
+OWN_ACTUATOR: Final = """
+from foosim.world.forms.quantities import Newtons
+
+
+class Pull(Struct, frozen=True):
+    slide: Newtons
+    sequence: Metres
+    several: tuple[float, ...]
+
+
+@actuator("own", ActuatorSettings, Pull, slots={"rate": 1}, needs=("joint_positions",))
+class Actuator(Own):
+    def __init__(self, settings, at):
+        self._rate = at.slot("rate")
+
+    def limits(self):
+        return {}
+
+    def accept(self, command, view):
+        return True
+
+    def hold(self, view):
+        view.write(self._rate, 0.0)
+
+    def stir(self, view):
+        view.write(self._rate, 1.0)
+
+    def command(self, view):
+        return (0.0, 1.0), (view.read(self._rate)[0], 2.0)
+"""
+
+
+def test_commands_of_somebodys_own_have_their_numbers_units_and_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of several numbers JSON, of two units none, and a name of its own where packets have that column."""
+    written(folder_on_path(tmp_path, monkeypatch), OWN_ACTUATOR)
+    own_alone = "robots.red.goal.actuators={own: {kind: 'own_form:Actuator'}}"
+    sets = ("players={}", "robots.red.goal.actuators=null", own_alone)
+    deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
+    table = table_of("commands", deployment)
+    columns = {column.name: (column.kind, column.unit) for column in table.columns}
+    assert columns["sequence"] == ("integer", "") and columns["command_sequence"] == ("number", "m")
+    assert (
+        columns["several"] == ("json", "")
+        and columns["slide"] == ("number", "")
+        and columns["spin"] == ("number", "rad")
+    )
+
+    own = codec_of("own_form:Actuator", "actuator")
+    pull = own.encode(own.kind(1.5, 2.5, (3.0, 4.0)))
+    rod = codec_of(*KINDS["position"]).encode(Command(0.25, 0.5))
+    expected = {
+        ("red.goal", "own", pull): (1.5, 2.5, "[3.0,4.0]", None),
+        ("red.attack", "position", rod): (0.25, None, None, 0.5),
+    }
+    for (robot, channel, payload), cells in expected.items():
+        packet = PacketRow("me", 7, 0, robot, channel, 0, 0, 0, 0, "delivered", "", "", "", "", 0, payload, 0)
+        message = Message("/packets", 0, 0, 0, encode_json(packet))
+        (row,) = table.rows(lambda decoder, told: decoder.decode(told.data), message)
+        found = dict(zip(columns, row, strict=True))
+        assert found["sequence"] == 7
+        assert tuple(found[name] for name in ("slide", "command_sequence", "several", "spin")) == cells
 
 
 def test_poses_are_those_of_the_frames(run: Path, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from foosim.capture.foxglove import VIEW_TYPES
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData, open_capture
-from foosim.capture.rows import ROW_TYPES, EpochRow, OwnerRow, row_schema
+from foosim.capture.rows import ROW_TYPES, EpochRow, OwnerRow, json_schema
 from foosim.vhub.recording.model_hash import model_hash
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import CHAIN_START, chain_next
@@ -263,7 +263,7 @@ def test_rows_are_json_valid_by_the_schemas_in_the_file(path: Path) -> None:
         for schema, channel, message in make_reader(file).iter_messages(list(ROW_TYPES)):
             assert isinstance(schema, Schema) and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             if channel.topic not in validators:
-                assert json.loads(schema.data) == row_schema(ROW_TYPES[channel.topic])
+                assert json.loads(schema.data) == json_schema(ROW_TYPES[channel.topic])
                 validators[channel.topic] = jsonschema.Draft202012Validator(json.loads(schema.data))
             validators[channel.topic].validate(json.loads(message.data))
             seen[channel.topic] += 1

@@ -17,6 +17,7 @@ from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
+from foosim.rehearsal.simulation import read_for_stepping
 from foosim.vhub.links.packet_sizes import warnings_of
 from foosim.vhub.links.summary import (
     SharedSettings,
@@ -198,6 +199,26 @@ def test_packets_that_are_longer_than_an_mtu_are_named(limit: int) -> None:
     assert ("rover01 proximity (1024 B)" in warning) == (limit < 1024)
     assert ("rover02 proximity (128 B)" in warning) == (limit < 128) and " drive (" not in warning
     assert warning in "\n".join(start_lines(summaries(made), "some.yaml"))
+
+
+@pytest.mark.parametrize(("rays", "is_long"), [(187, False), (360, True)])
+def test_a_scan_that_is_longer_than_the_mtu_of_wifi_is_named(rays: int, is_long: bool) -> None:
+    """The preset has 1500 B."""
+    scan = f"robots.red.goal.sensors.encoder={{kind: laser_scanner, rate: 10 Hz, rays: {rays}, range: 8 m}}"
+    places = ", ".join(f"{name}: [0 m, 0 m, 2 m]" for name in ("player-red", "player-blue", "camera"))
+    wifi = f"network={{radios: {{w: {{preset: wifi_5_indoor}}}}, robots: {{'*': [w]}}, places: {{{places}}}}}"
+    made = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [scan, wifi]), TABLE.name)
+    named = f"mtu of 1500 B are dropped: red.goal encoder ({8 * rays} B)"
+    assert [named in text for text in warnings_of(made)] == [True] * is_long
+
+
+def test_commands_of_a_fixed_or_a_jointed_size_that_are_longer_than_an_mtu_are_named() -> None:
+    """Four rotors have 32 B, an arm of seven joints 56 B."""
+    path = TABLE.with_name("yard.yaml")
+    links = "network.links=[{id: thin, from: '*', to: '*', mtu: 31 B}]"
+    made = read_for_stepping(path, [links])
+    (text,) = warnings_of(made)
+    assert "arm joints (56 B)" in text and "eagle rotors (32 B)" in text
 
 
 def test_a_network_alone_is_shown_over_its_radios() -> None:

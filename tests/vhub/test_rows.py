@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
 import jsonschema
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.capture.columns import Packets, word_of
+from foosim.capture.columns import Packets, frames_of, word_of
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import (
     AGES,
@@ -34,9 +35,11 @@ from foosim.capture.rows import (
     TickRow,
     delivered_of,
     edit_of,
-    row_schema,
+    json_schema,
 )
 from foosim.common.keyed_random import Slot, chance_threshold, draw_key, draw_words
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import load_deployment
 from foosim.vhub.network.memory import FlightState
 from foosim.vhub.network.packet import Flight, flight_of, level_cdbm, state_of
 from foosim.vhub.recording.rows_of_closing import (
@@ -48,8 +51,12 @@ from foosim.vhub.recording.rows_of_closing import (
     plan_of,
     world_rows,
 )
+from foosim.world.assembly.world import build_scene
 from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
+from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics, twist
+from foosim.world.layout import build_layout
+from tests.forms.worlds import DEPLOY, DRIVES, SOLIDS
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
 
 if TYPE_CHECKING:
@@ -123,7 +130,7 @@ def test_rows_stand_at_their_simulated_times(hub_run: HubRun, entries: list[Entr
 def test_rows_are_valid_by_their_schemas(entries: list[Entry]) -> None:
     encoder = msgspec.json.Encoder()
     for topic, kind in ROW_TYPES.items():
-        schema = row_schema(kind)
+        schema = json_schema(kind)
         jsonschema.Draft202012Validator.check_schema(schema)
         validator = jsonschema.Draft202012Validator(schema)
         contents = [entry[4] for entry in entries if entry[0] == topic]
@@ -155,7 +162,7 @@ def parse_as_viewers_do(schema: Any, place: str) -> None:
 
 @pytest.mark.parametrize("topic", sorted(ROW_TYPES))
 def test_viewers_can_parse_the_schema(topic: str) -> None:
-    parse_as_viewers_do(row_schema(ROW_TYPES[topic]), topic)
+    parse_as_viewers_do(json_schema(ROW_TYPES[topic]), topic)
 
 
 def test_a_tick_holds_what_it_is_computed_from(hub_run: HubRun, entries: list[Entry]) -> None:
@@ -292,3 +299,43 @@ def test_a_row_has_each_column_of_its_packet_in_its_place() -> None:
 def test_the_columns_of_a_capture_are_the_first_of_its_rows() -> None:
     names = tuple(field.name for field in fields(Packets))
     assert names == PacketRow.__struct_fields__[: len(names)]
+
+
+# --- columns of frames -----------------------------------------------------------------------------------------------
+
+ARM: Final = {"model": "urdf", "file": "models/arm.urdf", "fixed": False, "at": {"x": "5 m", "z": "1 m"}, "sensors": {}}
+FREE_SLOTS: Final = (*CENTRE_OF_SLOT, "angular_velocity")
+
+
+def test_columns_are_of_the_origins_of_links_as_on_tf_and_in_sensors() -> None:
+    objects = DRIVES.data["objects"] | {"hull": SOLIDS.data["objects"]["hull"]}
+    world = DRIVES.with_(("objects",), objects).with_(("robots", "arm"), ARM)
+    text, files = pin_assets(world.text(), "yard.yaml", DEPLOY)
+    drives = load_deployment(text, "yard.yaml").with_assets(files)
+    apart = set()
+    for deployment in (drives, load_deployment((DEPLOY / "table.yaml").read_text(), "table.yaml")):
+        layout = build_layout(deployment)
+        bodies = build_scene(deployment, layout).bodies
+        values = np.random.default_rng(1).normal(size=(3, layout.size))
+        frames = frames_of(layout, bodies, [FrameRow(tick, row.tobytes(), []) for tick, row in enumerate(values)])
+        for name, body in bodies.items():
+            entity, link = layout[name], body.links[0]
+            if not body.is_free:
+                assert not {*CENTRE_OF_SLOT, *CENTRE_OF_SLOT.values()} & {*frames.fields(name)}
+                continue
+            if not link.is_centred:
+                apart.add(name)
+            columns = {field: frames.column(name, field, 4 if field == "orientation" else 3) for field in FREE_SLOTS}
+            centres = [frames.column(name, field, 3) for field in CENTRE_OF_SLOT.values()]
+            for index, numbers in enumerate(values.tolist()):
+                _, position, orientation = forward_kinematics(body, entity, numbers)[0]
+                assert columns["position"][index].tolist() == [*position]
+                assert columns["orientation"][index].tolist() == [*orientation]
+                moves = twist(body, entity, numbers, 0)
+                assert columns["linear_velocity"][index].tolist() == [*moves.linear]
+                assert columns["angular_velocity"][index].tolist() == [*moves.angular]
+                slots = [numbers[at : at + 3] for at in map(entity.offsets.__getitem__, CENTRE_OF_SLOT)]
+                assert [centre[index].tolist() for centre in centres] == slots
+            with pytest.raises(CaptureError, match=f"{name}: position has 1 to 3 numbers, not 7"):
+                frames.column(name, "position", 7)
+    assert apart == {"arm", "hull", "one", "three", "two"}

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from collections.abc import Callable
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any, Final
 
+import jsonschema
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from foosim.analysis.export import export_capture
 from foosim.capture.cut import cut_capture
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.rehearsal.run import rehearse
@@ -18,6 +22,7 @@ from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
 from foosim.world.sensors.laser_scanner import LaserScannerSettings, directions
+from tests.own_forms import TABLE, folder_on_path, written
 
 SETS: Final = (
     "robots.rover01.sensors.place={kind: pose_3d, rate: 50 Hz, at: {x: 20 cm, z: 50 cm}}",
@@ -147,3 +152,53 @@ def test_bearings_are_those_of_the_first_and_the_last_beam(rays: int, angle: str
     (*_, last), (first, *_) = (list(directions(rays, settings.angle)) for _ in range(2))
     for bearing, way in zip(settings.bearings, (first, last), strict=True):
         assert (cos(bearing), sin(bearing), 0.0) == pytest.approx(way)
+
+
+OWN_SENSOR: Final = """
+class Told(Struct, frozen=True):
+    slide: Metres
+    words: str
+    ticks: list[int]
+    more: "Told | None" = None
+
+
+@sensor("own", SensorSettings, Told)
+class Sensor(Own):
+    def __init__(self, settings, at):
+        pass
+
+    def sample(self, view):
+        return Told(0.25, "grün", [view.tick, -1])
+"""
+
+
+def test_a_sensor_of_somebodys_own_is_shown_as_json_and_exported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also when nobody receives its readings; those of foosim's own are in packets, or Foxglove's messages."""
+    written(folder_on_path(tmp_path, monkeypatch), OWN_SENSOR)
+    own = "{kind: 'own_form:Sensor', rate: 50 Hz}"
+    sets = ("engine=pure", f"robots.red.goal.sensors.own={own}", f"robots.red.attack.sensors.own={own}")
+    heard = "players.player-red.robots={red.goal: [encoder, own], camera: [ball]}"
+    path = tmp_path / "run.mcap"
+    rehearse(TABLE.read_text(), TABLE.name, 30, None, (*sets, heard), capture=path)
+    found: dict[str, list[Any]] = {}
+    with path.open("rb") as file:
+        for schema, topic, message in make_reader(file, validate_crcs=True).iter_messages():
+            if topic.topic.startswith("/readings"):
+                assert schema is not None and (schema.encoding, topic.message_encoding) == ("jsonschema", "json")
+                told, content = json.loads(schema.data), json.loads(message.data)
+                jsonschema.Draft202012Validator(told).validate(content)
+                assert told["properties"]["slide"] == {"type": "number", "unit": "m"}
+                found.setdefault(topic.topic, []).append((message.log_time, content))
+    assert found.keys() == {"/readings/red.goal/own", "/readings/red.attack/own"}
+    for readings in found.values():
+        assert readings == [
+            (tick * 2_000_000, {"slide": 0.25, "words": "grün", "ticks": [tick, -1], "more": None})
+            for tick in range(0, 30, 10)
+        ]
+    export_capture(path, "packets", tmp_path / "packets.csv")
+    with (tmp_path / "packets.csv").open(newline="", encoding="utf-8") as stream:
+        sent = [line for line in csv.DictReader(stream) if line["channel"] == "own"]
+    told = [(int(line["sent_ns"]), json.loads(line["value"])) for line in sent]
+    assert told == found["/readings/red.goal/own"] and {line["destination"] for line in sent} == {"player-red"}

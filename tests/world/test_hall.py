@@ -73,7 +73,8 @@ def problems(text: str, *sets: str) -> list[str]:
          "hall.rover.drive.track: the wheels would be outside of the rover: more than twice its radius, '70 cm'"),
         ("hall.rover.battery.empty=30 V", "hall.rover.battery.empty: not below the full battery's voltage, '30 V'"),
         ("hall.rover.battery.capacity=3 V",
-         "hall.rover.battery.capacity: not an energy (a number and one of J, kJ, Wh, kWh); V measures a voltage, '3 V'"),
+         "hall.rover.battery.capacity: not an energy (a number and one of J, kJ, Wh, kWh); V measures a voltage, "
+         "'3 V'"),
         ("players.pilot01.process=west", "players.pilot01.process: a name that is also one of nodes, 'west'"),
         ("players.pilot01.process=vhub", "players.pilot01.process: a reserved name, 'vhub'"),
     ],

@@ -93,14 +93,23 @@ class MountedTogether:
         places, orientations = np.empty((3, count)), np.empty((4, count))
         if self._free:
             state = (np.array(numbers) if values is None else values)[self._places]
-            turned = multiplied(state[3:], self._back)
             place, orientation = self._mounts
-            middle = state[:3] - rotated(turned, self._centres)
-            places[:, self._free] = middle + rotated(turned, place)
+            origins, turned = free_poses(state, self._back, self._centres)
+            places[:, self._free] = origins + rotated(turned, place)
             orientations[:, self._free] = multiplied(turned, orientation)
         for number in self._jointed:
             places[:, number], orientations[:, number] = self._several[number].pose(numbers)
         return places, orientations
+
+
+def free_poses(state: Floats, back: Floats, centres: Floats) -> tuple[Floats, Floats]:
+    """Return the origins (3, n) and the orientations (4, n) of free links, with the bits of `forward_kinematics`.
+
+    `state` (7, n) are the slots `position` and `orientation`, `back` (4, n) the links' principal axes, conjugated, and
+    `centres` (3, n) their centres of mass.
+    """
+    turned = multiplied(state[3:], back)
+    return state[:3] - rotated(turned, centres), turned
 
 
 def _columns(rows: Sequence[Sequence[float]], size: int) -> Floats:

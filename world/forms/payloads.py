@@ -59,6 +59,13 @@ class PayloadCodec:
         return tuple(field.name for field in self.fields if field.is_number)
 
     @property
+    def size(self) -> int | None:
+        """How many bytes each payload has; None where they may differ."""
+        if not self.is_packed or self._least != self._most:
+            return None
+        return self._packed.size + 8 * self._many * self._most
+
+    @property
     def unit(self) -> str:
         """The units of its fields, each once."""
         return ", ".join(dict.fromkeys(field.unit for field in self.fields if field.unit))

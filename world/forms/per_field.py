@@ -110,12 +110,16 @@ def payload_bytes(component: Component, settings: ComponentSettings, counts: Map
     numbers = numbers_of(component, settings, counts)
     if numbers is not None:
         return 8 * numbers.size
-    fields = codec_of(component.name, component.form).fields
-    many = many_of(fields)
-    if not all(field.is_number for field in fields[: len(fields) - many]) or "joint_positions" not in component.needs:
+    codec = codec_of(component.name, component.form)
+    if codec.size is not None:
+        return codec.size
+    many = many_of(codec.fields)
+    singles = codec.fields[: len(codec.fields) - many]
+    is_of_joints = component.form == "actuator" and "joint_positions" in component.needs
+    if not is_of_joints or not all(field.is_number for field in singles):
         return None
-    joints = len(getattr(settings, "joints", None) or ()) or counts["joint_positions"]
-    return 8 * (len(fields) - many + many * joints)
+    joints = len(component.joints_named(settings) or ()) or counts["joint_positions"]
+    return 8 * (len(singles) + many * joints)
 
 
 def read_per_field(written: Any, numbers: Numbers, least: float | None = None) -> list[float | None]:
