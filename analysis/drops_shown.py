@@ -26,7 +26,6 @@ class Reported:
     deployment: Deployment
     watched: Mapping[str, Any]
     shown: Callable[[int], Frame | None] = lambda tick: None
-    has_counts: bool = True
 
     @property
     def versions(self) -> Mapping[str, str]:

@@ -113,7 +113,6 @@ class _Captured:
     def __init__(self, capture: CaptureData) -> None:
         self.deployment = capture.deployment
         self.versions = capture.about.versions
-        self.has_counts = capture.about.has_counts
         self._capture = capture
 
     def asked(self, until: int) -> Iterator[tuple[int, str]]:
@@ -164,7 +163,7 @@ def _head(stages: Stages) -> str:
     row = stages.row
     is_robot = row.source in stages.evidence.deployment.robots
     number = f"tick {row.sequence >> OUTBOX_SHIFT}, place {row.sequence & 0xFFFF}" if is_robot else "its own count"
-    number += f", count {row.count} on its channel" if is_robot and stages.evidence.has_counts else ""
+    number += f", count {row.count} on its channel" if is_robot else ""
     via = f" via {row.radio}" if row.radio and row.radio != row.rule else ""
     copy = f", copy {row.copy}" if row.copy else ""
     how = "published" if row.published else "sent"
@@ -185,8 +184,6 @@ def _verdict(stages: Stages) -> str:
     else:
         later_ns = row.due_ns - row.sent_ns
         text = f"delivered at tick {row.arrival_tick}: due {_time(later_ns)} after it was sent"
-    if stages.number is None:
-        return f"{text}; its draws are not made again: the capture's format has no counts within channels"
     return text if stages.agrees else f"{text}; its draws are NOT those of the address in its row"
 
 

@@ -22,10 +22,10 @@ from foosim.vhub.radio.timings import LRWPAN
 from foosim.vhub.stages.medium import ACCESS_BLOCK, wifi_timing
 
 
-def attempts_of(row: PacketRow, number: int | None, setup: LinkSetup, *, broadcast: bool) -> tuple[float, list[str]]:
+def attempts_of(row: PacketRow, number: int, setup: LinkSetup, *, broadcast: bool) -> tuple[float, list[str]]:
     """Return the probability of a collision per attempt, and the result of each, none on media without contenders.
 
-    `number` is that of the packet's draws; where it is not known there are no results.
+    `number` is that of the packet's draws.
     """
     settings, contenders = setup.settings, max(1, row.contenders)
     if settings.medium == "wifi":
@@ -38,8 +38,6 @@ def attempts_of(row: PacketRow, number: int | None, setup: LinkSetup, *, broadca
     else:
         return 0.0, []
     attempts: list[str] = []
-    if number is None:
-        return threshold / UNIT, attempts
     key = (setup.sending if broadcast else setup.draws).of(row.channel)
     is_lost = row.decided_by.collision == "contention" or row.cause in ("snr", "out_of_range", "blocked")
     for attempt in range(row.retries + 1):

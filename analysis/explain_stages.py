@@ -69,10 +69,8 @@ def _share(word: int) -> str:
     return f"{word / UNIT:.6g}"
 
 
-def _beside(draw: int | None, threshold: int) -> str:
-    """Return a draw, if it is known, beside the threshold that it is compared with."""
-    if draw is None:
-        return f"a chance of {_share(threshold)}"
+def _beside(draw: int, threshold: int) -> str:
+    """Return a draw beside the threshold that it is compared with."""
     return f"draw {_share(draw)} is {'below' if draw < threshold else 'not below'} {_share(threshold)}"
 
 
@@ -85,10 +83,6 @@ class Evidence(Protocol):
     @property
     def versions(self) -> Mapping[str, str]:
         """Of libraries and link models, by name."""
-
-    @property
-    def has_counts(self) -> bool:
-        """Whether its rows have counts within channels, by which robots' packets draw."""
 
     def asked(self, until: int) -> Iterable[tuple[int, str]]:
         """Return what was asked of the network up to a tick: ticks and events as JSON, in their order."""
@@ -115,25 +109,14 @@ class Stages:
         self.setup: LinkSetup = self.link.setup_at(row.sent_ns)
         self.settings = self.setup.settings
         self.stages = dict(zip(STAGE_NAMES, (make(self.setup) for make in STAGES), strict=True))
-        draws, is_known = self.setup.draws, evidence.has_counts or not self.setup.draws.by_channel
-        self.number = draws.number(row.sequence, self.tick, row.count) if is_known else None
-        """The number of its draws under their key; None where the row lacks the count that is part of it."""
-        self.words = self._words()
+        draws = self.setup.draws
+        self.number = draws.number(row.sequence, self.tick, row.count)
+        """The number of its draws under their key."""
+        self.words = draw_words(draws.of(row.channel), self.number, row.copy)
+        """Its draws by slot, made again."""
         self._take(asked, self.tick + 1, last)
         """From here on what is known of cuts is what was known when it arrived."""
         self.is_broadcast = row.published and self.setup.sends_once
-
-    def _words(self) -> dict[int, int]:
-        """Return the packet's draws by slot: made again, or else those that its row has."""
-        row = self.row
-        if self.number is not None:
-            return dict(enumerate(draw_words(self.setup.draws.of(row.channel), self.number, row.copy)))
-        return {slot: word for slot, text in self._of_row.items() if (word := word_of(text)) is not None}
-
-    @property
-    def _of_row(self) -> dict[int, str]:
-        row = self.row
-        return {Slot.LOSS: row.loss_word, Slot.JITTER: row.jitter_word, Slot.ERROR: row.error_word}
 
     def _take(self, asked: list[tuple[int, str]], first: int, last: int) -> None:
         for tick, event in asked:
@@ -152,7 +135,9 @@ class Stages:
     @property
     def agrees(self) -> bool:
         """Whether no draw of the row is another when it is made again."""
-        return all(not word or word == f"{self.words[slot]:016x}" for slot, word in self._of_row.items())
+        row = self.row
+        of_row = {Slot.LOSS: row.loss_word, Slot.JITTER: row.jitter_word, Slot.ERROR: row.error_word}
+        return all(not word or word == f"{self.words[slot]:016x}" for slot, word in of_row.items())
 
     @property
     def dropped_by(self) -> str:
@@ -349,17 +334,14 @@ class Stages:
         facts: dict[str, Any] = {"bits_flipped": row.bits_flipped}
         if settings.corrupt is not None:
             rate, bits = settings.corrupt.bit_error_rate, 8 * row.size
-            draw, threshold = self.words.get(Slot.CORRUPT), stage.threshold(bits) if rate else 0
+            draw, threshold = self.words[Slot.CORRUPT], stage.threshold(bits) if rate else 0
             flipped = "some" if row.cause == CRC_FAIL else str(row.bits_flipped)
-            facts["error_rate"] = threshold / UNIT
+            facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
             parts.append(f"{flipped} bits flipped: {_beside(draw, threshold)}, {rate:g} a bit in {bits}")
-            if draw is not None:
-                facts["error_draw"] = draw / UNIT
         if settings.duplicate and row.copy == 0 and row.cause != CRC_FAIL:
-            draw, threshold = self.words.get(Slot.DUPLICATE), chance_threshold(settings.duplicate)
-            copied = "a copy or none" if draw is None else "a copy" if draw < threshold else "no copy"
-            drawn = "" if draw is None else f"draw {_share(draw)}, "
-            parts.append(f"{copied}: {drawn}{settings.duplicate:g}")
+            draw = self.words[Slot.DUPLICATE]
+            copied = "a copy" if draw < chance_threshold(settings.duplicate) else "no copy"
+            parts.append(f"{copied}: draw {_share(draw)}, {settings.duplicate:g}")
         return ", ".join(parts) or "a copy is not copied again", facts
 
     def _delay(self) -> Told:
@@ -367,8 +349,7 @@ class Stages:
         parts = dict(self._spent())
         waits_ns = row.due_ns - row.sent_ns - sum(parts.values())
         if waits_ns > 0:
-            is_known = self.settings.reorder is None or Slot.REORDER in self.words
-            parts["order, behind the one before it" if is_known else "order, or another one"] = waits_ns
+            parts["order, behind the one before it"] = waits_ns
         told = " + ".join(f"{what} {_time(ns)}" for what, ns in parts.items()) or "no delay"
         return f"{told} = due {_time(row.due_ns)}", {**parts, "due_ns": row.due_ns}
 
@@ -376,8 +357,7 @@ class Stages:
         row, settings = self.row, self.settings
         bad_ns = settings.burst.bad_extra_delay_ns if settings.burst is not None and row.is_bad else 0
         reorder = settings.reorder
-        word = self.words.get(Slot.REORDER)
-        late = reorder is not None and word is not None and word < chance_threshold(reorder.probability)
+        late = reorder is not None and self.words[Slot.REORDER] < chance_threshold(reorder.probability)
         spent = {
             "phase": row.phase_ns,
             "queue": row.queue_ns,
@@ -402,14 +382,11 @@ class Stages:
         facts |= {"evicted_by": by.evicted_by, "evicted_by_copy": by.evicted_by_copy, "under_way": by.under_way}
         other = f"number {by.evicted_by}" + (f", copy {by.evicted_by_copy}," if by.evicted_by_copy else "")
         other += f" on {by.evicted_by_channel}" if by.evicted_by_channel not in ("", row.channel) else ""
-        text += f": {other} took its place, "
-        if self.number is not None:
-            draws, block = self.setup.draws, by.evicted_by_copy | CAPACITY_BLOCK << BLOCK_SHIFT
-            number = draws.number(by.evicted_by, by.evicted_by >> OUTBOX_SHIFT, by.evicted_by_count)
-            draw = draw_words(draws.of(by.evicted_by_channel), number, block)[0]
-            facts["draw"] = draw / UNIT
-            text += f"draw {_share(draw)} "
-        return f"{text}among {by.under_way} under way", facts
+        draws, block = self.setup.draws, by.evicted_by_copy | CAPACITY_BLOCK << BLOCK_SHIFT
+        number = draws.number(by.evicted_by, by.evicted_by >> OUTBOX_SHIFT, by.evicted_by_count)
+        draw = draw_words(draws.of(by.evicted_by_channel), number, block)[0]
+        facts["draw"] = draw / UNIT
+        return f"{text}: {other} took its place, draw {_share(draw)} among {by.under_way} under way", facts
 
     def _receiver(self) -> Told:
         row, decided = self.row, self.row.decided_by

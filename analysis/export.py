@@ -61,7 +61,7 @@ def export_capture(path: Path, what: str, out: Path, form: Format | None = None)
         raise BadValue(f"--format: not one of {', '.join(FORMATS)}", form)
     if form == "parquet" and out == STANDARD_OUTPUT:
         raise BadValue("-o: a Parquet file is not written to standard output", str(out))
-    scan = Scan(path, earlier=True)
+    scan = Scan(path)
     messages = scan.messages()
     first = next(messages, None)
     deployment = deployment_of(scan.about)

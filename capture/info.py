@@ -76,7 +76,7 @@ PACKET_MARKS: Final = msgspec.json.Decoder(PacketMark)
 def capture_info(path: Path | str) -> CaptureInfo:
     """Return a capture in short, by one pass over the file."""
     path = Path(path)
-    scan = Scan(path, earlier=True)
+    scan = Scan(path)
     found = _Counts(scan)
     for message in scan.messages():
         found.take(message)

@@ -11,7 +11,6 @@ from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -48,7 +47,6 @@ from foosim.capture.parts import (
 )
 from foosim.capture.rows import (
     CLIENTS,
-    EARLIER_FORMATS,
     EPOCHS,
     FORMAT,
     FRAME,
@@ -58,7 +56,6 @@ from foosim.capture.rows import (
     RECOVERIES,
     ROW_TYPES,
     TICK,
-    WITHOUT_COUNTS,
     ClientRow,
     DigestHex,
     EditRow,
@@ -76,7 +73,7 @@ from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import decode_json
 from foosim.common.names import nearest_name
 from foosim.common.struct_types import Counter
-from foosim.deployment.loader import load_deployment, load_earlier
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import first_chain
 from foosim.world.assembly.world import build_scene
@@ -135,8 +132,6 @@ class About:
     versions: dict[str, str] = field(default_factory=dict)
     finished: bool = False
     unfinished_bytes: int = 0
-    earlier: bool = False
-    """Whether its format is an earlier one."""
     start_ns: int = 0
     end_ns: int = 0
     """Simulated times of the first and the last message, once the file was read to its end."""
@@ -147,24 +142,15 @@ class About:
     def deployment_name(self) -> str:
         return self.metadata["deployment"]
 
-    @property
-    def has_counts(self) -> bool:
-        """Whether the rows of packets have counts within channels, by which robots' packets draw."""
-        return self.metadata["format"] not in WITHOUT_COUNTS
-
 
 class Scan:
     """One pass over a file: yields the messages of some topics and collects the file's metadata (`about`)."""
 
-    def __init__(self, path: Path, since_ns: int = 0, *, earlier: bool = False) -> None:
-        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`).
-
-        `earlier`: captures of earlier formats are read, too.
-        """
+    def __init__(self, path: Path, since_ns: int = 0) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`)."""
         self.about = About(path)
         self._path = path
         self._since_ns = since_ns
-        self._earlier = earlier
 
     def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
         """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
@@ -200,10 +186,12 @@ class Scan:
             raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
 
     def _check(self, file: Joined) -> None:
-        """Refuse a file that is no capture, or one of another version, before its rows are read."""
+        """Refuse a file that is no capture, or one of another format, before its rows are read."""
         if file.profile != PROFILE or not self.about.metadata:
             raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
-        self._check_format(self.about.metadata.get("format", ""))
+        found = self.about.metadata.get("format", "")
+        if found != str(FORMAT):
+            raise CaptureError(f"{self._path}: format {found!r} of the capture is unsupported, valid is '{FORMAT}'")
         if not self.about.deployment_text or "deployment" not in self.about.metadata:
             raise CaptureError(f"{self._path}: the capture has no deployment")
         if not file.is_checked:
@@ -214,18 +202,6 @@ class Scan:
         is_described = file.is_checked and self.about.metadata and self.about.deployment_text
         if file.profile in ("", PROFILE) and not is_described:
             raise CaptureError(f"{self._path}: the capture is cut off before its first row")
-
-    def _check_format(self, found: str) -> None:
-        self.about.earlier = found in EARLIER_FORMATS
-        if found == str(FORMAT) or found in WITHOUT_COUNTS or (self.about.earlier and self._earlier):
-            return
-        if not self.about.earlier:
-            raise CaptureError(f"{self._path}: format {found!r} of a capture, this reads {FORMAT}")
-        wrote = self.about.versions.get("foosim", "of an unknown version")
-        raise CaptureError(
-            f"{self._path}: a capture of format {found}, written by foosim {wrote}, which can do this. foosim "
-            f"{version('foosim')} has format {FORMAT}, and reads format {found} by `info` and `export` alone"
-        )
 
     def _take(self, content: records.Metadata | records.Attachment) -> None:
         about = self.about
@@ -364,8 +340,7 @@ def read_about(path: Path) -> About:
 def deployment_of(about: About) -> Deployment:
     """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
     try:
-        load = load_earlier if about.earlier else load_deployment
-        return load(about.deployment_text, about.deployment_name).with_assets(about.files)
+        return load_deployment(about.deployment_text, about.deployment_name).with_assets(about.files)
     except Refused as error:
         raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
 

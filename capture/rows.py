@@ -22,10 +22,6 @@ from foosim.world.robot_packets import Delivered
 
 FORMAT: Final = 4
 """Version of the rows and of the capture's metadata."""
-WITHOUT_COUNTS: Final = frozenset({"3"})
-"""Versions before, which everything reads, and in which the rows of packets have no counts within channels."""
-EARLIER_FORMATS: Final = frozenset({"2"})
-"""Versions before, which `info` and `export` read and all else refuses."""
 PROFILE: Final = "foosim"
 
 CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
@@ -39,7 +35,7 @@ Fate = Literal["delivered", "dropped", "in_flight"]
 
 
 class Row(msgspec.Struct, frozen=True, gc=False):
-    """What every row shares: an object with all its fields. Other fields, which earlier formats have, are ignored."""
+    """What every row shares: an object with all its fields."""
 
 
 class EditRow(Row, frozen=True):

@@ -16,8 +16,6 @@ from foosim.client.failing import Unanswered, describe, in_library, place_of
 from foosim.common.errors import CHOICES_MAX
 from foosim.common.names import class_path_of, nearest_name
 
-PLAYERS: Final = "foosim.players"
-"""What comes with foosim; its `MOVED` has modules that deployments of earlier versions name, and where they are."""
 MADE_WITH: Final = ("deployment", "parameters")
 CALLED_WITH: Final = ("tick", "samples")
 SHOWN_MAX: Final = 100
@@ -44,9 +42,6 @@ def load_player(path: str) -> Callable[..., Any]:
     module_name, colon, class_name = path.partition(":")
     if not (module_name and colon and class_name):
         raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
-    moved = import_module(PLAYERS).MOVED.get(module_name)
-    if moved:
-        raise ClassPathError(path, f"the module has moved to {moved}", f"{moved}:{class_name}")
     module = _import(path, module_name)
     made: Any = getattr(module, class_name, None)
     if made is None:

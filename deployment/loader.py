@@ -63,8 +63,6 @@ from foosim.world.moving.upright import stands_upright
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
 The swarm's worlds are 25 texts."""
-EARLIER_SETTINGS: Final = (("capture", "payloads"),)
-"""Section and key of settings that captures of earlier formats may have in their deployments."""
 SECTION_OF_KEY: Final = {"model": "robots", "shape": "scenery", "class": "players"}
 """What an unused template is for, by a key that it has."""
 
@@ -87,16 +85,6 @@ def load_deployment(text: Text, name: str) -> Deployment:
 def read_deployment(text: Text, name: str) -> Deployment:
     """The result of `load_deployment`, without the cache."""
     return _check(*read_source(text, name))
-
-
-def load_earlier(text: str, name: str) -> Deployment:
-    """What `load_deployment` returns of a text with settings that an earlier version had; they are left out."""
-    tree, problems = read_source(text, name)
-    for section, key in EARLIER_SETTINGS:
-        fields = tree.values.get(section) if isinstance(tree, Fields) else None
-        if isinstance(fields, Fields):
-            fields.values.pop(key, None)
-    return _check(tree, problems)
 
 
 def _keep(text: Text, name: str, deployment: Deployment) -> Deployment:

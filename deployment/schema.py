@@ -152,10 +152,10 @@ class Deadlines(SpecBase):
         return self.model_copy(update=raised) if raised else self
 
 
-def _int_only(value: object) -> object:
+def _supported(value: object) -> object:
     """Literal[2] alone would take `2.0` for 2."""
-    if type(value) is not int:
-        raise custom_error(BadValue("not one of 1, 2", value))
+    if type(value) is not int or value != 2:
+        raise custom_error(BadValue("unsupported format (valid is 2)", value))
     return value
 
 
@@ -165,7 +165,7 @@ class Deployment(WorldSpec):
     Sections of kits, which make a world from few numbers, stand beside these keys: `table` and `hall` are such.
     """
 
-    format: Annotated[Literal[2], BeforeValidator(_int_only, json_schema_input_type=Literal[2])]
+    format: Annotated[Literal[2], BeforeValidator(_supported, json_schema_input_type=Literal[2])]
     pace: PaceField
     mixed_cpu: bool = False
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"

@@ -1,12 +1,5 @@
 """Controllers as content: players of the football table, the rovers of the warehouse with their base."""
 
-MOVED = {
-    "foosim.client.players": "foosim.players.football",
-    "foosim.client.patrol": "foosim.players.warehouse_rover",
-    "foosim.client.dispatch": "foosim.players.warehouse_base",
-}
-"""Modules that deployments of earlier versions name, and where their classes are."""
-
 OF_THE_TABLE = {
     "keeper": "foosim.players.football:Keeper",
     "passive": "foosim.players.football:Passive",

@@ -53,7 +53,7 @@ def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool =
     """Verify a capture file. With `from_first_frame` it may be a cut: what follows on its first frame is verified, not
     how that frame came.
 
-    Raises CaptureError for one that cannot be read, has an earlier format, or, without that, is a cut.
+    Raises CaptureError for one that cannot be read or, without that, is a cut.
     """
     if not from_first_frame:
         check_whole(read_about(Path(path)))

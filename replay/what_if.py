@@ -24,7 +24,7 @@ from foosim.capture.rows import ClientRow, PacketRow, edit_of
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.replay.what_if_reader import Frames, Offers, caveats, frames_for, parts_lacking, world_of
+from foosim.replay.what_if_reader import Frames, Offers, frames_for, parts_lacking, world_of
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import IN_FLIGHT, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
@@ -166,7 +166,7 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     offers = Offers(capture, frames, compared.keep, before.take_row)
     for flight in _judged(capture, deployment, offers, frames, after):
         compared.take(flight)
-    told = offers.earlier, caveats(capture), _age_changes(before, after)
+    told = offers.earlier, parts_lacking(capture), _age_changes(before, after)
     return replace(compared.result(), earlier=told[0], caveats=told[1], ages=told[2])
 
 
@@ -270,7 +270,7 @@ def _judged(
             edits = [edit_of(edit) for edit in offered.edits]
             fates: list[Flight] = []
             numbers = sorted(offered.robots)
-            counts = [offered.counts[key] for key in numbers] if capture.about.has_counts else None
+            counts = [offered.counts[key] for key in numbers]
             state.close_world(frame, [offered.robots[key] for key in numbers], fates, edits, counts)
             for name in owing:
                 state.leave(name)

@@ -57,16 +57,9 @@ def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
     return "captured" if set(judged_ticks(capture)) <= set(capture.frame_ticks.tolist()) else "computed"
 
 
-def caveats(capture: CaptureData) -> tuple[str, ...]:
-    """Return why fates may not be the captured ones without another network: what of the run the capture lacks."""
-    found = list(parts_lacking(capture))
-    if not capture.about.has_counts:
-        found.append("its format has no counts within channels: packets of robots are judged by other draws")
-    return tuple(found)
-
-
 def parts_lacking(capture: CaptureData) -> tuple[str, ...]:
-    """Return which end of its run a capture lacks, each with what follows from that."""
+    """Return which end of its run a capture lacks, each with what follows from that: fates may not be the captured
+    ones without another network."""
     found = []
     if CUT_TICK in capture.about.metadata:
         found.append("it begins within its run: what links remembered, and events asked for before, are not known")

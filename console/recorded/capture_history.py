@@ -147,10 +147,6 @@ class CaptureHistory:
     def versions(self) -> Mapping[str, str]:
         return self.recording.about.versions
 
-    @property
-    def has_counts(self) -> bool:
-        return self.recording.about.has_counts
-
     def asked(self, until: int) -> Iterable[tuple[int, str]]:
         return [asked for asked in self._asked if asked[0] <= until]
 

@@ -15,7 +15,6 @@ from typing import Final
 from foosim.common import limits
 from foosim.common.errors import describe
 from foosim.common.finding import path_text
-from foosim.deployment.text.earlier_format import upgrade
 from foosim.deployment.text.yaml import (
     NODES_MAX,
     Fields,
@@ -65,10 +64,8 @@ TextOf = Callable[[Wanted], str | None]
 
 @lru_cache(maxsize=TREES_KEPT)
 def _tree_of(text: str, file: str, rank: int) -> tuple[Tree | None, list[Problem]]:
-    """The result of `read_tree`, of a file of an earlier format as one of today's; it is not changed."""
-    tree, problems = read_tree(text, locate_in(file, rank))
-    upgrade(tree)
-    return tree, problems
+    """The result of `read_tree`; it is not changed."""
+    return read_tree(text, locate_in(file, rank))
 
 
 def read_source(source: str | Source, name: str) -> tuple[Tree | None, list[Problem]]:

@@ -73,8 +73,6 @@ CASES = [
     ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
     ("foosim.players.footbal:Team",
      "there is no module foosim.players.footbal, nearest is 'foosim.players.football:Team'"),
-    ("foosim.client.patrol:Patrol", "the module has moved to foosim.players.warehouse_rover,"
-     " nearest is 'foosim.players.warehouse_rover:Patrol'"),
     ("own_importer:Acts", "importing own_importer failed: ModuleNotFoundError: No module named 'own_missing'"
      " (FOLDER/own_importer.py:1: import own_missing)"),
     ("own_broken:Acts",

@@ -217,7 +217,6 @@ class Everything:
     """All that is known of a run in which nobody asked for anything, for who explains its rows."""
 
     versions: Final[Mapping[str, str]] = {}
-    has_counts = True
 
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment

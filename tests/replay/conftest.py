@@ -19,7 +19,6 @@ from foosim.capture.contents import declare_topics, write_all
 from foosim.capture.mcap.checks import CHECKS
 from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.mcap.writer import McapWriter
-from foosim.capture.parts import METADATA
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import FRAME, PROFILE, Fate, PacketRow
 from foosim.cli.replay import app
@@ -109,8 +108,8 @@ def messages_of(path: Path) -> list[Message]:
     return [content for content in contents_of(path) if isinstance(content, Message)]
 
 
-def rewritten(path: Path, out: Path, messages: Iterable[Message], chunk: int = 0, **metadata: str) -> Path:
-    """Write a capture with other messages, so many in a chunk; all of them for 0. `metadata`: entries of `foosim`."""
+def rewritten(path: Path, out: Path, messages: Iterable[Message], chunk: int = 0) -> Path:
+    """Write a capture with other messages, so many in a chunk; all of them for 0."""
     with out.open("xb", buffering=0) as stream:
         mcap = McapWriter(partial(write_all, stream.fileno()), PROFILE)
         channels = declare_topics(mcap)
@@ -120,8 +119,7 @@ def rewritten(path: Path, out: Path, messages: Iterable[Message], chunk: int = 0
             elif isinstance(content, records.Metadata) and content.name == CHECKS:
                 mcap.add_checks()
             elif isinstance(content, records.Metadata):
-                more = metadata if content.name == METADATA else {}
-                mcap.add_metadata(content.name, {**content.metadata, **more})
+                mcap.add_metadata(content.name, content.metadata)
         for number, message in enumerate(messages, 1):
             stamps = message.log_ns, message.publish_ns, message.sequence
             mcap.add_message(channels[message.topic], *stamps, message.data)

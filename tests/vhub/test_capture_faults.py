@@ -117,16 +117,18 @@ def test_what_is_no_capture_is_told_so(tmp_path: Path, hub_run: HubRun) -> None:
     assert refused(path) == "FILE: cannot be read, No such file or directory"
     path.write_bytes(b"\x89PNG\r\n and so on")
     assert refused(path) == "FILE: no MCAP file, it does not start as one"
-    about = {"format": "3", "deployment": "table.yaml"}
+    about = {"format": "4", "deployment": "table.yaml"}
     assert refused(mcap_with(path, "ros2", None)) == "FILE: no capture of foosim, its profile is 'ros2', not 'foosim'"
-    assert refused(mcap_with(path, "foosim", {**about, "format": "1"})) == "FILE: format '1' of a capture, this reads 4"
+    for other in ("", "2", "3", "5", "04"):
+        unsupported = f"FILE: format '{other}' of the capture is unsupported, valid is '4'"
+        assert refused(mcap_with(path, "foosim", {**about, "format": other})) == unsupported
     assert refused(mcap_with(path, "foosim", about)) == "FILE: the capture has no deployment"
     lacking = mcap_with(path, "foosim", about, hub_run.text, checks=False)
     assert refused(lacking) == "FILE: the capture lacks its metadata 'foosim.digests'"
     row = mcap_with(path, "foosim", about, hub_run.text)
     assert refused(row).startswith("FILE: /tick at 5 ns: ")
     with pytest.raises(Refused):
-        open_capture(mcap_with(path, "foosim", about, "format: 1\nworld: [\n"))
+        open_capture(mcap_with(path, "foosim", about, "format: 2\nworld: [\n"))
 
 
 def test_what_is_cut_off_before_its_first_row_is_named_so(chunked: bytes, tmp_path: Path) -> None:

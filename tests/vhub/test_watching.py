@@ -172,7 +172,6 @@ class Everything:
     """All that was known of a run: what a capture would have."""
 
     versions: Final[Mapping[str, str]] = {}
-    has_counts = True
 
     def __init__(self, run: Run) -> None:
         self.deployment: Deployment = run.system.supervisor.state.deployment

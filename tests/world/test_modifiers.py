@@ -297,13 +297,3 @@ def test_a_reading_that_is_not_finite_is_said_once_and_not_sent(
         for tick in (45, 50, 55)
     ]
     assert sent == [1, 0, 0] and stepper.not_finite == {"red.goal own": 2}
-
-
-def test_a_file_of_format_1_has_its_noise_as_a_modifier() -> None:
-    lines = TEXT.replace("format: 2", "format: 1").splitlines()
-    noise = next(number for number, line in enumerate(lines) if line.strip() == "modifiers:")
-    earlier = [*lines[:noise], "        position_noise: 0.2 mm", "        angle_noise: 0.5 deg", *lines[noise + 5 :]]
-    deployment = load_deployment("\n".join(earlier) + "\n", TABLE.name)
-    assert deployment == load_deployment(TEXT, TABLE.name)
-    rod = deployment.robots["red.goal"].sensors["encoder"].modifiers
-    assert rod[0].std == {"slide": "0.2 mm", "spin": "0.5 deg"}  # type: ignore[attr-defined]
