@@ -39,7 +39,7 @@ def doctor(
 
     Checks versions, the players' classes, certificates (names, dates, keys, hosts), ports, the clock and disks, on
     this machine and through ssh on each host of the deployment. Of a host it also checks that it answers, that the
-    ports of supervisor and vHub are reached, the offset of its clock, and its systemd units. The check imports the
+    ports of supervisor and vHub are reached, and the offset of its clock. The check imports the
     modules of players and listens at the ports for a moment. Each line has a result and, where needed, what to do.
 
     Exit codes: 0 the deployment can run, 1 it cannot, 2 bad input.

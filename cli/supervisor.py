@@ -19,7 +19,7 @@ import typer
 from foosim.cli.run_command import with_options
 from foosim.common.errors import BadValue, Failed, Refused, read_at
 from foosim.launcher.run_options import RunOptions
-from foosim.runtime.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
 from foosim.runtime.early_signals import interrupting_signals, raise_noted
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.usage import BadUsage
@@ -473,55 +473,6 @@ def schema(
     with redirect_stdout(sys.stderr):  # what modules print is no result
         text = deployment_schema_text(installed=not own)
     print(text, end="")
-
-
-@app.command("install")
-def install_units(  # a command's options
-    host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path("deploy/cluster.yaml"),
-    listen: Annotated[
-        str | None, typer.Option(help="HOST:PORT of the supervisor; by default the deployment's.")
-    ] = None,
-    user: Annotated[bool, typer.Option("--user", help="Units of a user's systemd; with --print or --output.")] = False,
-    show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
-    output: Annotated[Path | None, typer.Option(help="Write the units into this folder of this machine.")] = None,
-    pki: PkiOption = None,
-    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
-) -> None:
-    """Install a systemd unit for each node of a host, on that host.
-
-    systemd restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. When the ssh
-    user is root, system units are installed, otherwise units of that user; these run without a login after
-    `loginctl enable-linger`.
-
-    With --pki the units are for runs with certificates. A node reads its certificate from the folder in the host's
-    `pki` setting; the files are sent there as by `foosim-pki init --send`.
-    """
-    from foosim.launcher.hosts.install import install, is_root_there, write_units
-    from foosim.launcher.hosts.ssh import Remote, unit_name
-    from foosim.launcher.hosts.systemd_units import units_of
-    from foosim.launcher.pki.hosts import files_for, send_files
-    from foosim.launcher.plan import make_plan
-
-    plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
-    deployment = plan.deployment
-    units = units_of(deployment, host, plan.address, user)
-    if show:
-        print("\n".join(f"# {name}\n{text}" for name, text in units.items()).rstrip())
-    elif output is not None:
-        print(*write_units(output, units), sep="\n")
-    elif user:
-        raise BadValue("--user goes with --print or --output; onto a host, whoever ssh logs in as decides", host)
-    else:
-        remote = Remote(host, deployment.hosts[host])
-        is_users = not is_root_there(remote)
-        if pki is not None:
-            print(*send_files(remote, pki, files_for(deployment, host)), sep="\n")
-        print(*install(remote, units_of(deployment, host, plan.address, is_users), is_users), sep="\n")
-    for name, node in deployment.nodes.items():
-        if unit_name(name) in units and node.launch != "systemd":
-            hint = "with `launch: systemd` `up` starts its unit"
-            print(f"node {name} has `launch: {node.launch}`; {hint}", file=sys.stderr)
 
 
 def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:

@@ -135,7 +135,6 @@ SHELLS = {
     "launcher/display.py",
     "cli/guard.py",
     "launcher/hosts/prepare.py",
-    "launcher/hosts/install.py",
     "launcher/begin.py",
     "launcher/detach.py",
     "launcher/doctor/checks.py",

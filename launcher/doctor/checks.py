@@ -31,11 +31,9 @@ from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import Refused, describe
 from foosim.deployment.processes import joint_processes, processes_of
 from foosim.deployment.schema import Deployment, places
-from foosim.launcher.hosts.install import SYSTEM_FOLDER, USER_FOLDER
 from foosim.launcher.hosts.port_check import REMEDIES, listen, why_not_reached
 from foosim.launcher.hosts.prepare import check_hosts
-from foosim.launcher.hosts.ssh import Remote, remotes, unit_name
-from foosim.launcher.hosts.systemd_units import units_of
+from foosim.launcher.hosts.ssh import Remote, remotes
 from foosim.launcher.new_capture import place_of
 from foosim.launcher.pki.hosts import identities_on, passwords_of
 from foosim.protocol import identity
@@ -383,38 +381,6 @@ def _commands(case: Case) -> Iterator[_Said]:
             yield name, "fine", found, ""
 
 
-def is_users_systemd() -> bool:
-    """Whether this user's units are those of a user's own systemd."""
-    return os.geteuid() != 0
-
-
-def _units(case: Case) -> Iterator[_Said]:
-    """On a host: the units of the nodes that systemd is to run there, as they would be written now."""
-    nodes, own = case.deployment.nodes, case.host
-    if own is None:
-        return
-    wanted = [name for name, host in places(case.deployment).items() if host == own and name in nodes]
-    wanted = [name for name in wanted if nodes[name].launch == "systemd"]
-    if not wanted:
-        return
-    secured = " --pki DIR" if case.ca else ""
-    remedy = f"foosim-supervisor install {case.host} FILE{secured}, with the run's --listen and --set"
-    is_users = is_users_systemd()
-    folder = Path(os.path.expandvars(USER_FOLDER if is_users else SYSTEM_FOLDER))
-    try:
-        units = units_of(case.deployment, own, case.address, is_users)
-    except Refused as refused:
-        yield "units", "problem", refused.what, remedy
-        return
-    for name in map(unit_name, wanted):
-        try:
-            is_same = (folder / name).read_text() == units[name]
-        except OSError:
-            yield name, "problem", f"not in {folder}", remedy
-            continue
-        yield (name, "fine", "", "") if is_same else (name, "warning", "is not as it would be written now", remedy)
-
-
 def _players(case: Case) -> Iterator[_Said]:
     """Whether the classes of the players that are to run on this machine can be imported here."""
     deployment, elsewhere = case.deployment, places(case.deployment)
@@ -440,7 +406,6 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "ports": _ports,
     "clock": _clock,
     "disk": _disk,
-    "units": _units,
     "hosts": _placement,
     "network": _network,
 }

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
 
-from foosim.common.errors import BadValue
-from foosim.common.names import nearest_name
 from foosim.deployment.hosts import Host
 from foosim.deployment.schema import Deployment, places
 from foosim.runtime.children import BY_SIGNAL, GUARD, OTHER_VERSION
@@ -111,16 +109,8 @@ class Remote:
 
 
 def unit_name(node: str) -> str:
-    """Return the name of the unit of systemd that runs a node."""
-    return f"foosim-{node}.service"
-
-
-def remote_of(deployment: Deployment, host: str) -> Remote:
-    """Return a host by its name. Raises BadValue, with the hosts that there are, for a name that none has."""
-    if host not in deployment.hosts:
-        declared = ", ".join(sorted(deployment.hosts)) or "none"
-        raise BadValue(f"unknown host (declared: {declared})", host, nearest_name(host, deployment.hosts))
-    return Remote(host, deployment.hosts[host])
+    """Return the name of the unit of systemd that runs a node, by its template in deploy/systemd."""
+    return f"foosim-node@{node}.service"
 
 
 def remotes(deployment: Deployment) -> dict[str, Remote]:

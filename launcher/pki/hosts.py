@@ -7,19 +7,22 @@ needs the passwords of all clients, to compare them. Nothing else is ever sent.
 from __future__ import annotations
 
 import shlex
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from foosim.common import wall_clock
 from foosim.common.errors import Failed
 from foosim.deployment.processes import joint_processes
 from foosim.deployment.schema import Deployment, places
-from foosim.launcher.hosts.install import run_there
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.hosts.ssh import SSH_FAILED, Remote
 from foosim.protocol import identity
 from foosim.protocol.channels import VHUB
 from foosim.runtime.transport.certificate_folder import CA_FILE, PASSWORD_SUFFIX, CertificateError
 from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials, read_password
+
+SEND_S: Final = 60.0
 
 
 def identities_on(deployment: Deployment, host: str | None) -> list[str]:
@@ -67,7 +70,7 @@ def send_files(remote: Remote, folder: Path, names: Sequence[str]) -> list[str]:
         path = f"{remote.host.pki.rstrip('/')}/{name}"
         there, target = shlex.quote(remote.host.pki), shlex.quote(path)
         script = f"umask 077; mkdir -p {there} && cat >{target}.new && mv {target}.new {target}"
-        run_there(remote, script, content)
+        _run_there(remote, script, content)
         paths.append(path)
     return paths
 
@@ -87,3 +90,20 @@ def _checked(folder: Path, name: str) -> str:
         return path.read_text("ascii")
     except (OSError, UnicodeDecodeError) as error:
         raise CertificateError(f"{path}: cannot be read, {error}") from None
+
+
+def _run_there(remote: Remote, script: str, text: str) -> str:
+    """Return the output of a shell script on a host, with `text` as its input. Raises Failed."""
+    command = remote.ssh(["sh", "-c", script])
+    try:
+        done = subprocess.run(command, input=text, capture_output=True, text=True, timeout=SEND_S, check=False)
+    except FileNotFoundError:
+        raise Failed("there is no ssh here") from None
+    except subprocess.TimeoutExpired:
+        raise Failed(f"host {remote.name}: no answer within {SEND_S:g} s") from None
+    if done.returncode != 0:
+        lines = done.stderr.splitlines()
+        if done.returncode == SSH_FAILED:
+            raise Failed(remote.why(done.returncode, lines))
+        raise Failed(f"host {remote.name}: {'; '.join(lines[-1:])}")
+    return done.stdout

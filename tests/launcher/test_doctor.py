@@ -54,7 +54,7 @@ def found(case: Case, subject: str) -> Finding:
 def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: Path) -> None:
     (folder / "ca.key").unlink()
     findings = examine(Case(deployment, "127.0.0.1", pki=folder))
-    assert {finding.check for finding in findings} == CHECKS.keys() - {"units", "hosts", "network"}, "which others have"
+    assert {finding.check for finding in findings} == CHECKS.keys() - {"hosts", "network"}, "which others have"
     assert [finding for finding in findings if finding.state == "problem"] == [] and is_well(findings)
     for finding in findings:
         assert (finding.state == "fine") == (finding.remedy == ""), finding

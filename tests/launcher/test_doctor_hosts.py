@@ -15,12 +15,9 @@ from foosim.common.errors import Malformed
 from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.launcher.doctor import checks as doctor
 from foosim.launcher.doctor.checks import CLOCK_WARN_NS, Answer, Case, Finding, Told, examine, findings_of, fingerprint
 from foosim.launcher.doctor.remote import GREETING, Question, serve
-from foosim.launcher.hosts import install
 from foosim.launcher.hosts.ssh import Remote
-from foosim.launcher.hosts.systemd_units import units_of
 from foosim.launcher.pki import certificates
 from foosim.launcher.pki.hosts import files_for
 from foosim.runtime.transport.certificate_files import read_certificate
@@ -120,20 +117,6 @@ def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> Non
     assert on_host(left)["node.blue"].remedy == "foosim-pki init DIR FILE --send"
     nowhere = on_host(Case(deployment, LISTEN, host="left", ca=ca))["folder"]
     assert nowhere.state == "problem" and "set hosts.left.pki" in nowhere.remedy
-
-
-def test_a_hosts_units_are_those_that_would_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for folder in ("USER_FOLDER", "SYSTEM_FOLDER"):
-        monkeypatch.setattr(doctor, folder, str(tmp_path))
-    deployment = deployed("nodes.blue.launch=systemd")
-    case = Case(deployment, LISTEN, insecure=True, host="left")
-    name = "foosim-blue.service"
-    assert on_host(case)[name].state == "problem" and "install left" in on_host(case)[name].remedy
-    install.write_units(tmp_path, units_of(deployment, "left", case.address, doctor.is_users_systemd()))
-    assert on_host(case)[name].state == "fine"
-    moved = Case(deployment, "192.168.10.9:7400", insecure=True, host="left")
-    assert on_host(moved)[name].state == "warning"
-    assert name not in on_host(Case(deployed(), LISTEN, insecure=True, host="left")), "`up` starts it"
 
 
 def test_a_host_answers_a_question_and_tries_to_reach_the_supervisor() -> None:

@@ -21,7 +21,6 @@ from foosim.common.errors import Failed
 from foosim.deployment.hosts import Host
 from foosim.launcher.children.processes import Child, Launcher
 from foosim.launcher.hosts import ssh as remote_module
-from foosim.launcher.hosts.install import install
 from foosim.launcher.hosts.prepare import fetch_capture
 from foosim.launcher.hosts.ssh import CAPTURE, Remote
 from foosim.runtime.transport.certificates import operator_credentials
@@ -207,41 +206,22 @@ def test_a_run_whose_host_does_not_have_foosim_says_so_and_ends(there: There, ho
     assert processes_with(str(house.folder / "state")) == {}
 
 
-def test_units_are_written_onto_the_host(there: There) -> None:
-    """As an ordinary user has them, so that this machine's own systemd is not touched."""
-    log = there.folder / "systemctl.log"
-    systemctl = there.bin / "systemctl"
-    systemctl.write_text(f'#!/bin/sh\necho "$@" >>{log}\n')
-    systemctl.chmod(0o755)
-    units = {"foosim-red.service": "[Service]\nExecStart=a '$b' \"c\" \\d %%e\n"}
-    (path,) = install(there.remote(), units, is_users=True)
-    assert path == f"{there.home}/.config/systemd/user/foosim-red.service"
-    assert Path(path).read_text() == units["foosim-red.service"]
-    assert log.read_text() == "--user daemon-reload\n"
-    systemctl.write_text("#!/bin/sh\necho there is no bus >&2\nexit 1\n")
-    with pytest.raises(Failed, match="host there: there is no bus"):
-        install(there.remote(), units, is_users=True)
-
-
 SYSTEMCTL: Final = """#!{python}
-# Stands in for systemd: starts what a unit says, with its credentials and a notify socket, keeps what it is told.
-import os, pathlib, shlex, shutil, socket, subprocess, sys
-*_, verb, unit = sys.argv
-text = (pathlib.Path("{units}") / unit).read_text()
+# Stands in for systemd: starts an instance of a template with a notify socket, keeps the notifications.
+import os, pathlib, shlex, socket, subprocess, sys
+template, name = sys.argv[-1].removesuffix(".service").split("@")
+text = pathlib.Path("{deploy}/systemd", template + "@.service").read_text()
 (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
-os.mkdir("{units}/lent", 0o700)
-for credential in [line for line in text.splitlines() if line.startswith("LoadCredential=")]:
-    name, path = credential.removeprefix("LoadCredential=").split(":")
-    shutil.copy(path, "{units}/lent/" + name)
-line = line.replace("%d", "{units}/lent")
+line = line.replace("/opt/foosim/bin", "{commands}").replace("%i", name).replace("${{FOOSIM_SUPERVISOR}}", "{address}")
 if os.fork() == 0:
     os.setsid()
     null = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(null, number)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told, open("{units}/told", "ab", 0) as log:
-        told.bind("{units}/notify")
-        environment = {{**os.environ, "NOTIFY_SOCKET": "{units}/notify", "WATCHDOG_USEC": "400000"}}
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told, open("{folder}/told", "ab", 0) as log:
+        told.bind("{folder}/notify")
+        environment = {{**os.environ, "NOTIFY_SOCKET": "{folder}/notify", "WATCHDOG_USEC": "400000"}}
+        environment["FOOSIM_PKI"] = "{pki}"
         node = subprocess.Popen(shlex.split(line.removeprefix("ExecStart=")), env=environment)
         told.settimeout(0.1)
         while node.poll() is None:
@@ -254,16 +234,15 @@ if os.fork() == 0:
 
 
 def test_a_node_that_systemd_runs_takes_part(there: There, house: House) -> None:
-    """The unit is the one that `install` writes, with the node's certificate; the launcher has it started; it tells
-    systemd how it does."""
+    """The unit is an instance of the template in deploy/systemd; the launcher starts it, and it notifies systemd."""
     units, folder = there.folder / "units", certificates(there.folder / "certs")
+    units.mkdir()
     address = f"127.0.0.1:{free_port()}"
     hosts = {"there": there.host(pki=str(folder))}
     sets = [f"hosts={json.dumps(hosts)}", "nodes.blue.host=there", "nodes.blue.launch=systemd", LONG]
     place = ["--listen", address, "--pki", str(folder), *(word for setting in sets for word in ("--set", setting))]
-    code, out, err = house.run("foosim-supervisor", "install", "there", TABLE, *place, "--output", units)
-    assert (code, out, err) == (0, f"{units}/foosim-blue.service\n", "")
-    (there.bin / "systemctl").write_text(SYSTEMCTL.format(python=sys.executable, units=units))
+    where = {"deploy": TABLE.parent, "commands": COMMANDS, "folder": units, "pki": folder, "address": f"tls/{address}"}
+    (there.bin / "systemctl").write_text(SYSTEMCTL.format(python=sys.executable, **where))
     (there.bin / "systemctl").chmod(0o755)
 
     run = house.start("foosim-supervisor", "run", TABLE, *place)
@@ -276,7 +255,6 @@ def test_a_node_that_systemd_runs_takes_part(there: There, house: House) -> None
     def told() -> list[str]:
         return (units / "told").read_text().splitlines() if (units / "told").exists() else []
 
-    assert sorted(path.name for path in (units / "lent").iterdir()) == ["ca.pem", "node.blue.key", "node.blue.pem"]
     with Control(f"tls/{address}", operator_credentials(folder)) as control:
         wait_for("blue to be here", lambda: "blue" in control.status()["processes"])
         assert control.status()["processes"]["blue"]["host"] == "there"
