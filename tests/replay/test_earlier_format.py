@@ -26,7 +26,7 @@ from foosim.vhub.state import hub_state
 from tests.replay.conftest import TABLE, messages_of, replay, rewritten
 
 LINKS = (
-    "network.links=[{id: evict, from: camera, to: player-blue, capacity: 1, delay: 30 ms, loss: 5 %},"
+    "network.links=[{id: camera, from: camera, to: player-blue, delay: 30 ms, loss: 5 %},"
     " {id: all, from: '*', to: '*', delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}, loss: 20 %, duplicate: 20 %,"
     " reorder: {probability: 20 %, extra: 3 ms}, corrupt: {bit_error_rate: 0.1 %}}]"
 )
