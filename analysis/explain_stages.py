@@ -18,19 +18,17 @@ from foosim.common.keyed_random import UNIT, Slot, chance_threshold, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.custom_models import VERSION_KEY
-from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import size_of_payload
 from foosim.vhub.network.timeline import FOREVER_NS
 from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.admission import NODE_DOWN
-from foosim.vhub.stages.capacity import CAPACITY_BLOCK, EVICTED
 from foosim.vhub.stages.corruption import CRC_FAIL, Mangle
 from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED
 from foosim.vhub.stages.duty import Duty
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 from foosim.vhub.stages.residual import Residual
-from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.vhub.state.in_flight_limit import TRANSIT_FULL
 from foosim.world.frame import Frame
 
@@ -39,7 +37,7 @@ Told = tuple[str, dict[str, Any]]
 
 STAGE_NAMES: Final = (
     *("admission", "policy", "duty", "queue", "medium", "channel", "residual", "custom_model", "corruption", "delay"),
-    *("capacity", "receiver"),
+    "receiver",
 )
 _AT_SENDING: Final = {
     **dict.fromkeys(("too_big", "node_down", "no_route"), "admission"),
@@ -55,7 +53,6 @@ _AT_SENDING: Final = {
 _AT_ARRIVAL: Final = {
     **dict.fromkeys(("partition", "expired"), "policy"),
     **dict.fromkeys(("collision", "snr", "out_of_range"), "channel"),
-    **dict.fromkeys((EVICTED,), "capacity"),
     **dict.fromkeys(("rx_down", "rx_full"), "receiver"),
 }
 """Which stage has dropped a packet, by cause."""
@@ -372,21 +369,6 @@ class Stages:
             "clog": row.held_ns,
         }
         return ((what, ns) for what, ns in spent.items() if ns)
-
-    def _capacity(self) -> Told:
-        row, most, by = self.row, self.settings.capacity, self.row.decided_by
-        facts: dict[str, Any] = {"capacity": most, "evicted": row.cause == EVICTED}
-        text = f"at most {most} on their way at once"
-        if row.cause != EVICTED:
-            return f"{text}, it kept its place", facts
-        facts |= {"evicted_by": by.evicted_by, "evicted_by_copy": by.evicted_by_copy, "under_way": by.under_way}
-        other = f"number {by.evicted_by}" + (f", copy {by.evicted_by_copy}," if by.evicted_by_copy else "")
-        other += f" on {by.evicted_by_channel}" if by.evicted_by_channel not in ("", row.channel) else ""
-        draws, block = self.setup.draws, by.evicted_by_copy | CAPACITY_BLOCK << BLOCK_SHIFT
-        number = draws.number(by.evicted_by, by.evicted_by >> OUTBOX_SHIFT, by.evicted_by_count)
-        draw = draw_words(draws.of(by.evicted_by_channel), number, block)[0]
-        facts["draw"] = draw / UNIT
-        return f"{text}: {other} took its place, draw {_share(draw)} among {by.under_way} under way", facts
 
     def _receiver(self) -> Told:
         row, decided = self.row, self.row.decided_by

@@ -123,8 +123,7 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     A `collision` is `contention` (the medium's), `interference`, or `half_duplex`: its receiver was on air itself.
     `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
     `duty_cycle` there is the airtime that was left; with `queue_full` and `queue_codel` how many packets waited, and of
-    CoDel for how long waits had been above its target, and which drop in a row it is; with `evicted` who took its
-    place (else -1) with its channel and its `count`, and how many were under way; with `rx_full` the bytes that its
+    CoDel for how long waits had been above its target, and which drop in a row it is; with `rx_full` the bytes that its
     source had left of its share.
     """
 
@@ -134,11 +133,6 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     queue_packets: Counter = 0
     codel_above_ns: Counter = 0
     codel_drops: Counter = 0
-    evicted_by: CounterOrNone = -1
-    evicted_by_copy: Counter = 0
-    evicted_by_channel: str = ""
-    evicted_by_count: Counter = 0
-    under_way: Counter = 0
     room_left: Counter = 0
     room_share: Counter = 0
 

@@ -290,20 +290,8 @@ def clog(
 
 
 @app.command()
-def chaos(
-    lasts: Annotated[str, typer.Option("--for", help="Duration in simulated time, at most 1 h.", show_default=False)],
-    among: Annotated[str, typer.Option(help="Endpoints, with commas.")] = "*",
-    random: Random = False,
-    run: Run = None,
-    json: Json = False,
-) -> None:
-    """Disturb links with random delays, losses, copies, clogs and partitions, drawn from the run's seed."""
-    _show(control.network({"chaos": {"among": _split(among)}, **_for(lasts, random)}, run), json)
-
-
-@app.command()
 def heal(
-    what: Annotated[str, typer.Argument(help="all, partitions, clogs, chaos or settings.")] = "all",
+    what: Annotated[str, typer.Argument(help="all, partitions, clogs or settings.")] = "all",
     run: Run = None,
     json: Json = False,
 ) -> None:

@@ -17,8 +17,7 @@ from foosim.deployment.radio_checks import is_on_air, radio_findings
 
 JITTER_RATIO_MAX: Final = 100
 NO_ENDPOINT: Final = "a selector that matches no endpoint"
-CHAOS_NS_MAX: Final = 3_600_000_000_000
-_LASTING: Final = ("partition", "clog", "chaos")
+_LASTING: Final = ("partition", "clog")
 
 
 def check_network(data: object) -> Iterator[Finding]:
@@ -279,35 +278,17 @@ def event_findings(view: View, location: Location, event: Any, links: Sequence[s
         if key in event:
             yield Finding((*location, key), f"{action} happens at once", key, at="key")
     yield from _ends(view, location)
-    if action == "chaos":
-        yield from _chaos(view, location)
     if action == "partition":
         groups = view.get(*location, "partition")
         for index in range(len(groups) if isinstance(groups, list) else 0):
             yield from _matches(view, (*location, "partition", index), (REST,))
     for side in ("from", "to"):
         yield from _matches(view, (*location, "clog", side))
-    yield from _matches(view, (*location, "chaos", "among"))
     link = view.get(*location, "set", "link")
     if isinstance(link, str) and link not in links:
         yield Finding((*location, "set", "link"), "unknown link rule", link, view.nearest(link, links))
     if view.mapping(*location, "set"):
         yield from _impairments(view, (*location, "set"))
-
-
-def _chaos(view: View, location: Location) -> Iterator[Finding]:
-    """Chaos has an end, and is short enough for all its partitions to be known beforehand."""
-    if view.get(*location, "for") is None and view.get(*location, "until") is None:
-        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
-    random, at = view.get(*location, "for", "exponential"), view.get(*location, "at")
-    for key in ("for", "until"):
-        try:
-            lasts_ns = units.parse_ns(random if key == "for" and random is not None else view.get(*location, key))
-            lasts_ns -= 0 if key == "for" or at is None else units.parse_ns(at)
-        except BadValue:
-            continue
-        if lasts_ns > CHAOS_NS_MAX:
-            yield Finding((*location, key), "chaos of more than 1 h", view.get(*location, key))
 
 
 def _ends(view: View, location: Location) -> Iterator[Finding]:

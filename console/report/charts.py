@@ -20,7 +20,6 @@ BAND_COLOURS: Final[Mapping[str, str]] = {
     "partition": "#d55e00",
     "clog": "#e69f00",
     "settings": "#0072b2",
-    "chaos": "#cc79a7",
 }
 SHADES: Final = ("partition", "clog")
 """What is drawn behind all charts."""

@@ -163,7 +163,7 @@ class Happening:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A time in which something held: `partition`, `clog`, `settings` or `chaos`."""
+    """A time in which something held: `partition`, `clog` or `settings`."""
 
     kind: str
     start_ns: int
@@ -458,12 +458,9 @@ class _Gathered:
                 "clog", hold.start_ns, hold.end_ns, f"{_members(hold.sources)} to {_members(hold.destinations)}"
             )
         for change in timeline.settings:
-            if change.rule:
-                yield from self._band(
-                    "settings", change.start_ns, change.end_ns, f"{change.rule}: {impairments_text(change.changes)}"
-                )
-        for chaos in timeline.chaos:
-            yield from self._band("chaos", chaos.start_ns, chaos.end_ns, f"among {_members(chaos.among)}")
+            yield from self._band(
+                "settings", change.start_ns, change.end_ns, f"{change.rule}: {impairments_text(change.changes)}"
+            )
 
     def _band(self, kind: str, start_ns: int, end_ns: int, text: str) -> Iterator[Band]:
         """Yield a band as far as it lies in the run."""

@@ -55,7 +55,7 @@ class RuleTexts:
         lines: list[str] = []
         for rule in self._profiles.rules_for(source, destination):
             profile = self._profiles.of_rule(rule, source, destination)
-            changes = self._timeline.changes_of(profile.rule, source, destination)
+            changes = self._timeline.changes_of(profile.rule)
             in_force = [change for change in changes if change.start_ns <= at_ns < change.end_ns]
             lines.append(self._rule(rule, profile, in_force, who or {}))
         lines += [f"{what}{self._when(event, who or {})}" for what, event in cut]

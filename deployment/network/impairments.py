@@ -215,8 +215,6 @@ class Impairments(SpecBase):
     overhead_bytes: Annotated[int, Quantity(units.SIZE, "0 B", "10 kB")] = default("0 B", "overhead")
     queue: Queue = Field(default_factory=Queue)
     trace: Trace | None = None
-    capacity: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """How many packets are on their way at once at most; one more takes the place of a random one (`evicted`)."""
     corrupt: Corrupt | None = None
     duplicate: Probability = default("0 %")
     reorder: Reorder | None = None

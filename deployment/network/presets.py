@@ -63,18 +63,6 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "queue": {"packets": _v(10, "[J]")},
         "mtu": _v("512 B", "[J]"),
     },
-    "chaos": {
-        "medium": _v(
-            "none", "everything that can go wrong on a wire, at once; fixed values, events make them come and go"
-        ),
-        "jitter": _v(
-            {"shape": "shifted_exp", "min": "15 ms", "mean": "65 ms"}, "[S] middle of TigerBeetle src/vopr.zig"
-        ),
-        "loss": _v("15 %", "[S] the same: 0 to 30 %"),
-        "duplicate": _v("25 %", "[S] the same: 0 to 50 % replayed"),
-        "capacity": _v(11, "[S] the same: paths of 2 to 20"),
-        "order": _v("free", "[S] the same: packets overtake"),
-    },
     "wifi_2_4_indoor": {
         **_WIFI,
         "frequency": _v("2.437 GHz", "IEEE 802.11 channel 6"),

@@ -26,7 +26,7 @@ Distance = Annotated[float, Quantity(units.LENGTH, "1 mm", "100 km")]
 Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 
 PresetName = Literal[
-    "perfect", "range_only", "acoustic", "chaos", "wifi_2_4_indoor", "wifi_5_indoor", "dot11p", "lte", "lora_eu868",
+    "perfect", "range_only", "acoustic", "wifi_2_4_indoor", "wifi_5_indoor", "dot11p", "lte", "lora_eu868",
     "zigbee", "wired_1g", "internet",
 ]  # fmt: skip
 Environment = Literal[

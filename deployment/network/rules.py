@@ -118,21 +118,11 @@ class Change(Impairments):
     link: Name
 
 
-class Chaos(SpecBase):
-    """Random delays, loss, copies, clogs and partitions on all links between the selected endpoints, drawn by seed.
-
-    The ranges are those of TigerBeetle's simulator (src/vopr.zig).
-    """
-
-    preset: Literal["tigerbeetle_swarm"] = "tigerbeetle_swarm"
-    among: Selectors = default("*")
-
-
 class Event(SpecBase):
     """Something that happens to the network `at` a simulated time: exactly one of the actions is written.
 
-    Partitions and clogs last `for` a time or `until` one, else to the next heal; chaos needs an end. With `symmetric`
-    off only what goes from the first group to the others is cut.
+    Partitions and clogs last `for` a time or `until` one, else to the next heal. With `symmetric` off only what
+    goes from the first group to the others is cut.
     """
 
     at_ns: Moment = Field(alias="at")
@@ -142,8 +132,7 @@ class Event(SpecBase):
     symmetric: bool = True
     clog: Clog | None = None
     set: Change | None = None
-    chaos: Chaos | None = None
-    heal: Literal["all", "partitions", "clogs", "chaos", "settings"] | None = None
+    heal: Literal["all", "partitions", "clogs", "settings"] | None = None
 
 
 def event_of(text: str, at_ns: int) -> Event:
@@ -151,7 +140,7 @@ def event_of(text: str, at_ns: int) -> Event:
     return Event.model_validate({**json.loads(text), "at": f"{at_ns} ns"})
 
 
-ACTIONS: Final = ("partition", "clog", "set", "chaos", "heal")
+ACTIONS: Final = ("partition", "clog", "set", "heal")
 
 
 class Defaults(SpecBase):

@@ -66,8 +66,6 @@ def event_words(event: Event) -> str:
         what = f"clog from {', '.join(event.clog.from_)} to {', '.join(event.clog.to)}"
     elif event.set is not None:
         what = f"set {event.set.link}: {impairments_text(event.set)}"
-    elif event.chaos is not None:
-        what = f"chaos {event.chaos.preset} among {', '.join(event.chaos.among)}"
     else:
         what = f"heal {event.heal}"
     if event.lasts is not None:

@@ -51,7 +51,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Timeline._events": 2 * EVENTS_MAX,
     "Timeline.settings": 2 * EVENTS_MAX,
     "Timeline.holds": 2 * EVENTS_MAX,
-    "Timeline.cuts": 1 << 16,  # an hour of chaos has some 10,000
+    "Timeline.cuts": 2 * EVENTS_MAX,
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers that ticks do not bound."""

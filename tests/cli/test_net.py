@@ -101,7 +101,7 @@ def test_lint_of_a_network_alone_says_what_it_cannot_know(command: Command, tmp_
     done = command("lint", file)
     assert done.code == 2
     assert [line.split(": ", 1)[1] for line in done.err.splitlines()] == [
-        "network.radios.wifi.preset: not one of perfect, range_only, acoustic, chaos, wifi_2_4_indoor, wifi_5_indoor,"
+        "network.radios.wifi.preset: not one of perfect, range_only, acoustic, wifi_2_4_indoor, wifi_5_indoor,"
         " dot11p, lte, lora_eu868, zigbee, wired_1g, internet, 'wifi_5', nearest is 'wifi_5_indoor'",
         "network.radios.wifi.loss: not a probability (a number and one of p, %), 2",
         "network.links[0]: missing key, 'to'",
@@ -133,7 +133,7 @@ def test_presets_have_a_source_for_each_value(command: Command) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [("lint", "nosuch.yaml"), ("explain", "nosuch.mcap", "a:1"), ("presets", "x"), ("partition", "a"), ("clog", "a"),
-     ("partition", "a", "b", "--random"), ("chaos",), ("set", "lan", "loss"), ("explain", "x.mcap", "camera")],
+     ("partition", "a", "b", "--random"), ("set", "lan", "loss"), ("explain", "x.mcap", "camera")],
     ids=" ".join,
 )  # fmt: skip
 def test_bad_input_is_refused_without_a_traceback(command: Command, arguments: tuple[str, ...]) -> None:
@@ -143,8 +143,7 @@ def test_bad_input_is_refused_without_a_traceback(command: Command, arguments: t
 
 @pytest.mark.parametrize(
     "arguments",
-    [("top",), ("heal",), ("set", "lan", "loss=5%"), ("partition", "a", "b"), ("clog", "a", "b"),
-     ("chaos", "--for", "1s")],
+    [("top",), ("heal",), ("set", "lan", "loss=5%"), ("partition", "a", "b"), ("clog", "a", "b")],
     ids=" ".join,
 )  # fmt: skip
 def test_without_a_run_it_says_so(command: Command, arguments: tuple[str, ...]) -> None:

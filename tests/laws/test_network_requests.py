@@ -34,7 +34,7 @@ EVENTS: Final[Sequence[tuple[int, dict[str, Any]]]] = (
     (40, {"clog": {"from": "camera", "to": "player-*"}}),
     (50, {"set": {"link": "lan", "loss": "30 %", "order": "free"}}),
     (70, {"heal": "clogs"}),
-    (80, {"chaos": {"among": ["player-*", "*.goal"]}, "for": {"exponential": "60 ms"}}),
+    (80, {"clog": {"from": ["player-*", "*.goal"], "to": "*"}, "for": {"exponential": "60 ms"}}),
     (100, {"partition": [["*.goal"], ["player-blue"]], "symmetric": False}),
     (110, {"heal": "all"}),
 )

@@ -1,7 +1,7 @@
 """Law 6 for what robots send: a packet draws by seed, link, channel, tick and its count within the channel.
 
 So another sensor shifts no draw, though it shifts the sequence numbers of its robot's other packets. What these share
-with it they share still: the order and the bursts of a link, its queue and its capacity, the air.
+with it they share still: the order and the bursts of a link, its queue, the air.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pytest
 
 from foosim.analysis.explain import explain_row
 from foosim.capture.rows import ClientRow, PacketRow
-from foosim.common.keyed_random import UNIT, draw_key, draw_words
+from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.vhub.links.fabric import Fabric
@@ -22,7 +22,6 @@ from foosim.vhub.network.draw_address import counts_within_channels
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.stages.capacity import CAPACITY_BLOCK, EVICTED
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
@@ -87,10 +86,7 @@ def row(flight: Flight) -> dict[str, Any]:
     """The row of a packet without the numbers that only order a robot's packets."""
     found = packet_row(flight)
     if flight.source == ROBOT:
-        decided = found.decided_by
-        if decided.evicted_by >= 0:
-            decided = msgspec.structs.replace(decided, evicted_by=0)
-        found = msgspec.structs.replace(found, sequence=0, decided_by=decided)
+        found = msgspec.structs.replace(found, sequence=0)
     return {name: getattr(found, name) for name in PacketRow.__struct_fields__}
 
 
@@ -155,7 +151,6 @@ def test_one_more_who_hears_a_broadcast_changes_nothing_for_the_others(name: str
 
 SHARED: Final[dict[str, tuple[str, frozenset[str]]]] = {
     "order": (FREE.replace("free", "fifo"), frozenset({"due_ns", "arrival_tick", "fate"})),
-    "capacity": (f"{FREE}, capacity: 4", frozenset({"fate", "cause", "decided_by"})),
     "a chain of bursts": (
         f"{FREE}, gilbert_elliott: {{p: 5 %, r: 30 %}}",
         frozenset({"is_bad", "fate", "cause", "due_ns", "arrival_tick", "jitter_word", "jitter_ns"}),
@@ -180,7 +175,7 @@ def test_where_packets_compete_their_draws_are_equal_all_the_same(name: str) -> 
     found = differing(usual, beside)
     assert found and set().union(*found.values()) <= may_differ, set().union(*found.values()) - may_differ
     lost = [{address for address, f in run.items() if f.cause == "random_loss"} for run in (usual, beside)]
-    if name in ("order", "capacity"):
+    if name == "order":
         assert lost[0] == lost[1] & usual.keys(), "who is lost by its draw alone is lost in both"
 
 
@@ -231,24 +226,13 @@ class Everything:
         return []
 
 
-def test_a_row_has_the_address_of_its_draws_and_of_those_that_evicted_it() -> None:
-    """`explain` makes them again: of the packet that took its place, which may be of another channel, too."""
-    deployment = deployment_of(rule(f"{FREE}, capacity: 4", ALL))
-    everything, evicted = Everything(deployment), 0
+def test_a_row_has_the_address_of_its_draws() -> None:
+    """`explain` makes them again."""
+    deployment = deployment_of(rule(FREE, ALL))
+    everything = Everything(deployment)
     found = drive(deployment, FIRST, ("air", "news", "scan"), ticks=60, talk=True)
-    by_number = {(f.source, f.sequence, f.destination, f.copy): f for f in found.values()}
-    setup = Fabric(deployment).link(ROBOT, "a", "news").setup_at(0)
     for flight in [f for f in found.values() if f.destination == "a"]:
-        explained = explain_row(everything, packet_row(flight))
-        assert explained.agrees
-        if flight.cause == EVICTED and flight.source == ROBOT:
-            evicted += 1
-            told = packet_row(flight).decided_by
-            by = by_number[ROBOT, told.evicted_by, "a", told.evicted_by_copy]
-            assert (told.evicted_by_channel, told.evicted_by_count) == (by.channel, by.count)
-            facts = next(step.facts for step in explained.steps if step.stage == "capacity")
-            assert facts["draw"] == setup.words(by, CAPACITY_BLOCK)[0] / UNIT
-    assert evicted > 100
+        assert explain_row(everything, packet_row(flight)).agrees
     changed = msgspec.structs.replace(packet_row(next(f for f in found.values() if f.count == 1)), count=0)
     assert explain_row(everything, changed).verdict.endswith("its draws are NOT those of the address in its row")
 

@@ -71,12 +71,7 @@ NETWORKS: Final[dict[str, tuple[str, ...]]] = {
     "trace": rules("trace: {file: lte.trace}, queue: {packets: 30}, duplicate: 10 %"),
     "table": rules("jitter: {shape: table, file: wild.dist, mean: 8 ms, sd: 4 ms}, order: free"),
     "errors": rules("corrupt: {bit_error_rate: 0.002 p, deliver: true}, reorder: {probability: 20 %, extra: 9 ms}"),
-    "capacity": rules(f"delay: 15 ms, capacity: 3, duplicate: 20 %, {WORKED}"),
     "late": rules(f"rate: 300 kbit/s, ttl: 12 ms, {WORKED}"),
-    "chaos": (
-        *rules("delay: 1 ms"),
-        "network.events=[{at: 20 ms, chaos: {}, until: 130 ms}, {at: 125 ms, heal: all}]",
-    ),
     "events": (
         *rules(f"delay: 9 ms, {WORKED}, ttl: 30 ms"),
         "network.events=[{at: 20 ms, for: 30 ms, partition: [[a, b], [rest]]}, "
@@ -94,7 +89,6 @@ NETWORKS: Final[dict[str, tuple[str, ...]]] = {
 ASKED: Final = {
     30: {"partition": [["c"], ["rest"]], "for": "25 ms"},
     50: {"clog": {"from": "a", "to": "b"}, "for": {"exponential": "15 ms"}},
-    60: {"chaos": {"among": ["a", "d"]}, "for": "30 ms"},
     70: {"heal": "all"},
 }
 """Requests on a running system, by tick."""

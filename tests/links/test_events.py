@@ -1,4 +1,4 @@
-"""Events by simulated time: partitions at sending and at arrival, clogs, changes, chaos, and what heals them."""
+"""Events by simulated time: partitions at sending and at arrival, clogs, changes, and what heals them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pytest
 from foosim.deployment.network.rules import event_of
 from foosim.protocol.messages import Sent
 from foosim.vhub.links.fabric import Fabric
-from foosim.vhub.network.packet import Flight
 from foosim.world.edits import Disrupt
 from tests.links.offered import ENDS, MS, Hub, S, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
@@ -55,7 +54,7 @@ def test_a_partition_of_one_direction() -> None:
     assert {pair for pair in PAIRS if cut_at((when,), pair)} == {("a", "b"), ("a", "c"), ("a", "d")}
 
 
-@pytest.mark.parametrize("heal", ["all", "partitions", "clogs", "chaos", "settings"])
+@pytest.mark.parametrize("heal", ["all", "partitions", "clogs", "settings"])
 def test_each_heals_its_own(heal: str) -> None:
     lines = (
         "{at: 10 ms, partition: [[a], [rest]]}",
@@ -200,25 +199,6 @@ def test_channels_of_one_link_keep_their_order_behind_a_clog() -> None:
         due = {f.sequence: f.due_ns for f in (*hub.fates, *hub.state.in_flight())}
         found.append([due[number] for number in range(1, 91)])
     assert found[0] == found[1] == sorted(set(found[0]))
-
-
-def test_chaos_comes_and_goes(proof: Proof) -> None:
-    """Between its times everything is as it was; within, every kind of trouble comes, by its own seed."""
-    lines = ("{at: 1 s, chaos: {among: [a, b, c]}, until: 60 s}", "{at: 30 s, heal: chaos}")
-    deployment = deployment_of(f"seed={proof.seed}", rule("delay: 1 ms", "from: '*', to: '*'"), events(*lines))
-    fabric = Fabric(deployment)
-    found: list[Flight] = list(fates(fabric, every(5 * MS, 8000)))
-    calm = [f for f in found if f.sent_ns < S or f.sent_ns >= 30 * S]
-    assert {f.due_ns - f.sent_ns for f in calm if f.sent_ns < S - 2 * MS} == {MS}
-    late = [f for f in calm if f.sent_ns >= 40 * S - 5 * MS]
-    assert all(f.due_ns - f.sent_ns == MS and not f.cause for f in late)
-    causes = {f.cause for f in found if S <= f.sent_ns < 30 * S}
-    assert {"", "random_loss"} <= causes and any(f.is_doubled for f in found)
-    apart = list(fates(Fabric(deployment), every(5 * MS, 8000), ends=("a", "d")))
-    assert all(not f.cause and f.due_ns - f.sent_ns == MS for f in apart), "d is not among them"
-    seeds = {tuple(f.cause for f in fates(Fabric(deployment.model_copy(update={"seed": seed})), every(5 * MS, 2000)))
-             for seed in range(10)}  # fmt: skip
-    assert len(seeds) == 10
 
 
 def test_a_request_is_as_an_event_of_the_file() -> None:

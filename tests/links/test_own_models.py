@@ -236,7 +236,7 @@ def test_a_capture_without_its_package(tmp_path: Path, foggy: Path, monkeypatch:
 def test_a_report_shows_the_model_with_its_parameters() -> None:
     """Whatever these are called, and are."""
     model = "model: {name: fog, parameters: {loss: many, late_ns: [1, {a: null}]}}"
-    (link,) = deployment_of(rule(f"{model}, loss: 1 %, capacity: 3")).network.links
+    (link,) = deployment_of(rule(f"{model}, loss: 1 %, order: free")).network.links
     told = 'link model fog {"loss":"many","late_ns":[1,{"a":null}]}'
     assert told in impairments_text(link)
     radio = deployment_of(f"network.radios={{r: {{preset: wifi_5_indoor, {model}}}}}").network.radios["r"]

@@ -43,7 +43,7 @@ NETWORK: Final = """network={
     {id: back, from: player-blue, to: "*", via: zigbee},
     {id: far, from: player-red, to: "red.*", via: far},
     {id: full, from: camera, to: player-red, via: wire, rate: 10 kbit/s, queue: {packets: 2}},
-    {id: evict, from: camera, to: player-blue, via: wire, capacity: 1, delay: 30 ms, corrupt: {bit_error_rate: 0.3 %}},
+    {id: camera, from: camera, to: player-blue, via: wire, delay: 30 ms, corrupt: {bit_error_rate: 0.3 %}},
     {id: end, from: "*", to: "*", via: wire}],
   events: [
     {at: 300 ms, partition: [[camera], [player-blue]], for: 40 ms},
@@ -84,9 +84,8 @@ def steps(capture: CaptureData, row: PacketRow) -> dict[str, Step]:
 
 STAGES: Final[dict[tuple[str, str, str], str]] = {
     ("back", "queue_full", ""): "queue",
-    ("evict", "crc_fail", ""): "corruption",
-    ("evict", "evicted", ""): "capacity",
-    ("evict", "partition", ""): "policy",
+    ("camera", "crc_fail", ""): "corruption",
+    ("camera", "partition", ""): "policy",
     ("far", "out_of_range", ""): "channel",
     ("full", "queue_codel", ""): "queue",
     ("full", "queue_full", ""): "queue",
@@ -114,9 +113,8 @@ def facts_of(capture: CaptureData, rows: list[PacketRow]) -> list[dict[str, Any]
 
 DECIDED: Final[dict[tuple[str, str, str], Callable[[dict[str, Any]], bool]]] = {
     ("back", "queue_full", ""): lambda f: f["packets"] == f["packets_max"] == 10,
-    ("evict", "crc_fail", ""): lambda f: f["error_draw"] < f["error_rate"] == pytest.approx(1 - 0.997**192),
-    ("evict", "evicted", ""): lambda f: f["under_way"] == 1 and f["evicted_by"] > 0,
-    ("evict", "partition", ""): lambda f: "event 0" in (f["cut_at_sending"], f.get("cut_at_arrival")),
+    ("camera", "crc_fail", ""): lambda f: f["error_draw"] < f["error_rate"] == pytest.approx(1 - 0.997**192),
+    ("camera", "partition", ""): lambda f: "event 0" in (f["cut_at_sending"], f.get("cut_at_arrival")),
     ("far", "out_of_range", ""): lambda f: f["received_dbm"] < f["sensitivity_dbm"] == -10.0,
     ("full", "queue_codel", ""): lambda f: f["above_ns"] >= f["interval_ns"] and f["drops"] > 0 < f["packets"],
     ("full", "queue_full", ""): lambda f: f["packets"] == f["packets_max"] == 2,
@@ -150,12 +148,6 @@ def test_interference_of_lora_is_told_by_spreading_factor(capture: CaptureData, 
         assert any(other["ratio_db"] < other["needed_db"] for other in facts["others"].values())
     others = facts_of(capture, [by_both])[0]["others"]
     assert (others[7]["needed_db"], others[8]["needed_db"]) == (6.0, -16.0)
-
-
-def test_what_was_evicted_is_told_of_the_packet_that_came(capture: CaptureData, lost: Lost) -> None:
-    rows = {row.sequence: row for row in capture.rows(PACKETS) if isinstance(row, PacketRow) and row.rule == "evict"}
-    for row in lost["evict", "evicted", ""]:
-        assert row.sent_ns < rows[row.decided_by.evicted_by].sent_ns <= row.due_ns
 
 
 def test_who_does_not_get_as_far_as_copying_has_no_copy(capture: CaptureData, lost: Lost) -> None:

@@ -35,8 +35,7 @@ NETWORKS: Final = {
     "lte": "radios: {m: {preset: lte}}, robots: {'*': [m]}",
     "events": "links: [{id: w, from: '*', to: '*', delay: 1 ms}], events: ["
     "{at: 40 ms, for: 60 ms, partition: [[player-red], [rest]]}, {at: 90 ms, for: {exponential: 30 ms},"
-    " clog: {from: player-blue, to: '*'}}, {at: 100 ms, set: {link: w, loss: 30 %}},"
-    " {at: 140 ms, until: 300 ms, chaos: {}}]",
+    " clog: {from: player-blue, to: '*'}}, {at: 100 ms, set: {link: w, loss: 30 %}}]",
 }
 PLACES: Final = "places: {player-red: [-20 m, 3 m, 1 m], player-blue: [3 m, 0 m, 1 m], camera: [0 m, 0 m, 2 m]}"
 

@@ -31,7 +31,6 @@ from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.timeline import FOREVER_NS, Timeline
 from foosim.vhub.radio.propagation import Propagation
 from foosim.vhub.stages import STAGES
-from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.custom_model import Own
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.queue import Queue
@@ -81,7 +80,7 @@ class Link:
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
         """Return the link's settings at a time, and the start and end of their validity."""
         settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
-        for change in self._timeline.changes_of(self.rule, self.source, self.destination):
+        for change in self._timeline.changes_of(self.rule):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
             for edge_ns in (change.start_ns, change.end_ns):
@@ -177,8 +176,6 @@ class Link:
     def turn_away(self, flight: Flight, cause: str) -> None:
         """Drop a packet that exceeds the limit of packets in flight."""
         self._drop(flight, cause)
-        if self.state.under_way:
-            leave(self.state, flight)
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
         """Judge a packet at arrival, by the settings of its time of sending, whatever was sent on the link since.
@@ -197,8 +194,6 @@ class Link:
         else:
             state.delivered += is_offered
             state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
-        if state.under_way:
-            leave(state, flight)
         return not flight.cause
 
 

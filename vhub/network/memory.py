@@ -30,12 +30,6 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Dropped packets by cause."""
     model: bytes = b""
     """The memory of a custom link model, as msgpack."""
-    under_way: list[tuple[int, int, Numbers]] = []
-    """On links with a capacity: (sequence, copy, replaced by) of the packets in flight.
-
-    The last is empty, or sequence and copy of another packet, how many were under way when that came, and the channel
-    and the count by which it drew.
-    """
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

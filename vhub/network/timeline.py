@@ -1,4 +1,4 @@
-"""The time line of a network: partitions, clogs, changed settings and chaos, as functions of simulated time.
+"""The time line of a network: partitions, clogs and changed settings, as functions of simulated time.
 
 It is made from the deployment's events and from what was asked for while the run went on, in the order of time; every
 random length is drawn from (seed, number of the event), so that the same time line comes out wherever it is made.
@@ -14,11 +14,10 @@ from typing import Final
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.rules import REST, Event, Network, selects
-from foosim.vhub.network.chaos import chaos_settings, clogs_of_chaos, partitions_of_chaos
 from foosim.vhub.network.series_math import exponential_ns
 
 FOREVER_NS: Final = 2**62
-HEALED: Final = ("partitions", "clogs", "chaos", "settings")
+HEALED: Final = ("partitions", "clogs", "settings")
 """What `heal` ends by kind; `all` is each of them."""
 
 
@@ -54,23 +53,12 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """New settings of a rule (of every link among some endpoints, when it names none) for a time."""
+    """New settings of a rule for a time."""
 
     start_ns: int
     end_ns: int
     rule: str
     changes: Impairments
-    among: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True, slots=True)
-class ChaosTime:
-    """A time of chaos among some endpoints, and the key of its draws."""
-
-    start_ns: int
-    end_ns: int
-    key: bytes
-    among: frozenset[str]
 
 
 class Timeline:
@@ -85,7 +73,6 @@ class Timeline:
         self.cuts: list[Cut] = []
         self.holds: list[Hold] = []
         self.settings: list[Settings] = []
-        self.chaos: list[ChaosTime] = []
         self.version = 0
         """Grows with every change: links look again."""
         self._compile()
@@ -99,14 +86,14 @@ class Timeline:
     def _compile(self) -> None:
         """Walk back through time, so that the next heal of each kind is known; at one moment the last entry is last."""
         self.version += 1
-        self.cuts, self.holds, self.settings, self.chaos = [], [], [], []
+        self.cuts, self.holds, self.settings = [], [], []
         heals: dict[str, int] = {}
         for event, purpose in sorted(self._events, key=lambda of: of[0].at_ns)[::-1]:
             if event.heal is not None:
                 heals |= dict.fromkeys(HEALED if event.heal == "all" else (event.heal,), event.at_ns)
             else:
                 self._take(event, purpose, heals)
-        for line in (self.cuts, self.holds, self.settings, self.chaos):
+        for line in (self.cuts, self.holds, self.settings):
             line.reverse()
 
     def _take(self, event: Event, purpose: str, heals: Mapping[str, int]) -> None:
@@ -124,13 +111,6 @@ class Timeline:
             self.holds.append(Hold(start_ns, healed("clogs"), *ends))
         elif event.set is not None:
             self.settings.append(Settings(start_ns, healed("settings"), event.set.link, event.set))
-        elif event.chaos is not None:
-            among = self._selected(event.chaos.among)
-            chaos = ChaosTime(start_ns, healed("chaos"), key, among)
-            self.chaos.append(chaos)
-            self.settings.append(Settings(start_ns, chaos.end_ns, "", chaos_settings(key), among))
-            for begin_ns, stop_ns, group, both in partitions_of_chaos(key, start_ns, chaos.end_ns, sorted(among)):
-                self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both, purpose))
 
     def _selected(self, globs: Sequence[str]) -> frozenset[str]:
         return frozenset(name for name in self._endpoints if selects(globs, name))
@@ -162,27 +142,19 @@ class Timeline:
     @property
     def has_holds(self) -> bool:
         """Whether there ever is a clog."""
-        return bool(self.holds or self.chaos)
+        return bool(self.holds)
 
     def holds_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is clogged, by start."""
-        times = [
+        return sorted(
             (hold.start_ns, hold.end_ns)
             for hold in self.holds
             if source in hold.sources and destination in hold.destinations
-        ]
-        for chaos in self.chaos:
-            if {source, destination} <= chaos.among:
-                times += clogs_of_chaos(chaos.key, chaos.start_ns, chaos.end_ns, source, destination)
-        return sorted(times)
+        )
 
-    def changes_of(self, rule: str, source: str, destination: str) -> list[Settings]:
-        """Return the changed settings of a link, in the order in which they apply."""
-        return [
-            change
-            for change in self.settings
-            if change.rule == rule or (not change.rule and {source, destination} <= change.among)
-        ]
+    def changes_of(self, rule: str) -> list[Settings]:
+        """Return the changed settings of a rule, in the order in which they apply."""
+        return [change for change in self.settings if change.rule == rule]
 
 
 def _end_ns(event: Event, key: bytes) -> int:

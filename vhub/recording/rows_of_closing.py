@@ -47,7 +47,6 @@ from foosim.vhub.network.ages import quantile
 from foosim.vhub.network.air import DEAF
 from foosim.vhub.network.memory import Age
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
-from foosim.vhub.stages.capacity import EVICTED
 from foosim.vhub.stages.duty import DUTY_CYCLE
 from foosim.vhub.stages.medium import COLLISION
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
@@ -132,7 +131,6 @@ DECIDING: Final[dict[str, tuple[str, ...]]] = {
     DUTY_CYCLE: ("duty_left_ns",),
     QUEUE_FULL: ("queue_packets",),
     CODEL: ("queue_packets", "codel_above_ns", "codel_drops"),
-    EVICTED: ("evicted_by", "evicted_by_copy", "under_way", "evicted_by_channel", "evicted_by_count"),
     RECEIVER_FULL: ("room_left", "room_share"),
 }
 """By cause of a drop, the fields of a row for what `Flight.decided_by` has."""

@@ -14,7 +14,6 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.stages.admission import Admit
-from foosim.vhub.stages.capacity import Capacity
 from foosim.vhub.stages.channel import Channel
 from foosim.vhub.stages.corruption import Mangle
 from foosim.vhub.stages.custom_model import Own
@@ -38,6 +37,5 @@ STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     Own.for_link,
     Mangle.for_link,
     Delay.for_link,
-    Capacity.for_link,
     Receiver.for_link,
 )

@@ -1,4 +1,4 @@
-// Events of the network by hand: forms of `foosim-net partition`, `clog`, `set`, `chaos` and `heal`.
+// Events of the network by hand: forms of `foosim-net partition`, `clog`, `set` and `heal`.
 
 import { dialog } from "./dialogs.js";
 import { field, h, select } from "./ui.js";
@@ -86,19 +86,8 @@ export class Disturb {
     });
   }
 
-  async chaos() {
-    const among = input("*", "*", { required: true });
-    const lasts = lasting("10 s", true);
-    const content = [field("Among", among), field("For", lasts, "Simulated time, at most 1 h.")];
-    await dialog("Chaos", content, {
-      action: "Begin",
-      danger: true,
-      send: () => this.ask({ chaos: { among: names(among.value) }, ...forTime(lasts) }),
-    });
-  }
-
   async heal() {
-    const what = select([["all", "everything"], ["partitions", "partitions"], ["clogs", "clogs"], ["chaos", "chaos"], ["settings", "settings"]], "all");
+    const what = select([["all", "everything"], ["partitions", "partitions"], ["clogs", "clogs"], ["settings", "settings"]], "all");
     await dialog("Heal", [field("What", what, "It ends at once, with what clogs hold.")], { action: "Heal", send: () => this.ask({ heal: what.value }) });
   }
 }

@@ -82,7 +82,6 @@ export class Network {
       button("Partition …", () => void this.disturb.partition(), { id: "partition" }),
       button("Clog …", () => void this.disturb.clog(), { id: "clog" }),
       button("Set …", () => void this.disturb.set(this._rule()), { id: "set" }),
-      button("Chaos …", () => void this.disturb.chaos(), { id: "chaos" }),
       button("Heal …", () => void this.disturb.heal(), { id: "heal" }),
     );
   }
@@ -214,7 +213,6 @@ export function eventText(event) {
   if (event.heal) return `heal ${event.heal}`;
   if (event.partition) return `partition ${event.partition.map(list).join(" | ")}${event.symmetric === false ? ", one way" : ""}${lasts}`;
   if (event.clog) return `clog from ${list(event.clog.from)} to ${list(event.clog.to)}${lasts}`;
-  if (event.chaos) return `chaos ${event.chaos.preset ?? "tigerbeetle_swarm"} among ${list(event.chaos.among ?? "*")}${lasts}`;
   if (event.set) return `set ${event.set.link}: ${Object.keys(event.set).filter((key) => key !== "link").join(", ")}`;
   return JSON.stringify(event);
 }
