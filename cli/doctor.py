@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from foosim.client.loading import look_in
 from foosim.common.addresses import check_listen
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -48,6 +49,7 @@ def doctor(
     deployment = load_deployment(text, str(file))
     address = deployment.listen if listen is None else listen
     check_listen(address, insecure, 2, pki is not None)
+    look_in(str(file.parent.absolute()))  # as `up` does
     findings = examine_all(Case(deployment, address, insecure, pki), str(file), text)
     if json:
         content = {"well": is_well(findings), "findings": [asdict(finding) for finding in findings]}

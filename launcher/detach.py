@@ -34,7 +34,12 @@ def detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
         code = process.poll()
         info = folder.info()
         if code is None and (info is None or not info.radio):
-            time.sleep(POLL_S)
+            try:
+                time.sleep(POLL_S)
+            except KeyboardInterrupt:  # then the command says that the run has not begun
+                process.terminate()
+                process.wait()
+                raise
             continue
         if code not in (None, DONE):
             raise Failed(f"run {folder.name} has ended with exit code {code}; the end of {path}:\n{_end_of(path)}")

@@ -261,8 +261,10 @@ class Output:
 def unfailing_output() -> AbstractContextManager[object]:
     """Make both output streams such that errors in writing do not end the run."""
     with ExitStack() as stack:
-        stack.enter_context(redirect_stdout(cast(TextIO, Output(sys.stdout))))
-        stack.enter_context(redirect_stderr(cast(TextIO, Output(sys.stderr))))
+        if sys.stdout is not None:  # it is None where it was closed before the start, which nothing minds
+            stack.enter_context(redirect_stdout(cast(TextIO, Output(sys.stdout))))
+        if sys.stderr is not None:
+            stack.enter_context(redirect_stderr(cast(TextIO, Output(sys.stderr))))
         return stack.pop_all()
 
 

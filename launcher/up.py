@@ -47,6 +47,8 @@ LEAVE_S: Final = 1.0
 """Deadline of the other processes after the supervisor's end, which waits for the vHub's capture."""
 AWAY_S: Final = 10.0
 """The same for other machines, whose process ends are noticed later."""
+HELD_S: Final = 5.0
+"""How long lines wait for the console's address while the run does not come up."""
 LOST_S: Final = 3.0
 """Time for the supervisor to notice the end of a child; it does not know one that never sent a hello."""
 HANGS_MAX: Final = 2
@@ -247,7 +249,10 @@ class Up:
 
     def _await(self, value: Callable[[], T | None]) -> T | None:
         """Return the first value of `value` that is not None; None when the run is over, or is to end, before."""
+        held_s = time.monotonic() + HELD_S
         while self._goes_on():
+            if time.monotonic() > held_s:
+                self.display.release()
             found = None if self._ending_s else value()
             if found is not None:
                 return found
@@ -287,7 +292,7 @@ class Up:
             )
             return stack.enter_context(control)
         except ConnectError:
-            self._supervisor_watch.unanswered(self._time_of(supervisor) - begun_s)
+            self._supervisor_watch.unconnected(self._time_of(supervisor) - begun_s)
             return None
 
     def _show(self, control: Control) -> None:

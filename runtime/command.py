@@ -10,9 +10,9 @@ import contextlib
 import gc
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
@@ -25,6 +25,8 @@ BAD_INPUT: Final = 2
 REFUSED: Final = 3
 INTERRUPTED: Final = 130
 HELP_WIDTH_MAX: Final = 100
+SESSION: Final = "foosim.runtime.transport.session"
+"""Many commands end without it."""
 PKI_VARIABLE: Final = "FOOSIM_PKI"
 """The folder with the certificates, without `--pki`."""
 
@@ -75,6 +77,7 @@ def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadU
     the time of a short command.
     """
     words = sys.argv[1:]
+    others = _sessions()
     if gc.get_freeze_count() == 0:
         gc.freeze()
     try:
@@ -92,13 +95,19 @@ def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadU
         code = FAILED
     except KeyboardInterrupt:
         code = INTERRUPTED
-    _end(code)
+    _end(code, others)
 
 
-def _end(code: int) -> NoReturn:
+def _sessions() -> Collection[Any]:
+    """Return the open sessions of this process: where a command is called by a program, they are the program's."""
+    session = sys.modules.get(SESSION)
+    return () if session is None else session.sessions()
+
+
+def _end(code: int, others: Collection[Any]) -> NoReturn:
     """End the process, also where a thread is inside Zenoh still, which would abort it at Python's own end."""
-    session = sys.modules.get("foosim.runtime.transport.session")  # many commands end without it
-    if session is not None and not session.end_all():
+    session = sys.modules.get(SESSION)
+    if session is not None and not session.end_all(others):
         atexit._run_exitfuncs()  # a terminal gets its settings back, among others
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):

@@ -118,7 +118,7 @@ def _fields(deployment: Deployment, layout: Layout, scene: Scene) -> list[dict[s
     fields = []
     for entity in layout.entities:
         body = scene.bodies.get(entity.name)
-        names = {} if body is None or body.links[0].is_centred else CENTRE_OF_SLOT
+        names = {} if body is None or not body.is_free or body.links[0].is_centred else CENTRE_OF_SLOT
         commanded = {f"{channel}.set_point": codec for channel, codec in _actuators(deployment, entity.name)}
         for name, start in entity.offsets.items():
             codec = commanded.get(name)

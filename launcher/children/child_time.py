@@ -51,8 +51,8 @@ class ChildTime:
         """Add the interval since the last observation. Without one at both of its ends all of it counts."""
         last, passed_s = self._last, now_s - self._at_s
         self._last, self._at_s = observed, now_s
-        if last is not None and observed is not None and (last.is_runnable or observed.is_runnable):
-            self._lacked_s += max(0.0, passed_s - (observed.processor_s - last.processor_s))
+        if last is not None and observed is not None and last.is_runnable and observed.is_runnable:
+            self._lacked_s += min(passed_s, max(0.0, passed_s - (observed.processor_s - last.processor_s)))
         if now_s >= self._window_s + WINDOW_S:
             window_s, lacked_s = now_s - self._window_s, self._lacked_s - self._lacked_before_s
             had = f"{window_s - lacked_s:.1f} s of processor time in {window_s:.0f} s"

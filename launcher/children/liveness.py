@@ -60,12 +60,12 @@ class SupervisorWatch:
         self._started_s = 0.0
         self.is_found = False
         """Whether it has published its address."""
-        self._silent_s = 0.0
-        """The time of the unanswered requests in a row, by its clock."""
+        self._silent_s = self._unconnected_s = 0.0
+        """The times of the unanswered requests, and of the failed connections, in a row, by its clock."""
 
     def started(self, now_s: float) -> None:
         """Its process was started or restarted."""
-        self._started_s, self.is_found, self._silent_s = now_s, False, 0.0
+        self._started_s, self.is_found, self._silent_s, self._unconnected_s = now_s, False, 0.0, 0.0
 
     def found(self) -> None:
         """It has published its address."""
@@ -73,7 +73,11 @@ class SupervisorWatch:
 
     def answered(self) -> None:
         """It has answered a request."""
-        self._silent_s = 0.0
+        self._silent_s = self._unconnected_s = 0.0
+
+    def unconnected(self, waited_s: float) -> None:
+        """It could not be connected to for this time of its clock, which a slow link or machine can do, too."""
+        self._unconnected_s += waited_s
 
     def unanswered(self, waited_s: float) -> None:
         """It has not answered a request for this time of its clock; does not count before it listens."""
@@ -84,6 +88,8 @@ class SupervisorWatch:
         """Return why its process is to be killed at a time of its clock; empty when it is not."""
         if self._silent_s >= self._unanswered_s:
             return f"it had not answered for {self._unanswered_s:g} s"
+        if self._unconnected_s >= self._start_s:
+            return f"it could not be connected to for {self._start_s:g} s (deadlines.start)"
         if not self.is_found and now_s - self._started_s >= self._start_s:
             return f"it had not published its address within {self._start_s:g} s (deadlines.start)"
         return ""

@@ -19,7 +19,7 @@ import re
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from itertools import chain, repeat
 from types import TracebackType
@@ -90,7 +90,7 @@ class _Attempt:
 
     def __init__(self, settings: dict[str, Any]) -> None:
         self._settings = settings
-        self._outcome: queue.SimpleQueue[zenoh.Session | zenoh.ZError] = queue.SimpleQueue()
+        self._outcome: queue.SimpleQueue[zenoh.Session | BaseException] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._is_abandoned = False
 
@@ -110,14 +110,14 @@ class _Attempt:
         except BaseException:  # a signal's
             self._abandon()
             raise
-        if isinstance(outcome, zenoh.ZError):
+        if isinstance(outcome, BaseException):
             raise outcome
         return outcome
 
     def _connect(self) -> None:
         try:
-            outcome: zenoh.Session | zenoh.ZError = _open(self._settings)
-        except zenoh.ZError as error:
+            outcome: zenoh.Session | BaseException = _open(self._settings)
+        except BaseException as error:  # noqa: BLE001  # it is raised where the session is waited for
             outcome = error
         with self._lock:
             if not self._is_abandoned:
@@ -476,7 +476,7 @@ def _name(key: str) -> str:
     return key.rpartition("/")[2]
 
 
-def _discard(outcome: zenoh.Session | zenoh.ZError) -> None:
+def _discard(outcome: zenoh.Session | BaseException) -> None:
     """Close the session of an attempt that was given up."""
     if isinstance(outcome, zenoh.Session):
         outcome.close()  # type: ignore[no-untyped-call]
@@ -524,18 +524,23 @@ def _start_inside(target: Callable[[], None], name: str) -> threading.Thread:
     return thread
 
 
-def end_all() -> bool:
-    """Close all sessions; False when a thread is inside Zenoh still: a process ends by `os._exit` then.
+def sessions() -> frozenset[Session]:
+    """Return the sessions that are open."""
+    return frozenset(_sessions)
+
+
+def end_all(but: Collection[Session]) -> bool:
+    """Close all sessions but these; False when a thread is inside Zenoh still: a process ends by `os._exit` then.
 
     A thread that Python ends inside Zenoh, as it does at exit, aborts the process.
     """
-    _close_all()
+    _close_all(but)
     return not any(thread.is_alive() for thread in _inside)
 
 
-def _close_all() -> None:
+def _close_all(but: Collection[Session] = ()) -> None:
     for session in list(_sessions):
-        if session.pid == os.getpid():
+        if session.pid == os.getpid() and session not in but:
             session.close()
 
 

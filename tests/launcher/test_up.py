@@ -392,7 +392,8 @@ def test_a_supervisor_that_cannot_be_reached_yet_is_tried_again_until_it_counts_
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(control, "CONNECT_S", 0.0)
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    options = RunOptions(TABLE, processes="each", sets=("deadlines.start=5 s",))
+    up = Up(make_plan(options), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
     with ExitStack() as stack:
         up.folder.write_info(RunInfo("run", "table", str(TABLE), 0, "", "tcp/127.0.0.1:1"))
@@ -402,12 +403,12 @@ def test_a_supervisor_that_cannot_be_reached_yet_is_tried_again_until_it_counts_
     supervisor, seconds = up._launcher.children[SUPERVISOR], count(0.0)
     monkeypatch.setattr(up, "_time_of", lambda child: next(seconds))
     with ExitStack() as stack:
-        for _ in range(UNANSWERED_MAX):
+        for _ in range(5):
             up._end_stalled_supervisor(supervisor)
             assert supervisor.exit_code is None and not supervisor.killed
             assert up._connect(stack) is None, "it lives: the run goes on, and another attempt follows"
         up._end_stalled_supervisor(supervisor)
-    assert supervisor.killed == "it had not answered for 5 s"
+    assert supervisor.killed == "it could not be connected to for 5 s (deadlines.start)"
     up._launcher.kill()
     up._launcher.close()
 

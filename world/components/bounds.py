@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf
+from math import inf, isfinite
 from operator import le
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -53,20 +53,23 @@ class CommandBounds:
         """Raises WrongResult for limits that are none."""
         self._made, self._codec, self._limits = made, codec, limits_of(made)
         self._within: Callable[[Any], Any] | None = getattr(made, "within", None)
-        self._ends: dict[int, tuple[tuple[float, ...], tuple[float, ...]]] = {}
-        """The least and the greatest values, by how many numbers a command has."""
+        self._size = -1
+        self._ends: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+        """How many numbers the last command had, with their least and greatest values."""
 
     def clamp(self, command: Any) -> tuple[Any, Sequence[Clamped]] | None:
-        """Return a command within the limits, and which numbers were not; None of one with too many numbers or too few.
+        """Return a command within the limits, and which numbers were not.
 
-        All its numbers are finite.
+        None of a command with too many numbers, too few, or one that is not finite, which modifiers may make.
         """
         if not self._codec.is_packed:
             return self._clamp_fields(command)
         numbers = self._codec.numbers(command)
         size = len(numbers)
-        low, high = self._ends[size] if size in self._ends else self._ends_of(size)
-        if len(low) != size:
+        if size != self._size:
+            self._keep_ends(size)
+        low, high = self._ends
+        if len(low) != size or not all(map(isfinite, numbers)):
             return None
         within, left = command, numbers
         if self._within is not None:
@@ -87,11 +90,9 @@ class CommandBounds:
         ]
         return within, beyond
 
-    def _ends_of(self, size: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _keep_ends(self, size: int) -> None:
         bounds = bounds_of(self._made, self._codec.fields, size)
-        ends = tuple(low for low, _ in bounds), tuple(high for _, high in bounds)
-        self._ends[size] = ends
-        return ends
+        self._size, self._ends = size, (tuple(low for low, _ in bounds), tuple(high for _, high in bounds))
 
     def _names(self, size: int) -> Sequence[str]:
         """Return what each number of a command is called."""
@@ -105,13 +106,19 @@ class CommandBounds:
         ]
 
     def _clamp_fields(self, command: Any) -> tuple[Any, Sequence[Clamped]]:
-        """Clamp the fields with limits of a command that is not all numbers."""
+        """Clamp the fields with limits of a command that is not all numbers; what is no number there stays."""
         units = {field.name: field.unit for field in self._codec.fields}
-        beyond = [
-            Clamped(name, units[name], value, min(max(value, low), high))
-            for name, (low, high) in self._limits.items()
-            if not low <= (value := getattr(command, name)) <= high
-        ]
-        if not beyond:
-            return command, NONE_CLAMPED
-        return msgspec.structs.replace(command, **{one.name: one.limit for one in beyond}), beyond
+        within: dict[str, Any] = {}
+        beyond: list[Clamped] = []
+        for name, (low, high) in self._limits.items():
+            value = getattr(command, name)
+            is_several = isinstance(value, tuple | list)
+            numbers = list(value) if is_several else [value]
+            clamped = [min(max(one, low), high) if isinstance(one, int | float) else one for one in numbers]
+            pairs = [pair for pair in zip(numbers, clamped, strict=True) if pair[0] != pair[1]]
+            found = [Clamped(name, units[name], *pair) for pair in pairs]
+            if found:
+                beyond += found
+                limits = [type(one)(limit) for one, limit in zip(numbers, clamped, strict=True)]
+                within[name] = type(value)(limits) if is_several else limits[0]
+        return (msgspec.structs.replace(command, **within), beyond) if beyond else (command, NONE_CLAMPED)

@@ -11,13 +11,17 @@ from typing import Final
 
 import numpy as np
 
+from foosim.common.names import CHANNEL_ECHO
 from foosim.world.components.bounds import Clamped
 from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.robot_packets import Delivered
 from foosim.world.spec import WorldSpec
 
+EVERY_TICKS: Final = 16
+"""A robot whose commands are clamped at each tick, as those of a controller in saturation, is looked at this seldom."""
 COUNTERS: Final = ("clamped", "refused")
 UNSEEN: Final[Mapping[str, str]] = {
     "clamped": "a command is clamped as its modifiers leave it",
@@ -35,6 +39,8 @@ class CommandWatch:
         self._places = np.zeros((0, 2), dtype=np.int64)
         self._actuators: dict[str, tuple[FittedActuator, ...]] = {}
         """Of robots whose counters have changed."""
+        self._due: dict[int, int] = {}
+        """Of robots, by their place, the tick from which commands are looked at again."""
         self._warned: set[tuple[str, str, str]] = set()
         """Robots, channels and numbers, or the fate of the whole command."""
 
@@ -44,17 +50,22 @@ class CommandWatch:
         if layout is not before.layout:  # who joins or leaves has its counters anew
             return
         if layout is not self._layout:
-            self._layout, self._actuators = layout, {}
+            self._layout, self._actuators, self._due = layout, {}, {}
             places = [[robot.offsets[counter] for counter in COUNTERS] for robot in layout.robots]
             self._places = np.array(places, dtype=np.int64).reshape(len(places), 2)
         more = after.values[self._places] > before.values[self._places]
         if not more.any():
             return
-        packets = delivered()
-        for robot, (is_clamped, is_refused) in zip(layout.robots, more.tolist(), strict=True):
-            if is_clamped or is_refused:
-                theirs = [packet for packet in packets if packet.destination == robot.name]
-                self._warn(robot.name, after.tick - 1, theirs, (is_clamped, is_refused))
+        due = [place for place in np.flatnonzero(more.any(axis=1)).tolist() if self._due.get(place, 0) <= after.tick]
+        if not due:
+            return
+        packets: dict[str, list[Delivered]] = {}
+        for packet in delivered():
+            packets.setdefault(packet.destination, []).append(packet)
+        for place in due:
+            self._due[place] = after.tick + EVERY_TICKS
+            robot, (is_clamped, is_refused) = layout.robots[place].name, more[place].tolist()
+            self._warn(robot, after.tick - 1, packets.get(robot, []), (is_clamped, is_refused))
 
     def _warn(self, robot: str, tick: int, packets: Sequence[Delivered], grown: tuple[bool, bool]) -> None:
         found = [*self._found(robot, packets)]
@@ -74,6 +85,8 @@ class CommandWatch:
         its = self._actuators_of(robot)
         for packet in packets:
             one = next((one for one in its if one.channel == packet.channel), None)
+            if packet.channel == CHANNEL_ECHO:
+                continue
             if one is None:
                 channels = ", ".join(one.channel for one in its) or "none"
                 yield (
@@ -83,7 +96,10 @@ class CommandWatch:
                     f"a packet is refused: there are the channels {channels}",
                 )
                 continue
-            why, clamped = one.examine(packet.payload)
+            try:
+                why, clamped = one.examine(packet.payload)
+            except ComponentError:  # it is another one than after its modifiers, which the node has given the actuator
+                continue
             if why:
                 yield one.channel, "refused", "refused", f"a command of {packet.source} is refused: {why}"
             for number in clamped:
