@@ -140,7 +140,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("launcher.children.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, in this order"),
     ("launcher.children.restarts", "AWAY_S"): ("`up`", "the same if the machine could not be reached"),
     ("launcher.children.restarts", "WINDOW_S"): ("`up`", "in which one end more than these waits gives a process up"),
-    ("launcher.up", "HELD_S"): ("`up`", "the run to come up, before lines that wait for the console's address are shown"),
+    ("launcher.up", "HELD_S"): ("`up`", "the run to come up; lines that wait for the console are shown then"),
     ("launcher.up", "LOST_S"): ("`up`", "the supervisor to detect the end of a process; then the run is ended"),
     ("launcher.up", "END_S"): ("`up`", "the answer of a supervisor to a request to end; then all processes are ended"),
     ("launcher.up", "LEAVE_S"): ("`up`", "the end of the other processes after the supervisor's; then they are ended"),
