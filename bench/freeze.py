@@ -33,7 +33,7 @@ from foosim.world.frame import Frame
 
 WORLDS: Final = ("table", "table_sensors", "warehouse", "yard")
 SEEDS: Final = (1, 2)
-OF_LAYOUT: Final = ("/tick", "/layout", "/frame")
+OF_LAYOUT: Final = ("/tick", "/layout", "/frame", "/epochs")
 """Topics whose rows have digests of frames or places in them."""
 LOG: Final = "/log"
 WALL: Final = "wall_"
