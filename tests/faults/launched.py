@@ -42,10 +42,14 @@ class Launched:
     costs: int = 2
 
 
+PATIENT: Final = ("deadlines.lockstep_realtime=120 s", "deadlines.client_back=120 s")
+
+
 @contextmanager
-def started(folder: Path, run: str) -> Iterator[subprocess.Popen[str]]:
-    """Start the table and wait for its first tick; whatever is left at the end is killed with it."""
+def started(folder: Path, run: str, *sets: str) -> Iterator[subprocess.Popen[str]]:
+    """Start the table, with settings, and wait for its first tick; whatever is left at the end is killed with it."""
     words = [script("foosim-supervisor"), "up", str(TABLE), "--processes", "each", "--run", run, "--json"]
+    words += [word for text in sets for word in ("--set", text)]
     with subprocess.Popen(
         [*words, "--capture", str(folder / f"{run}.mcap")],
         stdout=subprocess.PIPE,
@@ -140,8 +144,11 @@ def quota(percent: float, pids: Sequence[int]) -> Iterator[None]:
 
 
 def starved(percent: float, folder: Path, run: str, dice: random.Random) -> Figures:
-    """A minute of a small part of a core for all processes but the launcher: none is killed, and the world is equal."""
-    with started(folder, run) as launcher:
+    """A minute of a small part of a core for all processes but the launcher: none is killed, and the world is equal.
+
+    In real time the vHub would go on without players that are late, which is an input of the world: it waits for them.
+    """
+    with started(folder, run, *PATIENT) as launcher:
         children = children_of(launcher)
         time.sleep(dice.uniform(*CALM_S))
         with quota(percent, children):
