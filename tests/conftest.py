@@ -14,10 +14,15 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
+import foosim.protocol.hub_messages
+import foosim.protocol.messages
+import foosim.protocol.replay_messages  # noqa: F401  # all messages
+from foosim.common.struct_types import Message
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime.roles.loop import GC_THRESHOLDS
@@ -69,6 +74,13 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         gc.enable()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _bounds_of_messages_are_read() -> None:
+    """msgspec reads a message's bounds with its first decoder: before any test lowers a limit."""
+    for kind in Message.__subclasses__():
+        msgspec.msgpack.Decoder(kind)
 
 
 @pytest.fixture(autouse=True)
