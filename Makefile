@@ -19,7 +19,7 @@ PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 .PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers forms machines lint page pictures bench compiled clean environment
 
 help:
-	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
+	@echo 'make up      run the football table on two nodes (ARGS: options of foosim up)'
 	@echo 'make test    lint, type check and all tests (ARGS: options of pytest)'
 	@echo 'make slow    tests of processes on a machine made slow: each start takes 7 s longer, all cores are busy'
 	@echo 'make play    minutes of the table as deployed: goals, hand-overs, matches of its players; law 1 by further seeds'
@@ -39,9 +39,9 @@ help:
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
 
-# A run in the background has no console of its own: foosim-console shows it.
+# A run in the background has no console of its own: `foosim view` shows it.
 up: environment
-	@.venv/bin/foosim-supervisor up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
+	@.venv/bin/foosim up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
 
 play: environment
 	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/players/test_matches.py tests/laws $(ARGS)
@@ -55,7 +55,7 @@ machines: environment
 # Compiling takes as long as some hundred seeds: it pays for more.
 MANY := $(shell [ $(SEEDS) -ge 1000 ] && echo many)
 swarm: $(if $(MANY),compiled,environment)
-	@.venv$(if $(MANY),-compiled)/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
+	@.venv$(if $(MANY),-compiled)/bin/foosim rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
 
 faults: environment
 	@$(PYTHON) -m tests.faults.campaign --count $(or $(N),20) $(ARGS)

@@ -1,6 +1,6 @@
 """Compare two captures, channel by channel: the first row of each that differs, in which field, and how many there are.
 
-The typed function behind `foosim-replay diff`. Two equal runs differ in what a clock of the real world told, so fields
+The typed function behind `foosim capture diff`. Two equal runs differ in what a clock of the real world told, so fields
 whose names begin with `wall_` and the channel `/log` are not compared. Both files are read at once, closing by closing;
 what is held of them is one closing of each and the rows by which a channel of one is ahead.
 """

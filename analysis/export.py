@@ -1,6 +1,6 @@
 """Write a table of a capture to a file: CSV with the standard library, Parquet with pyarrow where it is installed.
 
-The typed function behind `foosim-replay export`. The capture is read once, and what is held of the table is one batch.
+The typed function behind `foosim capture export`. The capture is read once, and what is held of the table is one batch.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ RANGE_NOTE: Final = (
 
 
 def link_line(link: dict[str, Any]) -> str:
-    """Return one link of `foosim-net top` as a line."""
+    """Return one link of `foosim net top` as a line."""
     causes = "".join(f", {cause} {count}" for cause, count in link["causes"].items())
     return (
         f"{link['from']} to {link['to']} ({link['rule']}): {link['offered_per_s']:.1f}/s, offered {link['offered']}, "
@@ -77,7 +77,7 @@ def age_text(age: dict[str, Any]) -> str:
 
 
 def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
-    """Return the links of `foosim-net top` as a table."""
+    """Return the links of `foosim net top` as a table."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for column in ("from", "to", "rule"):
         table.add_column(column)

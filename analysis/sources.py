@@ -1,4 +1,4 @@
-"""Where the numbers come from that media have beside their settings: what `foosim-net presets` prints below a preset's.
+"""Where the numbers come from that media have beside their settings: what `foosim net presets` prints below a preset's.
 
 The numbers are those of the modules that hold them, so what is printed is what decides. The marks before the sources
 are those of `protocol.presets`.

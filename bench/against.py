@@ -59,7 +59,7 @@ print(sum(map(sum, least)) / sum(map(len, least)))
 """
 START_TICKS: Final = 60
 """Ticks at the beginning that do not count: in them is made what is made once."""
-COMMAND: Final = "import sys; from foosim.cli.rehearse import main; main()"
+COMMAND: Final = "import sys; from foosim.cli import main; main()"
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,7 +52,7 @@ def realtime(seconds: float = 60.0) -> Realtime:
 
 def _command_s() -> float:
     begun_s = time.monotonic()
-    subprocess.run([script("foosim-supervisor"), "--version"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([script(), "--version"], check=True, stdout=subprocess.DEVNULL)
     return time.monotonic() - begun_s
 
 

@@ -1,4 +1,4 @@
-"""Runs of real processes, as `foosim-supervisor up` makes them, watched from here.
+"""Runs of real processes, as `foosim up` makes them, watched from here.
 
 The watch stands where the display stands: it sees each status, and at the same time reads what every child has used.
 """

@@ -38,7 +38,7 @@ class Broken:
 class Damage:
     """What is broken in a finished capture; `ticks` are the spans, first and last, whose rows of /tick are whole.
 
-    `until_ns` is the simulated time up to which all is whole that `foosim-replay cut` needs; None where it needs more.
+    `until_ns` is the simulated time up to which all is whole that `foosim capture cut` needs; None where it needs more.
     """
 
     path: str
@@ -53,7 +53,7 @@ class Damage:
         lines.append(f"ticks {whole} are whole, {lost} between them are lost" if whole else "no tick is whole")
         if self.until_ns is not None:
             time = format_ns(self.until_ns).replace(" ", "")
-            lines.append(f"what is before the damage: foosim-replay cut {self.path} --to {time} -o PART")
+            lines.append(f"what is before the damage: foosim capture cut {self.path} --to {time} -o PART")
         return "\n  ".join(lines)
 
 

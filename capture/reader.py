@@ -454,6 +454,6 @@ def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     except KeyError as error:
         raise CaptureError(f"{path}: the layout at tick {row.tick} has an unknown model {error}") from None
     if layout.digest.hex() != row.digest or layout.size != row.size:
-        named = "`foosim-replay info` names the version that captured it"
+        named = "`foosim capture info` names the version that captured it"
         raise CaptureError(f"{path}: the layout at tick {row.tick} is not what this version builds: {named}")
     return layout

@@ -1,14 +1,14 @@
-"""The commands: one file each. Here is the entry of `foosim-supervisor`, which notes signals before it imports more."""
+"""The command `foosim`: its verbs, one file each. Here is its entry, which notes signals before it imports more."""
 
 import sys
 
 from foosim.runtime.early_signals import note_signals
 
 
-def foosim_supervisor() -> None:
-    """Entry of `foosim-supervisor`: from here on `up` leaves its result, whatever signal ends it."""
+def main() -> None:
+    """Entry of `foosim` and `foosim-supervisor`, one command: from here on a signal lets `up` leave its result."""
     if sys.argv[1:2] == ["up"]:
         note_signals()
-    from foosim.cli.supervisor import main
+    from foosim.cli import verbs
 
-    main()
+    verbs.main()

@@ -1,4 +1,4 @@
-"""What `foosim-supervisor components` shows: the forms that a deployment can name here."""
+"""What `foosim components` shows: the forms that a deployment can name here."""
 
 from __future__ import annotations
 

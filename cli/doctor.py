@@ -1,4 +1,4 @@
-"""The command `foosim-doctor`: whether a deployment could run here, and what to do where it could not."""
+"""The command `foosim doctor`: whether a deployment could run here, and what to do where it could not."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import typer
 
 from foosim.client.loading import look_in
 from foosim.common.addresses import check_listen
-from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.doctor.checks import HERE, Case, Finding, is_well
 from foosim.launcher.doctor.remote import examine_all
-from foosim.runtime.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, JsonOption, PkiOption, new_app, print_json
 
 app = new_app()
 
@@ -33,8 +32,7 @@ def doctor(
         bool, typer.Option("--insecure", help="Check for a run that listens without certificates, as `up --insecure`.")
     ] = False,
     pki: PkiOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")] = False,
-    version: VersionOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Check whether a deployment can run on this machine and its hosts.
 
@@ -53,7 +51,7 @@ def doctor(
     findings = examine_all(Case(deployment, address, insecure, pki), str(file), text)
     if json:
         content = {"well": is_well(findings), "findings": [asdict(finding) for finding in findings]}
-        print(encode_json(content).decode())
+        print_json(content)
     else:
         for host, lines in groupby(findings, lambda finding: finding.host):
             if host != HERE:
@@ -66,12 +64,3 @@ def _line(finding: Finding) -> str:
     remedy = f"\n{'':18}-> {finding.remedy}" if finding.remedy else ""
     text = f": {finding.text}" if finding.text else ""
     return f"{MARKS[finding.state]:3} {finding.check:13} {finding.subject}{text}{remedy}"
-
-
-def main() -> None:
-    """Entry of `foosim-doctor`."""
-    run_app(app, "foosim-doctor")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""The command `foosim-guard`: the launcher's hand on another machine, at the far end of an ssh connection.
+"""The command `foosim guard`: the launcher's hand on another machine, at the far end of an ssh connection.
 
 It starts one process of a run and ends it when its standard input ends, that is when the connection or the launcher
 does: first by SIGTERM, then by SIGKILL to the whole process group. When the guard itself is killed, the process dies
@@ -26,7 +26,7 @@ import typer
 from foosim.common.errors import BadValue, Failed
 from foosim.common.names import NAME_RULE, is_name
 from foosim.runtime.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
-from foosim.runtime.command import DONE, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, new_app
 from foosim.runtime.run_folder import hosted_folder
 
 BLOCK_BYTES: Final = 1 << 20
@@ -181,8 +181,8 @@ app = new_app()
 
 
 @app.callback()
-def foosim_guard(version: VersionOption = False) -> None:
-    """Serve a launcher that is on another machine; `foosim-supervisor up` calls this through ssh."""
+def guard_group() -> None:
+    """Serve a launcher that is on another machine; `foosim up` calls this through ssh."""
 
 
 @app.command("run", context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
@@ -219,12 +219,3 @@ def forget_command(run: Run) -> None:
     """Remove the folder of a run that is over."""
     shutil.rmtree(run_folder(run), ignore_errors=True)
     raise typer.Exit(DONE)
-
-
-def main() -> None:
-    """Entry of `foosim-guard`."""
-    run_app(app, GUARD)
-
-
-if __name__ == "__main__":
-    main()

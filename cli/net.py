@@ -1,4 +1,4 @@
-"""The command `foosim-net`: analyses networks, explains packets, and disturbs live runs.
+"""The command `foosim net`: analyses networks, explains packets, and disturbs live runs.
 
 Each subcommand is a thin shell over typed functions: `vhub.lint`, `vhub.explain`, `links_shown`, `control`.
 """
@@ -20,9 +20,9 @@ from foosim.analysis.explain import explain_packet, parse_packet
 from foosim.analysis.network_tables import RANGE_NOTE, link_line, link_table, links_shown, summary_tables, use_text
 from foosim.analysis.sources import parameters_of
 from foosim.capture.reader import open_capture
+from foosim.cli.control import show_answer
 from foosim.client import control
 from foosim.common.errors import BadValue
-from foosim.common.json_text import encode_json
 from foosim.common.names import nearest_name
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
@@ -32,8 +32,7 @@ from foosim.deployment.overrides import nested
 from foosim.deployment.schema import places
 from foosim.deployment.text.files import read_files, read_source_file
 from foosim.protocol.channels import VHUB
-from foosim.protocol.messages import Answer
-from foosim.runtime.command import VersionOption, new_app, run_app
+from foosim.runtime.command import JsonOption, RunOption, new_app, print_json
 from foosim.runtime.process import Stop
 from foosim.vhub.links.summary import LinkSummary, summaries, summary_of, uses_alone
 from foosim.vhub.links.summary_text import meaning_lines
@@ -41,8 +40,6 @@ from foosim.vhub.network.custom_models import check_link_models
 
 app = new_app()
 
-Run = Annotated[str | None, typer.Option("--run", help="Name of the run; by default the newest live one.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 Lasts = Annotated[
     str | None, typer.Option("--for", help="Duration in simulated time, e.g. 10s; by default until `heal`.")
 ]
@@ -56,7 +53,7 @@ ALONE: Final = (
 
 
 @app.callback()
-def foosim_net(version: VersionOption = False) -> None:
+def net_group() -> None:
     """Analyse a network, and disturb the network of a live run.
 
     `lint` and `presets` show what a configuration means, `explain` the fate of a captured packet and its cause, `top`
@@ -76,7 +73,7 @@ def lint(
         ),
     ],
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the file; may be repeated.")] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Print the figures of a network, per rule and radio, with warnings of likely mistakes.
 
@@ -86,7 +83,7 @@ def lint(
     """
     found, is_alone = linted(file, sets or [])
     if json:
-        print(encode_json({"alone": is_alone, "rules": [asdict(summary) for summary in found]}).decode())
+        print_json({"alone": is_alone, "rules": [asdict(summary) for summary in found]})
         return
     console = Console()
     if is_alone:
@@ -126,7 +123,7 @@ def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
 @app.command()
 def presets(
     name: Annotated[str | None, typer.Argument(help="Name of a preset; by default all.", show_default=False)] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Print the values of presets, the numbers of their media, and the source of each.
 
@@ -144,7 +141,7 @@ def presets(
             one: [{"key": key, "value": value, "source": source} for key, value, source in rows]
             for one, rows in chosen.items()
         }
-        print(encode_json(content).decode())
+        print_json(content)
         return
     for one, rows in chosen.items():
         print(one)
@@ -160,7 +157,7 @@ def explain(
         str,
         typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]].", show_default=False),
     ],
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Print the stages of a captured packet with their numbers, and its fate.
 
@@ -172,7 +169,7 @@ def explain(
     which = parse_packet(packet)
     explained = explain_packet(open_capture(capture), which)
     if json:
-        print(encode_json(asdict(explained)).decode())
+        print_json(asdict(explained))
         return
     print(explained.head)
     width = max(len(step.stage) for step in explained.steps)
@@ -183,9 +180,9 @@ def explain(
 
 @app.command()
 def top(
-    run: Run = None,
+    run: RunOption = None,
     once: Annotated[bool, typer.Option("--once", help="Print the totals since the start, once.")] = False,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Show the links of a live run, those with the most traffic first, until Ctrl-C.
 
@@ -220,7 +217,7 @@ def _show_links(
     console: Console, live: Live | None, status: dict[str, Any], links: list[dict[str, Any]], json: bool
 ) -> None:
     if json:
-        print(encode_json({"run": status["run"], "tick": status["ticks"], "links": links}).decode(), flush=True)
+        print_json({"run": status["run"], "tick": status["ticks"], "links": links})
         return
     title = f"run {status['run']} · tick {status['ticks']} · {use_text(status)}"
     if live is not None:
@@ -245,15 +242,15 @@ def set_link(
     settings: Annotated[
         list[str], typer.Argument(metavar="KEY=VALUE...", help="e.g. loss=5% delay='20 ms'.", show_default=False)
     ],
-    run: Run = None,
-    json: Json = False,
+    run: RunOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Change settings of a link rule until `heal settings`.
 
     Keys are those of a rule, with dots for what is inside: burst.loss=1% burst.mean_bad=20ms. A mapping is written
     whole.
     """
-    _show(control.network({"set": {**nested(settings), "link": link}}, run), json)
+    show_answer(control.network({"set": {**nested(settings), "link": link}}, run), json)
 
 
 @app.command()
@@ -267,12 +264,12 @@ def partition(
     lasts: Lasts = None,
     random: Random = False,
     one_way: Annotated[bool, typer.Option("--one-way", help="Drop only packets from the first group.")] = False,
-    run: Run = None,
-    json: Json = False,
+    run: RunOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Drop packets between endpoints of different groups."""
     event = {"partition": [_split(group) for group in groups], **_for(lasts, random)}
-    _show(control.network({**event, "symmetric": False} if one_way else event, run), json)
+    show_answer(control.network({**event, "symmetric": False} if one_way else event, run), json)
 
 
 @app.command()
@@ -281,22 +278,22 @@ def clog(
     destination: Annotated[str, typer.Argument(metavar="TO", help="Endpoints, with commas.", show_default=False)],
     lasts: Lasts = None,
     random: Random = False,
-    run: Run = None,
-    json: Json = False,
+    run: RunOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Delay packets to the end of the clog; then all arrive at once, in order."""
     ends = {"from": _split(source), "to": _split(destination)}
-    _show(control.network({"clog": ends, **_for(lasts, random)}, run), json)
+    show_answer(control.network({"clog": ends, **_for(lasts, random)}, run), json)
 
 
 @app.command()
 def heal(
     what: Annotated[str, typer.Argument(help="all, partitions, clogs or settings.")] = "all",
-    run: Run = None,
-    json: Json = False,
+    run: RunOption = None,
+    json: JsonOption = False,
 ) -> None:
     """End disturbances of the network; clogged packets are released at once."""
-    _show(control.network({"heal": what}, run), json)
+    show_answer(control.network({"heal": what}, run), json)
 
 
 def _split(text: str) -> list[str]:
@@ -309,16 +306,3 @@ def _for(lasts: str | None, random: bool) -> dict[str, Any]:
             raise BadValue("--random needs --for, the mean")
         return {}
     return {"for": {"exponential": lasts} if random else lasts}
-
-
-def _show(answer: Answer, json: bool) -> None:
-    print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
-
-
-def main() -> None:
-    """Entry of `foosim-net`."""
-    run_app(app, "foosim-net")
-
-
-if __name__ == "__main__":
-    main()

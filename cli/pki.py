@@ -1,4 +1,4 @@
-"""The command `foosim-pki`: certificates for those who take part in a run, control it or connect to it."""
+"""The command `foosim pki`: certificates for those who take part in a run, control it or connect to it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import typer
 
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
-from foosim.common.json_text import encode_json
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.text.files import read_source_file
@@ -19,16 +18,15 @@ from foosim.launcher.pki import certificates
 from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
 from foosim.launcher.pki.hosts import files_for, passwords_of, send_files
 from foosim.protocol.identity import identities_of
-from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 
 app = new_app()
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of certificates.", show_default=False)]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 
 @app.callback()
-def foosim_pki(version: VersionOption = False) -> None:
+def pki_group() -> None:
     """Create and check the certificates of a run on several machines.
 
     `init` creates the certificates of a deployment's processes; with --send it copies them to the deployment's hosts.
@@ -89,11 +87,11 @@ def _is_sent(deployment: Deployment, folder: Path) -> bool:
 
 
 @app.command()
-def show(folder: Folder, json: Json = False) -> None:
+def show(folder: Folder, json: JsonOption = False) -> None:
     """Show whose certificates a folder has, until when, and what is wrong with them."""
     shown = certificates.show_folder(folder)
     if json:
-        print(encode_json([_as_json(its) for its in shown]).decode())
+        print_json({"certificates": [_as_json(its) for its in shown]})
     else:
         for its in shown:
             print(_line(its))
@@ -118,12 +116,3 @@ def _line(its: Shown) -> str:
     days = its.days_left(wall_clock.now_utc())
     hosts = ", ".join(its.hosts) or "issues certificates"
     return f"{its.identity:24} until {its.ends:%Y-%m-%d} ({days:.0f} days), {hosts}"
-
-
-def main() -> None:
-    """Entry of `foosim-pki`."""
-    run_app(app, "foosim-pki")
-
-
-if __name__ == "__main__":
-    main()

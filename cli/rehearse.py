@@ -1,4 +1,4 @@
-"""The command `foosim-rehearse`: a deployment in one process on virtual time. A shell over `rehearse`."""
+"""The command `foosim rehearse`: a deployment in one process on virtual time. A shell over `rehearse`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from foosim.cli.run_command import with_options
 from foosim.common import limits
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
-from foosim.common.json_text import decode_json, encode_json
+from foosim.common.json_text import decode_json
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
@@ -37,7 +37,7 @@ from foosim.rehearsal.swarm.campaign import Flown
 from foosim.rehearsal.swarm.faults import TICKS
 from foosim.rehearsal.swarm.workers import fly_seeds
 from foosim.rehearsal.system import Settings
-from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 
@@ -46,7 +46,7 @@ app = new_app()
 
 @app.command()
 @with_options("file", "duration", "seed", "branch", "sets", "engine")
-def foosim_rehearse(
+def rehearse_command(
     options: RunOptions,
     nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN, each with its own engine.")] = 1,
     swarm: Annotated[bool, typer.Option("--swarm", help="Inject random faults, drawn from --seed.")] = False,
@@ -55,13 +55,12 @@ def foosim_rehearse(
         int | None, typer.Option(help="With --swarm: number of processes; by default that of the processors.", min=1)
     ] = None,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
-    version: VersionOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Simulate a deployment in one process on virtual time, as fast as possible.
 
     The supervisor, the vHub, the nodes and the lockstep players are the same code and exchange the same bytes as the
-    processes of `foosim-supervisor up`. The digests are those of `up`, with any number of nodes.
+    processes of `foosim up`. The digests are those of `up`, with any number of nodes.
 
     A line of progress a second goes to standard error: simulated time, its speed, the score, and the process that the
     run waited for the longest. Ctrl-C ends the rehearsal in order, a second Ctrl-C at once; the last line has the last
@@ -105,7 +104,10 @@ def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
     output, file = sys.stdout, plan.options.file
 
     def show(result: dict[str, Any]) -> int:
-        print(encode_json(result).decode() if json else _told(result), file=output, flush=True)
+        if json:
+            print_json(result, file=output)
+        else:
+            print(_told(result), file=output, flush=True)
         return FAILED if result["failed"] else DONE
 
     def stuck(result: dict[str, Any]) -> None:
@@ -172,7 +174,7 @@ def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
                 flown.append(flight)
                 if flight.broken:
                     typer.echo(f"seed {flight.seed}: {flight.broken}", err=True)
-                    typer.echo(f"  foosim-rehearse {file} --swarm{longer} --seed {flight.seed}", err=True)
+                    typer.echo(f"  foosim rehearse {file} --swarm{longer} --seed {flight.seed}", err=True)
                     for fault in flight.faults:
                         typer.echo(f"  {fault}", err=True)
                 if time.monotonic() >= told_s + LINE_S:
@@ -183,7 +185,7 @@ def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
             raise
     broken = [flight.seed for flight in flown if flight.broken]
     if json:
-        typer.echo(encode_json({"seeds": [asdict(flight) for flight in flown], "broken": broken}).decode())
+        print_json({"seeds": [asdict(flight) for flight in flown], "broken": broken})
     else:
         faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
         done, seen = sum(flight.ticks for flight in flown), sum(flight.seen for flight in flown)
@@ -194,14 +196,9 @@ def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
     return FAILED if broken else DONE
 
 
-def main() -> None:
-    """The entry point of `foosim-rehearse`."""
-    run_app(app, "foosim-rehearse")
-
-
 # --- for check-component ---------------------------------------------------------------------------------------------
 
-REHEARSE: Final = "from foosim.cli.rehearse import main; main()"
+REHEARSE: Final = "from foosim.cli import main; main()"
 HASH_SEED: Final = "4711"
 """Of the other process: sets of texts have another order there."""
 
@@ -288,7 +285,7 @@ def elsewhere(text: str, name: str, ticks: int, folder: Path | None = None) -> I
             asset.parent.mkdir(parents=True, exist_ok=True)
             asset.write_bytes(content)
         span = f"{ticks * here['tick_ns']}ns"
-        command = [sys.executable, "-c", REHEARSE, str(file), "--for", span, "--nodes", "1", "--json"]
+        command = [sys.executable, "-c", REHEARSE, "rehearse", str(file), "--for", span, "--nodes", "1", "--json"]
         environment = {**os.environ, "PYTHONHASHSEED": HASH_SEED}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:

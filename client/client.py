@@ -109,7 +109,7 @@ class Actuator:
     def set(self, *numbers: float, **named: float) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
 
-        What the numbers of its kind mean `foosim-supervisor components actuator KIND` says. In lockstep a command is
+        What the numbers of its kind mean `foosim components actuator KIND` says. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
         its last command. Raises BadValue for numbers that are not finite, or not those of a command;
         NotJoined, RunEnded.

@@ -1,4 +1,4 @@
-"""The process `foosim-player`: players that the deployment declares, between their classes and the radio plane.
+"""The process `foosim role player`: players that the deployment declares, between their classes and the radio plane.
 
 The vHub sends class, rate, robots and parameters with the welcome. Each player of a process is a role with its own
 presence. Players share the process's loop, and its session where there are no certificates, which have one name each.
@@ -24,7 +24,7 @@ from foosim.common.names import is_name
 from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
-from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
@@ -141,7 +141,6 @@ def player(
     pki: PkiOption = None,
     path: PathOption = None,
     progress_file: ProgressOption = None,
-    version: VersionOption = False,
 ) -> None:
     """Run players: the classes that the deployment names for them.
 
@@ -155,12 +154,3 @@ def player(
     if path is not None:
         look_in(str(path.absolute()))
     raise typer.Exit(run_players(name, connect, world, pki, progress_file))
-
-
-def main() -> None:
-    """Entry of `foosim-player`."""
-    run_app(app, "foosim-player")
-
-
-if __name__ == "__main__":
-    main()

@@ -2,7 +2,7 @@
 
 A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
 robots that it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
-process `foosim-player` and the rehearsal run this same loop.
+process `foosim role player` and the rehearsal run this same loop.
 """
 
 from __future__ import annotations

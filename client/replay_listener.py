@@ -1,4 +1,4 @@
-"""Listening to a replay: the messages that `foosim-replay play` publishes, and requests to it.
+"""Listening to a replay: the messages that `foosim capture play` publishes, and requests to it.
 
     with hear_replay("tcp/127.0.0.1:7470") as replay:
         replay.resume()

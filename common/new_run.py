@@ -13,5 +13,5 @@ def new_run_text(arguments: Sequence[str], capture: str) -> str:
     """Return in words how a run begins with the last frame of a capture; `arguments` are those of the run before."""
     if not capture:
         return "The run has no capture to begin a new one with"
-    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@last"]
+    command = ["foosim", "up", *arguments, "--from", f"{capture}@last"]
     return f"{NEW_RUN}: {shlex.join(command)}"

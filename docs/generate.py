@@ -13,48 +13,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-import typer.main
+from typer.core import TyperGroup
 
 from foosim.capture.rows import ROW_TYPES, json_schema
-from foosim.cli.doctor import app as doctor_app
-from foosim.cli.guard import app as guard_app
-from foosim.cli.match.command import app as match_app
-from foosim.cli.net import app as net_app
-from foosim.cli.pki import app as pki_app
-from foosim.cli.process import app as process_app
-from foosim.cli.rehearse import app as rehearse_app
-from foosim.cli.replay import app as replay_app
-from foosim.cli.supervisor import app as supervisor_app
-from foosim.client.main import app as player_app
+from foosim.cli.verbs import Foosim
 from foosim.common import limits, units
-from foosim.console.main import app as console_app
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
-from foosim.fitting.main import app as table_app
-from foosim.node.main import app as node_app
 from foosim.protocol.channels import CHANNELS
-from foosim.rehearsal.learning.main import app as learn_app
-from foosim.runtime.health import app as probe_app
-from foosim.vhub.main import app as vhub_app
+from foosim.runtime.help_text import shown_argument
 
 DOCS: Final = Path(__file__).parent
-COMMANDS: Final[Mapping[str, Any]] = {
-    "foosim-supervisor": supervisor_app,
-    "foosim-rehearse": rehearse_app,
-    "foosim-match": match_app,
-    "foosim-replay": replay_app,
-    "foosim-net": net_app,
-    "foosim-table": table_app,
-    "foosim-learn": learn_app,
-    "foosim-console": console_app,
-    "foosim-vhub": vhub_app,
-    "foosim-node": node_app,
-    "foosim-player": player_app,
-    "foosim-process": process_app,
-    "foosim-probe": probe_app,
-    "foosim-guard": guard_app,
-    "foosim-pki": pki_app,
-    "foosim-doctor": doctor_app,
-}
 DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
     "heartbeat": ("supervisor", "a message of a node or the vHub; a process that is silent for longer is lost"),
     "tick_named": ("supervisor", "the parts or deliveries of a tick; then the log names the missing process"),
@@ -146,8 +114,8 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("launcher.up", "LEAVE_S"): ("`up`", "the end of the other processes after the supervisor's; then they are ended"),
     ("launcher.up", "AWAY_S"): ("`up`", "the same on other machines"),
     ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to report the end of the run to its pages"),
-    ("runtime.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process after SIGTERM; then it is killed"),
-    ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the end of the previous guard"),
+    ("runtime.children", "GRACE_S"): ("`up`, `foosim guard`", "a process after SIGTERM; then it is killed"),
+    ("cli.guard", "TAKE_OVER_S"): ("`foosim guard`", "the end of the previous guard"),
     ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
     ("runtime.roles.shell", "CONNECT_S"): (
@@ -165,35 +133,36 @@ _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end --
 
 
 def commands() -> Iterator[tuple[str, Any]]:
-    """Yield every command, such as `foosim-replay verify`, with its description by typer."""
-    for name, app in COMMANDS.items():
-        command = typer.main.get_command(app)
-        subcommands = getattr(command, "commands", None)
-        if subcommands is None:
-            yield name, command
-            continue
-        for subname, subcommand in subcommands.items():
-            yield f"{name} {subname}", subcommand
+    """Yield every command, such as `foosim capture verify`, as typer knows it; second names are left out."""
+    foosim = Foosim(name="foosim")
+    names = [*foosim.list_commands(None), *(name for name, verb in foosim.plumbing.items() if not verb.name)]
+    for name in names:
+        yield from _commands_in(f"foosim {name}", foosim.get_command(None, name))
+
+
+def _commands_in(name: str, command: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a command, or those of a group."""
+    if not isinstance(command, TyperGroup):
+        yield name, command
+        return
+    for verb in command.list_commands(None):  # type: ignore[arg-type]  # which needs no context
+        yield from _commands_in(f"{name} {verb}", command.get_command(None, verb))  # type: ignore[arg-type]
 
 
 def write_commands() -> Iterator[str]:
     """Yield a section for each command: description, arguments and options."""
     for name, command in commands():
-        words = [_argument(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
+        words = [shown_argument(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
         yield f"### `{' '.join([name, *words])}`\n\n"
         yield re.sub(r"(?m)^ +", "", command.help.strip()) + "\n\n"
-        options = [p for p in command.params if p.param_type_name == "option" and p.name != "version" and not p.hidden]
+        options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
         if options:
             yield "| option | |\n|---|---|\n"
         for option in options:
             required = " Required." if option.required else ""
-            yield f"| `{' '.join(option.opts)}` | {_cell(option.help or '')}{required} |\n"
+            value = "" if option.is_flag else f" {option.metavar}"
+            yield f"| `{' '.join(option.opts)}{value}` | {_cell(option.help or '')}{required} |\n"
         yield "\n" if options else ""
-
-
-def _argument(parameter: Any) -> str:
-    name = parameter.metavar or (parameter.name.upper() if parameter.nargs == 1 else "X Y Z")
-    return name if parameter.required else f"[{name}]"
 
 
 def write_deployment() -> Iterator[str]:

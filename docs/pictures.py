@@ -23,7 +23,7 @@ from typing import Any, Final
 
 from bench.machine import children
 from bench.runs import ROOT, TABLE, name_of
-from foosim.cli.replay_view import open_sources
+from foosim.cli.view import open_sources
 from foosim.client import control
 from foosim.common.errors import Refused
 from foosim.rehearsal.run import rehearse

@@ -1,4 +1,4 @@
-"""The command `foosim-table`: the numbers of a football table from measurements.
+"""The command `foosim fit`: the numbers of a football table from measurements.
 
 It is a shell over `tracks.read_tracks` and `estimate.fit`.
 """
@@ -15,13 +15,12 @@ from typing import Annotated, Final
 import typer
 
 from foosim.common.errors import BadValue, Failed
-from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.fitting.estimate import Fitted, Result, fit, scatter_of
 from foosim.fitting.motion import Field, Pairs
 from foosim.fitting.tracks import BadTracks, Track, read_tracks, usable
-from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.world.parameters.table import TABLE, Table, table_of
 
 app = new_app()
@@ -40,14 +39,6 @@ WRITTEN: Final = {
 """Where what is fitted stands in `table.surfaces`, in which unit."""
 
 
-@app.callback()
-def foosim_table(version: VersionOption = False) -> None:
-    """Find the numbers of a football table from measurements.
-
-    Exit codes: 0 done, 1 the tracks tell nothing or scipy is not installed, 2 bad input.
-    """
-
-
 @app.command(name="fit")
 def fit_command(
     files: Annotated[
@@ -60,7 +51,7 @@ def fit_command(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write the YAML here; by default to standard output.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON in place of YAML.")] = False,
+    json: JsonOption = False,
 ) -> int:
     """Fit rolling friction, friction and restitution of a table to measured tracks of its ball.
 
@@ -91,15 +82,17 @@ def fit_command(
     found = fit([track.rows for track in tracks], field, first)
     for line in (*_doubts(found, tracks), *_unknown(found)):
         print(line, file=sys.stderr)
-    text = encode_json(_as_json(found, tracks)).decode() + "\n" if json else "\n".join(_yaml(found, tracks)) + "\n"
-    if out is None:
-        sys.stdout.write(text)
-    else:
+    text = "\n".join(_yaml(found, tracks)) + "\n"
+    if out is not None:
         try:
             with out.open("x") as file:
                 file.write(text)
         except OSError as error:
             raise Failed(f"{out} cannot be written: {error.strerror}") from None
+    if json:
+        print_json(_as_json(found, tracks))
+    elif out is None:
+        sys.stdout.write(text)
     return DONE if any(one.is_known for one in found.pairs.values()) else FAILED
 
 
@@ -195,8 +188,3 @@ def _as_json(found: Result, tracks: list[Track]) -> dict[str, object]:
         "tracks": len(tracks),
         "rebounds": found.rebounds,
     }
-
-
-def main() -> None:
-    """Run the command."""
-    run_app(app, "foosim-table")

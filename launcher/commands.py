@@ -1,23 +1,21 @@
 """The command lines of the processes of a run.
 
-A process with one role runs that role's command, one with several runs `foosim-process`.
+A process with one role runs that role's command, one with several runs `foosim role roles`.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from foosim.common.addresses import parse_address
 from foosim.deployment.processes import Process
 from foosim.launcher.hosts.ssh import CAPTURE, Remote
 from foosim.launcher.plan import Plan
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.runtime.children import FOOSIM, ROLE
 from foosim.runtime.roles.shell import RUN
 from foosim.runtime.run_folder import RunFolder, RunInfo
-
-PROCESS: Final = "foosim-process"
 
 
 class Commands:
@@ -41,23 +39,23 @@ class Commands:
             return self._shared(process, info, remote)
         role, pki = process.name, self._pki(remote)
         if role == SUPERVISOR:
-            return ["foosim-supervisor", "run", *self._plan.options.arguments(), "--run", self._folder.name]
+            return [FOOSIM, "run", *self._plan.options.arguments(), "--run", self._folder.name]
         simulation, radio = self._addresses(info)
         if role == VHUB:
             insecure = ["--insecure"] if self._plan.options.insecure else []
             address = ["--listen", self._radio_address(info, remote)]
-            return ["foosim-vhub", "--connect", simulation, *address, *insecure, *pki, *self._records(remote)]
+            return [*ROLE, "vhub", "--connect", simulation, *address, *insecure, *pki, *self._records(remote)]
         if role in self._plan.deployment.nodes:
-            return ["foosim-node", "--name", role, "--connect", simulation, *pki]
-        return ["foosim-player", "--name", role, "--connect", radio, *self._path(remote), *pki]
+            return [*ROLE, "node", "--name", role, "--connect", simulation, *pki]
+        return [*ROLE, "player", "--name", role, "--connect", radio, *self._path(remote), *pki]
 
     def _shared(self, process: Process, info: RunInfo | None, remote: Remote | None) -> list[str]:
         deployment, roles = self._plan.deployment, process.roles
         simulation, radio = self._addresses(info)
         if all(role in deployment.players for role in roles):
             words = [word for role in roles for word in ("--name", role)]
-            return ["foosim-player", *words, "--connect", radio, *self._path(remote), *self._pki(remote)]
-        command = [PROCESS, process.name]
+            return [*ROLE, "player", *words, "--connect", radio, *self._path(remote), *self._pki(remote)]
+        command = [*ROLE, "roles", process.name]
         if SUPERVISOR in roles:
             command += ["--run", self._folder.name]
         else:

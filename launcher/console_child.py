@@ -16,6 +16,7 @@ from foosim.common.errors import BadValue, Failed, read_at
 from foosim.common.units import parse_offset_ns
 from foosim.launcher.children.processes import Launcher
 from foosim.launcher.display import Display
+from foosim.runtime.children import FOOSIM
 from foosim.runtime.run_folder import UNREADABLE, RunFolder
 
 CONSOLE: Final = "console"
@@ -52,7 +53,7 @@ def page_of(console: bool, opens: bool, second: Path | None, offset: str | None,
                 raise BadValue(f"{option} goes with --console", str(value))
         return None
     if detached:
-        raise BadValue("--console and --detach exclude each other; foosim-console shows a run in the background")
+        raise BadValue("--console and --detach exclude each other; foosim view shows a run in the background")
     if offset is not None:
         if second is None:
             raise BadValue("--offset needs --second", offset)
@@ -78,7 +79,8 @@ class ConsoleChild:
         path = self._folder.path / ADDRESSES
         path.unlink(missing_ok=True)
         command = [
-            "foosim-console",
+            FOOSIM,
+            "view",
             self._folder.name,
             "--announce",
             str(path),
@@ -101,7 +103,7 @@ class ConsoleChild:
         if child.exit_code is not None:
             self._has_ended = True
             self._display.release(
-                f"console {child.ending}, the run continues; foosim-console {self._folder.name} starts another one; "
+                f"console {child.ending}, the run continues; foosim view {self._folder.name} starts another one; "
                 f"its log is {child.log}"
             )
 

@@ -10,7 +10,7 @@ from typing import Final
 
 from foosim.common.errors import Failed
 from foosim.launcher.plan import Plan
-from foosim.runtime.children import script
+from foosim.runtime.children import FOOSIM, script
 from foosim.runtime.command import DONE
 from foosim.runtime.run_folder import RunFolder, create_run
 
@@ -21,7 +21,7 @@ LINES: Final = 20
 
 def launcher_command(plan: Plan, capture: Path | None, run: str) -> list[str]:
     """Return the command that launches a plan as a run that has a folder already."""
-    command = ["foosim-supervisor", "up", *plan.options.arguments(), "--run", run]
+    command = [FOOSIM, "up", *plan.options.arguments(), "--run", run]
     return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
 
 

@@ -76,7 +76,7 @@ def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | 
     """Return the outcome of a run that was left running."""
     known = {"run": folder.name, **plan_facts(deployment), "capture": None if capture is None else str(capture)}
     name = folder.name
-    line = f"run {name} is up; foosim-supervisor status --run {name} shows it, down --run {name} ends it"
+    line = f"run {name} is up; foosim status --run {name} shows it, down --run {name} ends it"
     return Outcome({**_UNKNOWN, **known, "failed": False}, False, (line,))
 
 
@@ -93,7 +93,7 @@ def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals:
     there, is_finished = [*files.values()], capture is not None and is_complete(capture)
     lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
     if not is_finished and result is not None and journals is not None:
-        lines.append(f"complete it with: foosim-replay recover {there[0]} --journals {journals}")
+        lines.append(f"complete it with: foosim capture recover {there[0]} --journals {journals}")
     return [*lines, wrong] if wrong else lines
 
 

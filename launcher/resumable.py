@@ -48,7 +48,7 @@ def _new_run(folder: RunFolder, options: RunOptions, capture: Path | None) -> st
         with suppress(CaptureError):
             if head_of(first).get("run") == folder.name:
                 return f". {branch_command(replace(options, branch=None).arguments(), first)}"
-    return f"; foosim-supervisor up {shlex.join(options.arguments())} begins a new run"
+    return f"; foosim up {shlex.join(options.arguments())} begins a new run"
 
 
 def _check_hub(folder: RunFolder, capture: Path | None) -> None:

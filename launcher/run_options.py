@@ -53,7 +53,7 @@ class RunOptions:
         return (*self.sets, *engine, *(() if self.seed is None else (f"seed={self.seed}",)))
 
     def arguments(self) -> list[str]:
-        """Return the options as arguments of `foosim-supervisor up` or `run`."""
+        """Return the options as arguments of `foosim up` or `run`."""
         given = []
         for name, annotation in get_type_hints(RunOptions, include_extras=True).items():
             value, info = getattr(self, name), annotation.__metadata__[0]

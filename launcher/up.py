@@ -427,7 +427,7 @@ class Up:
         after = f"restarts in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
             is_node = child.name in self.plan.deployment.nodes
-            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
+            after = f"is given up; foosim start {child.name} tries it again" if is_node else "is given up"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
@@ -537,7 +537,7 @@ class Up:
         if ended is None:
             result = self.unended(reason)
             may_resume = (self._is_resumed or self._has_begun) and NEW_RUN not in reason
-            then = f"; foosim-supervisor up --resume {self.folder.name} resumes it" if may_resume else ""
+            then = f"; foosim up --resume {self.folder.name} resumes it" if may_resume else ""
             line = f"the run did not end in order{then}"
         else:
             result = {**ended, "reason": reason, "failed": True} if reason and not ended["failed"] else ended

@@ -1,4 +1,4 @@
-"""The process `foosim-node`: a node's core between the simulation plane and its physics engine.
+"""The process `foosim role node`: a node's core between the simulation plane and its physics engine.
 
 One address is all that it needs: deployment and models come with the handshake.
 """
@@ -21,7 +21,7 @@ from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import Stop, die_with_parent, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
@@ -174,7 +174,6 @@ def node(
     world: Annotated[str, typer.Option(help="Refuse to join a run of another world.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
-    version: VersionOption = False,
 ) -> None:
     """Run a simulation node.
 
@@ -185,12 +184,3 @@ def node(
     """
     die_with_parent()
     raise typer.Exit(run_node(name, connect, world, pki, progress_file))
-
-
-def main() -> None:
-    """Entry of `foosim-node`."""
-    run_app(app, "foosim-node")
-
-
-if __name__ == "__main__":
-    main()

@@ -6,4 +6,4 @@ OF_THE_TABLE = {
     "striker": "foosim.players.football:Striker",
     "team": "foosim.players.football:Team",
 }
-"""Classes that play football by themselves, by the names that `foosim-match` knows."""
+"""Classes that play football by themselves, by the names that `foosim match` knows."""

@@ -1,6 +1,6 @@
 """Rehearse a deployment: the whole system, players included, in one process on virtual time, on any number of nodes.
 
-The typed function behind `foosim-rehearse`. Its result is that of `up`; its digests too, when all players are lockstep.
+The typed function behind `foosim rehearse`. Its result is that of `up`; its digests too, when all players are lockstep.
 """
 
 from __future__ import annotations

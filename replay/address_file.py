@@ -1,4 +1,4 @@
-"""The addresses of this user's replays, so that `foosim-replay control` finds the newest without an address.
+"""The addresses of this user's replays, so that `foosim capture control` finds the newest without an address.
 
 A replay holds a lock on its file as long as it lives.
 """
@@ -70,5 +70,5 @@ def newest_place() -> Place:
             else:
                 path.unlink(missing_ok=True)
     if not found:
-        raise NoReplay("no replay runs here: foosim-replay play CAPTURE starts one, --address names one elsewhere")
+        raise NoReplay("no replay runs here: foosim capture play CAPTURE starts one, --address names one elsewhere")
     return max(found, key=lambda place: place.started)

@@ -1,6 +1,6 @@
 """Plays a capture: the shell around `replay.core`, the router of a plane of its own, keys and requests.
 
-The typed function behind `foosim-replay play`. One thread reads, decides and publishes; it sleeps until the next entry,
+The function behind `foosim capture play`. One thread reads, decides and publishes; it sleeps until the next entry,
 the next clock message or a request.
 """
 

@@ -1,6 +1,6 @@
 """Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
 
-The typed function behind `foosim-replay verify`. It starts with the frame that the run began with, which is frame 0 but
+The function behind `foosim capture verify`. It starts with the frame that the run began with, which is frame 0 but
 for a branch, on any number of nodes, and names the first tick and the entities that differ. With a later one it starts
 only where that is asked for, of a cut.
 """

@@ -12,15 +12,19 @@ from foosim.runtime.process import PARENT_VARIABLE
 
 GRACE_S: Final = 5.0
 """How long a child has after SIGTERM before it is killed."""
-GUARD: Final = "foosim-guard"
+FOOSIM: Final = "foosim"
+"""The command, whose verbs are the processes of a run, too."""
+ROLE: Final = (FOOSIM, "role")
+GUARD: Final = "foosim guard"
+"""How lines of a guard begin."""
 BY_SIGNAL: Final = 128
 """The exit code of a guard is this plus the number of the signal that ended its process."""
 OTHER_VERSION: Final = 125
 """The exit code of a guard of another version than the launcher."""
 
 
-def script(name: str) -> str:
-    """Return the path of one of foosim's commands: beside this Python, else on PATH."""
+def script(name: str = FOOSIM) -> str:
+    """Return the path of a command, by default foosim: beside this Python, else on PATH."""
     beside = Path(sysconfig.get_path("scripts")) / name
     return str(beside) if beside.is_file() else shutil.which(name) or name
 

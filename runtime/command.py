@@ -1,4 +1,4 @@
-"""Shared by the commands: exit codes, `--version`, and the display of refusals.
+"""Shared by the commands: exit codes, options, results as JSON, and the display of refusals.
 
 Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused, 130 for a second Ctrl-C.
 """
@@ -10,14 +10,15 @@ import contextlib
 import gc
 import os
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn, TextIO
 
 import typer
 
 from foosim.common.errors import Refused
-from foosim.runtime.usage import BadUsage, bad_usage
+from foosim.runtime.help_text import App, Group
+from foosim.runtime.usage import bad_usage
 
 DONE: Final = 0
 FAILED: Final = 1
@@ -57,45 +58,62 @@ PathOption = Annotated[
 ]
 
 
-def new_app() -> typer.Typer:
-    """Return a command with foosim's habits: help on no arguments, no shell completion to install, plain tracebacks."""
-    return typer.Typer(
-        context_settings={"max_content_width": HELP_WIDTH_MAX},
-        add_completion=False,
+RunOption = Annotated[str | None, typer.Option("--run", help="Name of the run; by default the newest live one.")]
+NewRunOption = Annotated[str | None, typer.Option("--run", help="Name of the new run; by default WORLD-TIME.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, for scripts.")]
+
+
+def new_app(group: type[Group] = Group, *, completes: bool = False) -> typer.Typer:
+    """Return a command with foosim's habits: help without arguments, plain tracebacks; `completes`: in shells, too."""
+    return App(
+        cls=group,
+        context_settings={"max_content_width": HELP_WIDTH_MAX, "help_option_names": ["-h", "--help"]},
+        add_completion=completes,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         no_args_is_help=True,
     )
 
 
-def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadUsage], None] | None = None) -> None:
-    """Run the command `name` and exit with its code; refusals are shown without a traceback.
+def print_json(content: dict[str, Any], file: TextIO | None = None) -> None:
+    """Print a result of `--json` on standard output, or to a file, in one line."""
+    from foosim.common.json_text import encode_json
 
-    `refusing` is called with invalid arguments, before they are shown.
+    _printed.append(True)
+    print(encode_json(content).decode(), file=file, flush=True)
+
+
+def run_app(app: typer.Typer, name: str) -> NoReturn:
+    """Run the command `name` and end with its exit code; refusals are shown without a traceback.
+
+    With `--json` a command that is refused before its result prints an object, too: `failed`, `reason`.
 
     Garbage collections skip imported objects, which live as long as the process; at its end they would take a fifth of
     the time of a short command.
     """
     words = sys.argv[1:]
     others = _sessions()
+    _printed.clear()
     if gc.get_freeze_count() == 0:
         gc.freeze()
+    reason = ""
     try:
         code = _run(app, name, words)
-    except BadUsage as problem:
-        if refusing is not None:
-            refusing(words, problem)
-        print(str(problem), file=sys.stderr)
-        code = problem.exit_code
     except Refused as refused:
-        print(str(refused), file=sys.stderr)
-        code = refused.exit_code
+        reason, code = str(refused), refused.exit_code
     except MemoryError:
-        print(f"{name}: too little memory (MemoryError)", file=sys.stderr)
-        code = FAILED
+        reason, code = f"{name}: too little memory (MemoryError)", FAILED
     except KeyboardInterrupt:
         code = INTERRUPTED
+    if reason:
+        print(reason, file=sys.stderr)
+    if code != DONE and "--json" in words and not _printed:
+        print_json({"failed": True, "reason": reason or "interrupted"})
     _end(code, others)
+
+
+_printed: Final[list[bool]] = []
+"""One for each object that this command has printed."""
 
 
 def _sessions() -> Collection[Any]:
@@ -121,9 +139,5 @@ def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:
     try:
         code = app(words, prog_name=name, standalone_mode=False)
     except typer.TyperException as error:
-        root = typer.main.get_command(app)
-        if not words and hasattr(root, "commands"):  # then it is the help
-            print(error.format_message(), file=sys.stderr)
-            return BAD_INPUT
-        raise bad_usage(error, root, name, words) from None
+        raise bad_usage(error, typer.main.get_command(app), name, words) from None
     return code if isinstance(code, int) else DONE

@@ -39,4 +39,4 @@ def interrupting_signals() -> Iterator[None]:
 
 
 def _interrupt(number: int, frame: object) -> None:
-    raise KeyboardInterrupt(f"{signal.Signals(number).name} ended foosim-supervisor up before the run began")
+    raise KeyboardInterrupt(f"{signal.Signals(number).name} ended foosim up before the run began")

@@ -1,4 +1,4 @@
-"""The command `foosim-probe`: checks whether the loop of a process advances, for health checks and probes."""
+"""The command `foosim probe`: checks whether the loop of a process advances, for health checks and probes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import typer
 
 from foosim.common.errors import BadValue
 from foosim.common.units import parse_ns
-from foosim.runtime.command import VersionOption, new_app, run_app
+from foosim.runtime.command import new_app
 from foosim.runtime.progress import NoProgress, age_ns
 
 ProgressOption = Annotated[
     Path | None,
-    typer.Option("--progress-file", help="File that shows progress, read by foosim-probe."),
+    typer.Option("--progress-file", help="File that shows progress, read by foosim probe."),
 ]
 """The option of a process with a progress file."""
 
@@ -37,19 +37,9 @@ def probe_file(path: Path, within: str) -> int:
 def probe(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The process's --progress-file.", show_default=False)],
     within: Annotated[str, typer.Option(help="Maximum age of the last progress.")] = "5s",
-    version: VersionOption = False,
 ) -> None:
     """Check whether the main loop of a process advances, as a health check on its machine or in its container.
 
     Exit codes: 0 the last progress is recent, 1 it is too old or absent.
     """
     print(f"alive, {probe_file(path, within) / 1e9:.1f} s ago")
-
-
-def main() -> None:
-    """Entry of `foosim-probe`."""
-    run_app(app, "foosim-probe")
-
-
-if __name__ == "__main__":
-    main()

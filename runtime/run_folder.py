@@ -275,7 +275,7 @@ def find_run(name: str | None = None) -> RunFolder:
     if name is None:
         live = live_runs()
         if not live:
-            raise NoRun("no run is live; foosim-supervisor up FILE starts one")
+            raise NoRun("no run is live; foosim up FILE starts one")
         return live[0]
     folder = open_run(name)
     if not folder.is_live():

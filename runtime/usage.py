@@ -37,12 +37,22 @@ def bad_usage(error: typer.TyperException, root: Any, program: str, words: Seque
 
 def _meant(error: Exception, root: Any, program: str, words: Sequence[str]) -> tuple[Any, str, list[str]]:
     """Return the refused command, its name, and the words after its name."""
-    commands, context = getattr(root, "commands", {}), getattr(error, "ctx", None)
-    if context is None or context.parent is not None:
-        for number, word in enumerate(words):
-            if word in commands:
-                return commands[word], f"{program} {word}", list(words[number + 1 :])
-    return root, program, list(words)
+    command, names, context, left = root, [program], typer.Context(root, resilient_parsing=True), list(words)
+    refusing = getattr(error, "ctx", None)
+    depth = len(words) if refusing is None else len(_groups_above(refusing))
+    while len(names) <= depth and hasattr(command, "list_commands"):
+        place = next((place for place, word in enumerate(left) if not word.startswith("-")), len(left))
+        name, found, after = command.resolve_command(context, left[place:]) if left[place:] else (None, None, [])
+        if found is None:
+            break
+        command, left = found, after
+        names.append(name)
+    return command, " ".join(names), left
+
+
+def _groups_above(context: Any) -> list[Any]:
+    """Return the contexts of the groups that the command of a context is in."""
+    return [] if context.parent is None else [context.parent, *_groups_above(context.parent)]
 
 
 def _shown(parameter: Any) -> str:
@@ -91,12 +101,13 @@ def _value(error: Exception, parameter: Any, where: str) -> BadUsage:
 
 def _arguments(command: Any, error: typer.TyperException, place: str, words: Sequence[str]) -> BadUsage:
     """A word that is no command, no command at all, or more words than there are arguments."""
-    commands, context = getattr(command, "commands", None), getattr(error, "ctx", None)
-    if commands is not None:
+    context = getattr(error, "ctx", None)
+    if hasattr(command, "list_commands"):
+        commands = command.list_commands(context)
         word = next((word for word in words if not word.startswith("-")), None)
         if word is None:
-            return BadUsage(f"{place}: a command is missing; commands are {', '.join(commands)}")
-        return _unknown(f"{place}: there is no such command", word, "commands", list(commands))
+            return BadUsage(error.format_message())  # the help
+        return _unknown(f"{place}: there is no such command", word, "commands", commands)
     extra = [] if context is None else command.make_parser(context).parse_args(list(words))[1]
     if not extra:
         return BadUsage(f"{place}: {error.format_message()}")

@@ -1,4 +1,4 @@
-"""The process `foosim-supervisor run`: the supervisor's core as the router of the simulation plane.
+"""The process `foosim run`: the supervisor's core as the router of the simulation plane.
 
 It holds the run's folder: the run file says where the run listens, the journal has what was decided, and at the end
 `result.json` has how it ended. Started again in the folder of a run that has not ended, it listens where it listened

@@ -97,7 +97,7 @@ class Roster:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no {hello.role} {show(hello.name)} is declared; declared are {', '.join(choices)}{hint}"
         if hello.name in self.stopped:
-            return f"{hello.name} is stopped; `foosim-supervisor start {hello.name}` lets it take part again"
+            return f"{hello.name} is stopped; `foosim start {hello.name}` lets it take part again"
         known = self.by_name.get(hello.name)
         if known is not None and known.boot != hello.boot and not known.lost and not known.in_doubt:
             return f"a {known.role} {hello.name} is already here"

@@ -22,6 +22,7 @@ from xdist.scheduler import LoadScopeScheduling
 import foosim.protocol.hub_messages
 import foosim.protocol.messages
 import foosim.protocol.replay_messages  # noqa: F401  # all messages
+from foosim.cli import main
 from foosim.common.struct_types import Message
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
@@ -189,19 +190,19 @@ class Done(NamedTuple):
 
 
 Command = Callable[..., Done]
-Typed = Callable[[str, Callable[[], None]], Command]
+Typed = Callable[..., Command]
 
 
 @pytest.fixture
 def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Typed:
-    """Return a function that makes a command, by name and entry point; it runs in an empty folder."""
+    """Return a function that makes a command of foosim, by its verb; it runs in an empty folder."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.chdir(tmp_path)
 
-    def make(program: str, main: Callable[[], None]) -> Command:
+    def make(*verb: str) -> Command:
         def run(*arguments: str | Path) -> Done:
-            monkeypatch.setattr(sys, "argv", [program, *map(str, arguments)])
+            monkeypatch.setattr(sys, "argv", ["foosim", *verb, *map(str, arguments)])
             with pytest.raises(SystemExit) as ended:
                 main()
             printed = capsys.readouterr()

@@ -114,9 +114,9 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     assert (learning / "table.yaml").read_text() == (ROOT / "deploy" / "table.yaml").read_text()
     assert (learning / "defend_shot.json").is_file()
     scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
-    assert "foosim-supervisor" in scripts
+    assert "foosim" in scripts
     assert not [script for script in scripts if not (installed.commands / script).is_file()]
-    assert "Usage" in run(installed.commands / "foosim-supervisor", "--help", cwd=tmp_path)
+    assert "Usage" in run(installed.commands / "foosim", "--help", cwd=tmp_path)
 
 
 def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_path: Path) -> None:
@@ -127,7 +127,7 @@ def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_
     (tmp_path / "powers.py").write_text(source)
     shutil.copy(ROOT / "deploy" / "table.yaml", tmp_path)
     options = ["--in", "table.yaml", "--ticks", "40", "--set", "engine=pure", "--set", "players={}", "--set", setting]
-    command = installed.commands / "foosim-supervisor"
+    command = installed.commands / "foosim"
     shown = run(command, "check-component", "motor_power", *options, cwd=tmp_path, PYTHONPATH=str(tmp_path))
     assert "sensor motor_power: the same world on 1, 2 and 3 nodes" in shown
 
@@ -159,7 +159,7 @@ def test_the_guides_examples_run_from_an_empty_folder(
         shutil.copy(ROOT / use.deployment, tmp_path)
     folder = tmp_path / "packages" if use.is_package else tmp_path
     sets = [word for name in names for word in USES[name].arguments]
-    deployment, command = Path(use.deployment).name, installed.commands / "foosim-rehearse"
+    deployment, command = Path(use.deployment).name, installed.commands / "foosim rehearse"
     options = [deployment, "--set", "engine=pure", *sets, "--for", "400ms", "--json"]
     result = json.loads(run(command, *options, cwd=tmp_path, PYTHONPATH=str(folder)))
     assert result["ticks"] > 0 and not result["failed"] and shows in result
@@ -173,8 +173,8 @@ def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: 
     file, *options = RUNS[name]
     for commands in (installed.commands, INTERPRETED):
         capture = tmp_path / f"{commands.parent.name}.mcap"
-        run(commands / "foosim-rehearse", ROOT / "deploy" / file, *options, "--capture", capture, cwd=tmp_path)
-    run(INTERPRETED / "foosim-replay", "diff", *sorted(tmp_path.glob("*.mcap")), cwd=tmp_path)
+        run(commands / "foosim", "rehearse", ROOT / "deploy" / file, *options, "--capture", capture, cwd=tmp_path)
+    run(INTERPRETED / "foosim", "capture", "diff", *sorted(tmp_path.glob("*.mcap")), cwd=tmp_path)
 
 
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")

@@ -1,4 +1,4 @@
-"""The process `foosim-vhub`: connects the vHub's core to both planes, the journal and the capture.
+"""The process `foosim role vhub`: connects the vHub's core to both planes, the journal and the capture.
 
 It is a client of the simulation plane and the router of the radio plane; only the core passes data from one to the
 other. The core's records are in the journal before its messages are sent. A thread writes the capture.
@@ -31,7 +31,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import CAPTURE, Build
-from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, new_app
 from foosim.runtime.disk import Level
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.journal import (
@@ -466,7 +466,7 @@ app = new_app()
 
 
 @app.command()
-def vhub(  # noqa: PLR0913, PLR0917  # a command's options
+def vhub(  # a command's options
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT, or run:NAME.")],
     listen: Annotated[str, typer.Option(help="Address for clients; port 0 is any free port.")] = LOOPBACK,
     insecure: InsecureOption = False,
@@ -475,7 +475,6 @@ def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     run_folder: RunFolderOption = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
-    version: VersionOption = False,
 ) -> None:
     """Run the virtual hub of a run.
 
@@ -487,12 +486,3 @@ def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     die_with_parent()
     options = read_options(capture, no_capture, run_folder, progress_file)
     raise typer.Exit(run_vhub(connect, listen, insecure, options, pki))
-
-
-def main() -> None:
-    """Entry of `foosim-vhub`."""
-    run_app(app, "foosim-vhub")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,1 +1,1 @@
-"""The command `foosim-match`."""
+"""The verb `match`."""

@@ -1,4 +1,4 @@
-"""The command `foosim-match`: many games of two players, in several processes, and what they show."""
+"""The command `foosim match`: many games of two players, in several processes, and what they show."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from foosim.cli.run_command import with_options
 from foosim.client.loading import look_in
 from foosim.common import units
 from foosim.common.errors import BadValue, Failed, UnknownName, read_at
-from foosim.common.json_text import encode_json
 from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -29,7 +28,7 @@ from foosim.rehearsal.match.entrants import entrant, seats
 from foosim.rehearsal.match.figures import figures
 from foosim.rehearsal.match.game import Fixture, Game, Link, Played, play, sets_of
 from foosim.rehearsal.workers import in_processes
-from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, JsonOption, new_app, print_json
 
 TABLE: Final = Path("deploy/table.yaml")
 SIDES: Final = {"a": (0,), "b": (1,), "both": (0, 1)}
@@ -78,8 +77,7 @@ class MatchOptions:
 @with_options()
 def foosim_match(
     options: MatchOptions,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
-    version: VersionOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Let two players play many games, and show who is better.
 
@@ -152,7 +150,7 @@ def _play(match: Match, jobs: int, drawing: Path | None, json: bool) -> int:
         with new_file(drawing) as part:
             part.write_text(picture(drawn, match.labels, drawn_title(match)), encoding="utf-8")
     if json:
-        typer.echo(encode_json(as_json(match, played, cells)).decode())
+        print_json(as_json(match, played, cells))
     elif cells:
         show(match, cells)
     return code
@@ -206,8 +204,3 @@ def _make_room(folder: Path | None, games: Iterable[Game]) -> None:
     for game in games:
         if game.capture is not None:
             check_absent(game.capture)
-
-
-def main() -> None:
-    """The entry point of `foosim-match`."""
-    run_app(app, "foosim-match")

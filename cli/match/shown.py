@@ -1,4 +1,4 @@
-"""How `foosim-match` shows a match: a line for each game, a table, JSON."""
+"""How `foosim match` shows a match: a line for each game, a table, JSON."""
 
 from __future__ import annotations
 

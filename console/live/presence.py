@@ -32,7 +32,7 @@ def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
     reason, failed, capture = result["reason"], bool(result["failed"]), result["capture"]
     if stopped_by and reason == "stopped":
         reason = f"stopped by {stopped_by}"
-    command = "" if capture is None else f"foosim-replay view {shlex.quote(capture)}"
+    command = "" if capture is None else f"foosim view {shlex.quote(capture)}"
     said = f"The run has {'failed' if failed else 'ended'} at tick {result['ticks']}: {reason}. "
     if capture is None:
         said += "It has no capture."

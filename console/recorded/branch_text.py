@@ -1,4 +1,4 @@
-"""The command that begins a run with the shown frame: arguments that `foosim-supervisor up --from` accepts."""
+"""The command that begins a run with the shown frame: arguments that `foosim up --from` accepts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def branch_answer(recording: Recording, tick: int) -> Answered:
     row = recording.row(FRAME, number)
     name = recording.about.deployment_name
     time = format_ns(row.tick * recording.tick_ns).replace(" ", "")
-    command = ["foosim-supervisor", "up", name, "--from", f"{_near(recording.path)}@{time}"]
+    command = ["foosim", "up", name, "--from", f"{_near(recording.path)}@{time}"]
     return Answered(shlex.join(command) + _remark(recording, Path(name)), row.tick)
 
 

@@ -231,7 +231,7 @@ class CaptureIndex:
                 pairs.frombytes(content[INDEX_FIELDS.size : INDEX_FIELDS.size + size])
                 self._note(part, channel, pairs)
         elif opcode == Opcode.MESSAGE:
-            raise ValueError("a message outside of a chunk; foosim-replay cut writes a capture with chunks")
+            raise ValueError("a message outside of a chunk; foosim capture cut writes a capture with chunks")
         elif opcode == Opcode.DATA_END:
             if not part.taken:
                 self._complete(part)

@@ -1,4 +1,4 @@
-"""A replay on the replay plane (`foosim-replay play`) as a source of the page.
+"""A replay on the replay plane (`foosim capture play`) as a source of the page.
 
 Its connection belongs to a thread, which passes messages on to the event loop. Poses have names of links, so the scene
 is that of the captured deployment with the entities that these names add.

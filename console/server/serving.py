@@ -1,4 +1,4 @@
-"""Serves sources until a signal ends the process; shared by `foosim-console` and `foosim-replay view`.
+"""Serves sources until a signal ends the process; shared by `foosim view` and `foosim view`.
 
 By default only this machine reaches the page. Another address takes a certificate, which browsers have to trust: a
 token that travels in the open is known to everybody on the way.

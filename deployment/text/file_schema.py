@@ -1,7 +1,7 @@
 """The JSON Schema of what people write, made from that of the models, which know nothing of abbreviations.
 
 Entries of a section may be like a template, and then have any part of their keys; in those for each robot texts may
-have signs (`$robot`). What is missing in the end, and whether names exist, only `foosim-supervisor validate` says.
+have signs (`$robot`). What is missing in the end, and whether names exist, only `foosim check` says.
 """
 
 from __future__ import annotations

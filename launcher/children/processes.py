@@ -24,11 +24,11 @@ from foosim.common.errors import Failed
 from foosim.launcher.children.memory import OomKills, oom_kills
 from foosim.launcher.children.restarts import Ending
 from foosim.launcher.hosts.ssh import Remote
-from foosim.runtime.children import GRACE_S, child_environment, script
+from foosim.runtime.children import GRACE_S, ROLE, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
 
 POLL_S: Final = 0.02
-SHOW_STACKS: Final = ("foosim-player", "foosim-process")
+SHOW_STACKS: Final = ([*ROLE, "player"], [*ROLE, "roles"])
 """Commands whose processes run code of users."""
 STACK_S: Final = 1.0
 """Time for a hanging player to log its stack."""
@@ -93,7 +93,7 @@ class Child:
 
     def ask_for_stack(self) -> bool:
         """Make a player on this machine log its stack and end; False for any other process."""
-        shows = self.command[0] in SHOW_STACKS and self.remote is None
+        shows = list(self.command[:3]) in SHOW_STACKS and self.remote is None
         if shows:
             self.process.send_signal(STACK_SIGNAL)
         return shows

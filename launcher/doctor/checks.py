@@ -39,6 +39,7 @@ from foosim.launcher.pki.hosts import identities_on, passwords_of
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
+from foosim.runtime.children import FOOSIM, script
 from foosim.runtime.run_folder import hosted_folder, runs_folder
 from foosim.runtime.transport.certificate_files import (
     check_certificate,
@@ -118,7 +119,7 @@ class Case:
 
     def provide(self, more: str = "") -> str:
         """Return the command that issues missing certificates, and sends them to a host."""
-        return f"foosim-pki init DIR FILE{more} --send" if self.is_there else f"foosim-pki init {self.pki} FILE{more}"
+        return f"foosim pki init DIR FILE{more} --send" if self.is_there else f"foosim pki init {self.pki} FILE{more}"
 
 
 class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -371,14 +372,12 @@ def _disk(case: Case) -> Iterator[_Said]:
 
 
 def _commands(case: Case) -> Iterator[_Said]:
-    """The processes that `up` starts."""
-    for name in ("foosim-supervisor", "foosim-vhub", "foosim-node", "foosim-player"):
-        beside = Path(sys.executable).with_name(name)
-        found = str(beside) if beside.is_file() else shutil.which(name)
-        if found is None:
-            yield name, "problem", "not found beside this Python or on PATH", "install foosim in this environment"
-        else:
-            yield name, "fine", found, ""
+    """The command that `up` starts processes with."""
+    found = shutil.which(script())
+    if found is None:
+        yield FOOSIM, "problem", "not found beside this Python or on PATH", "install foosim in this environment"
+    else:
+        yield FOOSIM, "fine", found, ""
 
 
 def _players(case: Case) -> Iterator[_Said]:
@@ -400,7 +399,7 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "processes": _processes,
     "versions": _versions,
     "arithmetic": _arithmetic,
-    "commands": _commands,
+    "command": _commands,
     "players": _players,
     "certificates": _certificates,
     "ports": _ports,

@@ -1,6 +1,6 @@
 """Runs the doctor's checks on the hosts of a deployment, in parallel, through ssh like a launcher.
 
-Lines on standard input and output of `foosim-guard`, so that one connection serves for everything: the greeting; for
+Lines on standard input and output of `foosim guard`, so that one connection serves for everything: the greeting; for
 each `clock` the wall time in ns; for the question (JSON) the answer (JSON). Then the host listens, where a vHub of the
 run would, until standard input ends, so that others can test the connection. A host that does not answer is one
 finding, and does not delay the others.
@@ -42,11 +42,11 @@ from foosim.launcher.hosts.port_check import listening, why_not_reached
 from foosim.launcher.hosts.ssh import NOT_FOUND, NOT_RUNNABLE, SSH_FAILED, Remote
 from foosim.protocol.channels import VHUB
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.runtime.children import GUARD, OTHER_VERSION
+from foosim.runtime.children import OTHER_VERSION
 from foosim.runtime.transport.certificate_files import read_ca
 from foosim.runtime.transport.certificate_folder import CertificateError
 
-GREETING: Final = "foosim-doctor is here"
+GREETING: Final = "foosim doctor is here"
 CLOCK: Final = "clock"
 LINE_BYTES_MAX: Final = 1 << 20
 LIMIT_S: Final = 40.0
@@ -117,7 +117,7 @@ def _root(case: Case) -> str:
 
 def ask(remote: Remote, question: Question, limit_s: float) -> Told:
     """Run the checks of one host within a time limit."""
-    words = [remote.path(GUARD), "examine", "--version-of-launcher", version("foosim")]
+    words = [remote.foosim, "guard", "examine", "--version-of-launcher", version("foosim")]
     with tempfile.TemporaryFile() as errors:
         try:
             process = subprocess.Popen(

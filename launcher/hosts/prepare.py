@@ -17,7 +17,6 @@ from foosim.common.addresses import Address, parse_address
 from foosim.common.errors import Failed, Refused
 from foosim.deployment.schema import Deployment
 from foosim.launcher.hosts.ssh import CAPTURE, Remote
-from foosim.runtime.children import GUARD
 
 BLOCK_BYTES: Final = 1 << 20
 SIZE_LINE_MAX: Final = 64
@@ -47,7 +46,7 @@ def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, 
         if address.protocol == "tls" and remote.host.pki is None:
             raise NoFolder(
                 f"{there} has no certificate: set hosts.{remote.name}.pki to their folder on it; "
-                "`foosim-pki init DIR FILE --send` brings them there"
+                "`foosim pki init DIR FILE --send` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:
@@ -59,7 +58,7 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
 
     Raises Failed; it stays there then.
     """
-    command = remote.ssh([remote.path(GUARD), "send", run, CAPTURE])
+    command = remote.ssh([remote.foosim, "guard", "send", run, CAPTURE])
     came: dict[Path, Path] = {}
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
@@ -82,7 +81,7 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
         raise Failed(f"the capture stays on {where}: {why or problem}")
     for part, home in came.items():
         part.replace(home)
-    forget = remote.ssh([remote.path(GUARD), "forget", run])
+    forget = remote.ssh([remote.foosim, "guard", "forget", run])
     try:
         subprocess.run(forget, stdin=subprocess.DEVNULL, capture_output=True, timeout=FORGET_S, check=False)
     except subprocess.TimeoutExpired:

@@ -1,7 +1,7 @@
 """Starting processes on another machine: the command line of the system's ssh, and the meaning of its exit code.
 
 `ssh` is the user's own: keys, agents, jump hosts and ~/.ssh/config are as they are; it never prompts. On the
-other side `foosim-guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs the
+other side `foosim guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs the
 commands, `hosts` fetches what a run left on a machine.
 """
 
@@ -15,7 +15,7 @@ from typing import Final
 
 from foosim.deployment.hosts import Host
 from foosim.deployment.schema import Deployment, places
-from foosim.runtime.children import BY_SIGNAL, GUARD, OTHER_VERSION
+from foosim.runtime.children import BY_SIGNAL, FOOSIM, GUARD, OTHER_VERSION
 
 SSH_FAILED: Final = 255
 NOT_FOUND: Final = 127
@@ -61,9 +61,10 @@ class Remote:
         """How a person connects to the machine."""
         return shlex.join(["ssh", *self.host.ssh_options, self.host.destination])
 
-    def path(self, command: str) -> str:
-        """Return one of foosim's commands as it is called there."""
-        return command if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{command}"
+    @property
+    def foosim(self) -> str:
+        """The command as it is called there."""
+        return FOOSIM if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{FOOSIM}"
 
     def pki_arguments(self) -> list[str]:
         """Return the folder of the certificates there, as an argument for a process of a run with certificates."""
@@ -71,7 +72,7 @@ class Remote:
 
     def guarded(self, run: str, name: str, command: Sequence[str]) -> list[str]:
         """Return the command line that starts a process of a run there, and ends it when the connection ends."""
-        guard = [self.path(GUARD), "run", "--version-of-launcher", version("foosim"), run, name, *command]
+        guard = [self.foosim, "guard", "run", "--version-of-launcher", version("foosim"), run, name, *command]
         return self.ssh(guard)
 
     def unit_started(self, name: str) -> list[str]:
@@ -82,10 +83,10 @@ class Remote:
     def why(self, code: int, lines: Sequence[str]) -> str:
         """Return why ssh, or its command, ended with this code; `lines` are the last ones of its log."""
         if code == NOT_FOUND:
-            text = f"there is no {self.path(GUARD)} on host {self.name}"
+            text = f"there is no {self.foosim} on host {self.name}"
             return f"{text}: install foosim there, and set hosts.{self.name}.commands to its folder"
         if code == NOT_RUNNABLE:
-            return f"{self.path(GUARD)} cannot be run on host {self.name}"
+            return f"{self.foosim} cannot be run on host {self.name}"
         if code == OTHER_VERSION:
             found = next((line for line in reversed(lines) if line.startswith(GUARD)), "another version of foosim")
             return f"host {self.name}: {found.removeprefix(GUARD + ': ')}; install {version('foosim')} there"

@@ -18,7 +18,7 @@ def read_ca(folder: Path, now: datetime) -> x509.Certificate:
     """Return the root, checked. Raises CertificateError."""
     path = folder / CA_FILE
     if not path.exists():
-        raise CertificateError(f"{folder} has no {CA_FILE}; foosim-pki init {folder} FILE makes one")
+        raise CertificateError(f"{folder} has no {CA_FILE}; foosim pki init {folder} FILE makes one")
     ca = read_certificate(path)
     try:
         is_ca = ca.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
@@ -57,7 +57,7 @@ def check_certificate(path: Path, found: x509.Certificate, identity: str, ca: x5
         found.verify_directly_issued_by(ca)
     except (ValueError, TypeError, InvalidSignature):
         raise CertificateError(f"{path}: not issued by the root in {CA_FILE} beside it") from None
-    _check_dates(path, found, now, f"foosim-pki init {path.parent} FILE")
+    _check_dates(path, found, now, f"foosim pki init {path.parent} FILE")
 
 
 def check_key(path: Path, found: x509.Certificate) -> None:

@@ -194,5 +194,5 @@ def check_host(credentials: Credentials | None, locator: str) -> None:
         shown = ", ".join(name for name in known if name != who)
         raise CertificateError(
             f"{credentials.certificate} is for {shown}, not for {host}, where {who} listens: "
-            f"foosim-pki init {credentials.certificate.parent} FILE --host {host}"
+            f"foosim pki init {credentials.certificate.parent} FILE --host {host}"
         )

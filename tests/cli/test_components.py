@@ -18,7 +18,7 @@ from foosim.deployment.loader import apply_sets
 from foosim.world.forms.registry import FORMS, names
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+COMMAND: Final = "from foosim.cli import main; main()"
 BOUNDED: Final = '''
 from typing import Annotated
 

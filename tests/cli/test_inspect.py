@@ -19,11 +19,11 @@ from foosim.world.bodies.urdf_text import snippet
 ROOT: Final = Path(__file__).parents[2]
 ARM: Final = ROOT / "deploy" / "models" / "arm.urdf"
 PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
-COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+COMMAND: Final = "from foosim.cli import main; main()"
 
 
 def inspected(*arguments: str | Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", COMMAND, "inspect", *map(str, arguments)]
+    command = [sys.executable, "-c", COMMAND, "urdf", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 

@@ -1,4 +1,4 @@
-"""The command `foosim-match`: what it prints, what it refuses, exit codes."""
+"""The command `foosim match`: what it prints, what it refuses, exit codes."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ SHORT: Final = ("--deployment", TABLE, "--minutes", "0.01", "--set", "engine=pur
 
 @pytest.fixture
 def command(typed: Typed) -> Command:
-    """Runs `foosim-match`."""
-    return typed("foosim-match", match.main)
+    """Runs `foosim match`."""
+    return typed("match")
 
 
 def test_a_match_has_a_line_for_each_game_and_a_table(command: Command, tmp_path: Path) -> None:

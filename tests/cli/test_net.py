@@ -1,4 +1,4 @@
-"""The command `foosim-net` without a run of processes: what it prints, what it refuses, exit codes."""
+"""The command `foosim net` without a run of processes: what it prints, what it refuses, exit codes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from foosim.analysis.explain_stages import STAGE_NAMES
 from foosim.analysis.network_tables import link_line, links_shown, use_text
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
-from foosim.cli import net
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.network.presets import PRESETS
@@ -43,8 +42,8 @@ TICKS: Final = 320
 
 @pytest.fixture
 def command(typed: Typed) -> Command:
-    """Runs `foosim-net`."""
-    return typed("foosim-net", net.main)
+    """Runs `foosim net`."""
+    return typed("net")
 
 
 def text_of(**network: Any) -> str:
@@ -148,7 +147,7 @@ def test_bad_input_is_refused_without_a_traceback(command: Command, arguments: t
 )  # fmt: skip
 def test_without_a_run_it_says_so(command: Command, arguments: tuple[str, ...]) -> None:
     done = command(*arguments)
-    assert (done.code, done.err) == (1, "no run is live; foosim-supervisor up FILE starts one\n")
+    assert (done.code, done.err) == (1, "no run is live; foosim up FILE starts one\n")
 
 
 def test_settings_are_nested() -> None:

@@ -15,7 +15,7 @@ import pytest
 ROOT: Final = Path(__file__).parents[2]
 PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
 DIFFERS: Final = 1
-"""Exit code of `foosim-replay diff`: on two nodes others took part."""
+"""Exit code of `foosim capture diff`: on two nodes others took part."""
 
 
 def files() -> dict[str, str]:
@@ -52,7 +52,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     for words in commands():
         code, text = run(words, folder)
         line = " ".join(words)
-        assert code == (DIFFERS if words[:2] == ["foosim-replay", "diff"] else 0), f"{line}:\n{text}"
+        assert code == (DIFFERS if words[:2] == ["foosim", "capture", "diff"] else 0), f"{line}:\n{text}"
         found[line] = text
     assert {"live.mcap", "turret.mcap", "two.mcap", "commands.csv", "turret.html"} <= {p.name for p in folder.iterdir()}
     return found
@@ -60,17 +60,17 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 def test_the_guide_goes_from_the_file_to_the_capture(printed: dict[str, str]) -> None:
     assert [" ".join(line.split()[:2]) for line in printed] == [
-        "foosim-supervisor inspect",
-        "foosim-supervisor validate",
-        "foosim-supervisor up",
-        "foosim-rehearse turret.yaml",
-        "foosim-replay info",
-        "foosim-replay verify",
-        "foosim-replay export",
-        "foosim-replay report",
+        "foosim urdf",
+        "foosim check",
+        "foosim up",
+        "foosim rehearse turret.yaml",
+        "foosim capture info",
+        "foosim capture verify",
+        "foosim capture export",
+        "foosim capture report",
         "python look.py",
-        "foosim-rehearse turret.yaml",
-        "foosim-replay diff",
+        "foosim rehearse turret.yaml",
+        "foosim capture diff",
     ]
     assert sorted(files()) == ["look.py", "lookout.py", "turret.urdf", "turret.yaml"]
 
@@ -86,10 +86,10 @@ def test_one_and_two_nodes_compute_the_same_world(printed: dict[str, str]) -> No
         digest
         for line, text in printed.items()
         for digest in re.findall(r"digest of all ticks ([0-9a-f]{64})", text)
-        if line.startswith(("foosim-rehearse", "foosim-replay"))
+        if line.startswith(("foosim", "rehearse", "foosim capture"))
     }
     assert len(digests) == 1
-    (said,) = [text for line, text in printed.items() if line.startswith("foosim-replay diff")]
+    (said,) = [text for line, text in printed.items() if line.startswith("foosim capture diff")]
     assert all(
         re.search(rf"^  /{topic}: \d+ rows, equal$", said, re.MULTILINE) for topic in ("frame", "tick", "packets")
     )

@@ -13,10 +13,10 @@ ROOT = Path(__file__).parents[2]
 TABLE = str(ROOT / "deploy" / "table.yaml")
 RUN = """
 import sys
-from foosim.cli import supervisor
+from foosim.cli import main
 sys.argv = sys.argv[1:]
 try:
-    supervisor.main()
+    main()
 except SystemExit as end:
     assert not end.code, end.code
 print(*sys.modules, file=sys.stderr)
@@ -29,12 +29,12 @@ HEAVY = {"numpy", "pybullet", "zenoh", "cryptography", "mcap", "rich", "yaml", "
     [
         (["--help"], set()),
         (["up", "--help"], set()),
-        (["validate", TABLE], {"yaml", "foosim.deployment.schema"}),
+        (["check", TABLE], {"yaml", "foosim.deployment.schema"}),
     ],
 )
 def test_a_command_imports_what_it_needs(words: list[str], needed: set[str]) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", RUN, "foosim-supervisor", *words],
+        [sys.executable, "-c", RUN, "foosim", *words],
         capture_output=True,
         text=True,
         check=True,

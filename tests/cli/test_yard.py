@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
-from foosim.cli import net, rehearse, supervisor
-from foosim.cli.match import command as match
 from foosim.rehearsal.swarm import campaign
 from foosim.rehearsal.swarm.faults import FAULT_OF
 from tests.conftest import Typed
@@ -19,24 +16,18 @@ NO_SIDES: Final = f"{YARD}: a match needs a world with a rule that keeps the sco
 
 
 @pytest.mark.parametrize(
-    ("program", "main", "words", "code", "err"),
+    ("words", "code", "err"),
     [
-        ("foosim-match", match.main, ("team", "team", "--deployment", YARD), 2, NO_SIDES),
-        ("foosim-net", net.main, ("lint", YARD), 0, ""),
-        ("foosim-supervisor", supervisor.main, ("validate", YARD), 0, ""),
-        ("foosim-rehearse", rehearse.main, (YARD, "--swarm", "--jobs", "1"), 0, ""),
+        (("match", "team", "team", "--deployment", YARD), 2, NO_SIDES),
+        (("net", "lint", YARD), 0, ""),
+        (("check", YARD), 0, ""),
+        (("rehearse", YARD, "--swarm", "--jobs", "1"), 0, ""),
     ],
 )
-def test_files_of_robots_are_found(  # the columns of the table
-    program: str,
-    main: Callable[[], None],
-    words: tuple[Any, ...],
-    code: int,
-    err: str,
-    typed: Typed,
-    monkeypatch: pytest.MonkeyPatch,
+def test_files_of_robots_are_found(
+    words: tuple[Any, ...], code: int, err: str, typed: Typed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(campaign.Flight, "run", campaign.Flight.close)  # a world that is built has its files
     monkeypatch.setattr(campaign, "CHANGES_THE_WORLD", frozenset(FAULT_OF))
-    done = typed(program, main)(*words)
+    done = typed()(*words)
     assert done.code == code and done.err.startswith(err), done.err

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app
-from foosim.cli.replay import app as replay_app
 from foosim.client.failing import failed
 from tests.turns import BY_PERIOD
 

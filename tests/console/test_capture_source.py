@@ -176,7 +176,7 @@ def test_what_a_branch_says_is_what_up_takes(run: Path, tmp_path: Path, monkeypa
     text, tick = asyncio.run(ask(237))
     assert tick == 230 and text.endswith("  # table.yaml is not here: name the file that the run was started with")
     words = shlex.split(text, comments=True)
-    assert words == ["foosim-supervisor", "up", "table.yaml", "--from", "run.mcap@460ms"]
+    assert words == ["foosim", "up", "table.yaml", "--from", "run.mcap@460ms"]
     branch = read_branch(words[-1], Recording(run).deployment)
     assert branch.start.origin.tick == 230
     monkeypatch.chdir(tmp_path)

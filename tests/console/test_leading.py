@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from foosim.capture.mcap.checks import CaptureError
+from foosim.cli.view import app
 from foosim.common.errors import BadValue, Refused
 from foosim.console.clock.leading import HeardClock, Leader
-from foosim.console.main import app
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_csv import BadPoses
 from foosim.console.recorded.poses_source import NOWHERE, PosesSource

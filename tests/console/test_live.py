@@ -124,9 +124,9 @@ def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
         == {
             "done": "The run has ended at tick 70: done. It has no capture.",
             "stopped": f"The run has ended at tick 70: stopped by browser 3. Its capture is {run}; "
-            f"this shows it: foosim-replay view {run}",
+            f"this shows it: foosim view {run}",
             "lost vhub: it was killed": f"The run has failed at tick 70: lost vhub: it was killed."
-            f" Its capture is {run}; this shows it: foosim-replay view {run}",
+            f" Its capture is {run}; this shows it: foosim view {run}",
         }[ends]
     )
 

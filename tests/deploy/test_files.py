@@ -15,13 +15,10 @@ from typing import Any, Final
 
 import pytest
 import typer.main
+from typer.core import TyperGroup
 
-from foosim.cli.supervisor import app as supervisor_app
-from foosim.client.main import app as player_app
+from foosim.cli.verbs import app
 from foosim.deployment.loader import load_deployment
-from foosim.node.main import app as node_app
-from foosim.runtime.health import app as probe_app
-from foosim.vhub.main import app as vhub_app
 from tests.deploy.processes import (
     DEPLOY,
     INSTANCES,
@@ -37,13 +34,6 @@ from tests.deploy.processes import (
 )
 
 ROOT: Final = DEPLOY.parent
-APPS: Final[dict[str, Any]] = {
-    "foosim-node": node_app,
-    "foosim-player": player_app,
-    "foosim-probe": probe_app,
-    "foosim-supervisor": supervisor_app,
-    "foosim-vhub": vhub_app,
-}
 USED_BY: Final = {
     "Dockerfile": "docker build",
     "compose.yaml": "docker compose --file deploy/compose.yaml up",
@@ -87,9 +77,10 @@ def test_commands_and_options_exist(declared: Callable[[], list[Declared]]) -> N
     for process in declared():
         for words in filter(None, (process.command, process.probe)):
             assert words[0] in scripts
-            command, arguments = typer.main.get_command(APPS[words[0]]), list(words[1:])
-            if words[0] == "foosim-supervisor":
-                command = command.commands[arguments.pop(0)]  # type: ignore[attr-defined]
+            command: Any = typer.main.get_command(app)
+            arguments = list(words[1:])
+            while isinstance(command, TyperGroup):
+                _, command, arguments = command.resolve_command(typer.Context(command), arguments)
             assert not command.make_context(words[0], arguments).args, words
 
 
@@ -97,7 +88,7 @@ def test_commands_and_options_exist(declared: Callable[[], list[Declared]]) -> N
 def test_probes_ask_the_file_that_the_process_writes(declared: Callable[[], list[Declared]]) -> None:
     for process in declared():
         written = process.command[process.command.index("--progress-file") + 1]
-        assert process.probe[:2] == ("foosim-probe", written)
+        assert process.probe[:3] == ("foosim", "probe", written)
 
 
 def test_there_is_a_process_for_everything_that_the_table_declares() -> None:
@@ -116,7 +107,7 @@ def test_only_the_vhub_is_in_both_networks() -> None:
     assert plane.pop("vhub") == {"simulation", "radio"}
     for process in from_compose():
         if process.name != "vhub":
-            assert plane[process.name] == {"radio" if process.command[0] == "foosim-player" else "simulation"}
+            assert plane[process.name] == {"radio" if process.command[2] == "player" else "simulation"}
     assert all(network["internal"] for network in content["networks"].values())
     assert not any("ports" in service for service in content["services"].values())
 

@@ -74,7 +74,7 @@ class Cluster:
         weather: Weather | None = None,
         programs: dict[str, list[str]] | None = None,
     ) -> None:
-        """`folder` takes deployment, capture and logs; `programs` are other words than a node's `foosim-node`."""
+        """`folder` takes deployment, capture and logs; `programs` are other words than a node's `foosim role node`."""
         self.folder = folder
         self.name = name
         self.pace = pace
@@ -137,13 +137,13 @@ class Cluster:
         """Return the words that start a process."""
         here = f"tcp/127.0.0.1:{self._port}"
         if process == SUPERVISOR:
-            words = ["foosim-supervisor", "run", str(self._file), "--listen", here, "--run", self.name]
+            words = ["foosim", "run", str(self._file), "--listen", here, "--run", self.name]
             return [*words, "--pace", self.pace]
         words = ["--connect", self.proxies[process].address]
         if process == VHUB:
             words += ["--listen", self.radio, "--capture", str(self.capture)]
-            return ["foosim-vhub", *words, "--run-folder", str(self.folder / f"{self.name}.vhub")]
-        program = ["foosim-player"] if process in self.deployment.players else ["foosim-node"]
+            return ["foosim", "role", "vhub", *words, "--run-folder", str(self.folder / f"{self.name}.vhub")]
+        program = ["foosim", "role", "player"] if process in self.deployment.players else ["foosim", "role", "node"]
         return [*self._programs.get(process, program), "--name", process, *words]
 
     def start(self, process: str) -> Child:

@@ -41,11 +41,11 @@ def hang(number, frame):
     while True:
         ctypes.PyDLL(None).usleep(100_000)  # holds the interpreter, as a loop in C does
 signal.signal(signal.SIGUSR1, hang)
-from foosim.node.main import main
+from foosim.cli import main
 main()
 """
 """A node that hangs for ever at SIGUSR1, while the threads of its session go on."""
-NODE: Final = [sys.executable, "-c", HANGING_NODE]
+NODE: Final = [sys.executable, "-c", HANGING_NODE, "role", "node"]
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Faults of a whole run as `foosim-supervisor up` starts it: what its launcher leaves behind, and how it ends."""
+"""Faults of a whole run as `foosim up` starts it: what its launcher leaves behind, and how it ends."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ PATIENT: Final = ("deadlines.lockstep_realtime=120 s", "deadlines.client_back=12
 @contextmanager
 def started(folder: Path, run: str, *sets: str) -> Iterator[subprocess.Popen[str]]:
     """Start the table, with settings, and wait for its first tick; whatever is left at the end is killed with it."""
-    words = [script("foosim-supervisor"), "up", str(TABLE), "--processes", "each", "--run", run, "--json"]
+    words = [script("foosim"), "up", str(TABLE), "--processes", "each", "--run", run, "--json"]
     words += [word for text in sets for word in ("--set", text)]
     with subprocess.Popen(
         [*words, "--capture", str(folder / f"{run}.mcap")],

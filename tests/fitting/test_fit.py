@@ -18,7 +18,6 @@ from foosim.common.errors import Failed
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.fitting.estimate import fit, scatter_of
-from foosim.fitting.main import main
 from foosim.fitting.motion import Array, Field, Pairs, Start, motion
 from foosim.fitting.tracks import BadTracks, read_tracks, usable
 from foosim.world.parameters.table import Table, table_of
@@ -99,7 +98,7 @@ def write(path: Path, tracks: Sequence[Array]) -> Path:
 
 
 def run(typed: Typed, *arguments: str | Path) -> Any:
-    return typed("foosim-table", main)("fit", *arguments)
+    return typed("fit")(*arguments)
 
 
 # --- the motion ------------------------------------------------------------------------------------------------------

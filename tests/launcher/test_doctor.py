@@ -100,11 +100,11 @@ def _no_root(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "subject", "state", "said", "remedy"),
     [
-        (_no_certificate, "node.red", "problem", "no certificate", "foosim-pki init"),
-        (_short, "node.red", "warning", "renew it", "foosim-pki init"),
+        (_no_certificate, "node.red", "problem", "no certificate", "foosim pki init"),
+        (_short, "node.red", "warning", "renew it", "foosim pki init"),
         (_swapped, "node.red", "problem", "does not belong to", "remove both files"),
         (_readable, "node.red.key", "problem", "can be read by others", "chmod 600"),
-        (_no_root, "ca.pem", "problem", "has no ca.pem", "foosim-pki init"),
+        (_no_root, "ca.pem", "problem", "has no ca.pem", "foosim pki init"),
     ],
 )
 def test_what_is_wrong_with_certificates_is_found(
@@ -124,7 +124,7 @@ def test_what_is_wrong_with_certificates_is_found(
 def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, folder: Path) -> None:
     case = Case(deployment, "127.0.0.9:7400", pki=folder)
     finding = found(case, "vhub")
-    assert finding.state == "problem" and finding.remedy.endswith(f"foosim-pki init {folder} FILE --host 127.0.0.9")
+    assert finding.state == "problem" and finding.remedy.endswith(f"foosim pki init {folder} FILE --host 127.0.0.9")
     assert found(case, "node.red").state == "fine", "who only connects listens nowhere"
     certificates.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
     assert found(case, "vhub").state == "fine"
@@ -134,7 +134,7 @@ def test_clients_with_passwords_need_one(folder: Path) -> None:
     text = read_deployment_text(TABLE) + "\naccess: {radio: password}\n"
     case = Case(load_deployment(text, "table.yaml"), "127.0.0.1", pki=folder)
     finding = found(case, "client.player-red")
-    assert finding.state == "problem" and finding.remedy.startswith("foosim-pki init")
+    assert finding.state == "problem" and finding.remedy.startswith("foosim pki init")
     certificates.issue_password(folder, "client.player-red")
     assert "a password and a certificate" in found(case, "client.player-red").text
     (folder / "client.player-red.pem").unlink()

@@ -109,12 +109,12 @@ def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> Non
     assert {finding.host for finding in findings.values()} == {"left"}
     vhub = on_host(Case(deployment, LISTEN, pki=there, host="radio", ca=ca))["vhub"]
     assert vhub.text.endswith("not for 192.168.10.4"), "where it listens is not where the supervisor does"
-    assert vhub.remedy == "foosim-pki init DIR FILE --host 192.168.10.4 --send"
+    assert vhub.remedy == "foosim pki init DIR FILE --host 192.168.10.4 --send"
     assert on_host(Case(deployment, LISTEN, pki=there, host="left", ca="00"))["ca.pem"].state == "problem"
     (there / "ca.key").write_bytes((folder / "ca.key").read_bytes())
     assert on_host(left)["ca.key"].state == "problem"
     (there / "node.blue.pem").unlink()
-    assert on_host(left)["node.blue"].remedy == "foosim-pki init DIR FILE --send"
+    assert on_host(left)["node.blue"].remedy == "foosim pki init DIR FILE --send"
     nowhere = on_host(Case(deployment, LISTEN, host="left", ca=ca))["folder"]
     assert nowhere.state == "problem" and "set hosts.left.pki" in nowhere.remedy
 

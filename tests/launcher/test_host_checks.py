@@ -45,7 +45,7 @@ def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
     check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
     assert check_certificates(plan) == []
     plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts[:2]), pki=folder))
-    with pytest.raises(NoFolder, match=r"red on host right .* set hosts.right.pki .* `foosim-pki init DIR FILE"):
+    with pytest.raises(NoFolder, match=r"red on host right .* set hosts.right.pki .* `foosim pki init DIR FILE"):
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
 

@@ -13,7 +13,6 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch
-from foosim.cli.supervisor import main
 from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.launcher.journal_check import check_journals, supervisor_records
@@ -76,7 +75,7 @@ def test_a_run_that_would_end_at_once_for_want_of_room_is_left_as_it_is(typed: T
     sets = (*SETS, "capture.reserve=1000 TiB")
     folder.write_launch(launch_of(RunOptions(TABLE, sets=sets), Path(launch.capture)))
     before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
-    done = typed("foosim-supervisor", main)("up", "--resume", folder.name)
+    done = typed()("up", "--resume", folder.name)
     assert done.code == 3 and done.err.startswith(f"{Path(launch.capture).parent}: ")
     assert "TiB left on its disk, the reserve is 1000 TiB (capture.reserve): make room" in done.err
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
@@ -127,7 +126,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
     told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
     assert told is not None and 10 < int(told[1]) <= 30
     words = shlex.split(told[2])
-    assert words[:3] == ["foosim-supervisor", "up", str(TABLE)] and words[-2] == "--from"
+    assert words[:3] == ["foosim", "up", str(TABLE)] and words[-2] == "--from"
     assert words[3:7] == ["--set", SETS[0], "--set", SETS[1]]
     branch = read_branch(words[-1], load_deployment(TABLE.read_text(), TABLE.name))
     assert branch.start.origin.tick == open_capture(tmp_path / "a run.mcap").frame_ticks[-1] > 40

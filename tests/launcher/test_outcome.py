@@ -16,7 +16,6 @@ import msgspec
 import pytest
 
 from foosim.capture.parts import FOOTER
-from foosim.cli.supervisor import main
 from foosim.common.errors import Refused
 from foosim.launcher import console_child
 from foosim.launcher.journal_check import supervisor_records
@@ -170,7 +169,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
     with pytest.raises(Refused) as refused:
         plan_again(folder)
     assert problems[what] in str(refused.value), refused.value
-    command = f"foosim-supervisor up {TABLE} --for '120 ms' --set engine=pure"
+    command = f"foosim up {TABLE} --for '120 ms' --set engine=pure"
     if what in ("capture", "another"):
         assert str(refused.value).endswith(f"; {command} begins a new run"), "what is there has no frame of this run"
     else:
@@ -193,7 +192,7 @@ def test_a_resume_of_a_run_that_has_ended_reports_its_result(run: Run, left: Lef
     again = create_run("table", "over")
     again.write_launch(launch_of(RunOptions(TABLE), Path("run.mcap")))
     again.write_result({**run.result, "run": "over", "reason": "done"})
-    supervisor = typed("foosim-supervisor", main)
+    supervisor = typed()
     code, out, err = supervisor("up", "--resume", "over", "--json")
     assert code == 0 and '"reason":"done"' in out and out.count("\n") == 1 and '"capture":"' in out
     assert "run over has ended: done" in err
@@ -205,7 +204,7 @@ def test_a_resume_imports_the_players_before_anything_starts(left: Left, typed: 
     sets = "engine=pure", "players.player-red.class=gone_since:Acts"
     capture = left.folder.path.parents[3] / "run.mcap"
     left.folder.write_launch(launch_of(RunOptions(TABLE, duration="120 ms", sets=sets), capture))
-    done = typed("foosim-supervisor", main)("up", "--resume", "mine")
+    done = typed()("up", "--resume", "mine")
     assert done.code == 2 and "players.player-red.class: there is no module gone_since" in done.err
     assert left.folder.result() is None and left.folder.info() is None
 
@@ -224,7 +223,7 @@ def test_a_resume_imports_the_players_before_anything_starts(left: Left, typed: 
 def test_json_is_one_object_whatever_is_refused(
     arguments: tuple[str | Path, ...], code: int, typed: Typed, run: Run
 ) -> None:
-    done = typed("foosim-supervisor", main)(*arguments, "--json")
+    done = typed()(*arguments, "--json")
     (line,) = done.out.splitlines()
     content = msgspec.json.decode(line)
     assert done.code == code and content.keys() == run.result.keys() - OF_THE_TABLE
@@ -240,7 +239,7 @@ def test_json_is_one_object_also_of_a_run_that_was_killed(
         raise Killed("killed", self.unended("killed by a second Ctrl-C"))
 
     monkeypatch.setattr(Up, "run", kill)
-    done = typed("foosim-supervisor", main)("up", TABLE, "--no-capture", "--json")
+    done = typed()("up", TABLE, "--no-capture", "--json")
     (line,) = done.out.splitlines()
     content = msgspec.json.decode(line)
     assert content.keys() == run.result.keys() - OF_THE_TABLE and done.err.endswith("killed\n")
@@ -284,10 +283,10 @@ def test_a_signal_while_up_imports_leaves_a_result(
 ) -> None:
     before = signal.getsignal(number)
     monkeypatch.setattr(console_child, "page_of", lambda *options: signal.raise_signal(number))
-    done = typed("foosim-supervisor", main)("up", TABLE, "--no-capture", "--json")
+    done = typed()("up", TABLE, "--no-capture", "--json")
     (line,) = done.out.splitlines()
     content = msgspec.json.decode(line)
-    assert content["reason"] == f"{number.name} ended foosim-supervisor up before the run began"
+    assert content["reason"] == f"{number.name} ended foosim up before the run began"
     assert (done.code, done.err, content["failed"]) == (FAILED, f"{content['reason']}\n", True)
     assert signal.getsignal(number) is before
 
@@ -301,8 +300,8 @@ class Signals:
             signal.raise_signal(signal.SIGTERM)
 
 sys.meta_path.insert(0, Signals())
-from foosim.cli import foosim_supervisor
-foosim_supervisor()
+from foosim.cli import main
+main()
 """
 
 
@@ -311,7 +310,7 @@ def test_a_signal_while_the_command_itself_is_imported_leaves_a_result(module: s
     words = "up", str(TABLE), "--no-capture", "--json", "--run", module
     done = subprocess.run([sys.executable, "-c", AMID_AN_IMPORT, *words], capture_output=True, text=True, check=False)
     content = msgspec.json.decode(done.stdout.splitlines()[-1])
-    reason = "SIGTERM ended foosim-supervisor up before the run began"
+    reason = "SIGTERM ended foosim up before the run began"
     assert (done.returncode, done.stderr, content["reason"], content["run"]) == (FAILED, f"{reason}\n", reason, module)
 
 

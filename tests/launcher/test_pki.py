@@ -166,7 +166,7 @@ def _no_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (_expired, r"node\.red\.pem: expired on .* UTC; foosim-pki init .* FILE"),
+        (_expired, r"node\.red\.pem: expired on .* UTC; foosim pki init .* FILE"),
         (_early, r"ca\.pem: valid from .* mind the clock"),
         (_root_expired, r"ca\.pem: expired on"),
         (_others_key, r"node\.red\.key: the key does not belong to the certificate node\.red\.pem"),
@@ -177,7 +177,7 @@ def _no_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (_garbage_key, r"node\.red\.key: not a private key in PEM"),
         (_no_key, r"node\.red\.key: cannot be read, No such file"),
         (_nothing, r"has no certificate of node\.red; it has: node\.blue"),
-        (_no_root, r"has no ca\.pem; foosim-pki init"),
+        (_no_root, r"has no ca\.pem; foosim pki init"),
     ],
 )
 def test_what_would_be_refused_is_refused_before_anything_is_opened(
@@ -291,7 +291,7 @@ def test_only_identities_get_certificates_and_only_clients_passwords(folder: Pat
     (folder / "client.hand.password").write_text("a b\n")
     with pytest.raises(CertificateError, match="a password is printable ASCII"):
         load_credentials(folder, "client.hand")
-    with pytest.raises(CertificateError, match=r"has no ca.pem; foosim-pki init .* FILE makes one"):
+    with pytest.raises(CertificateError, match=r"has no ca.pem; foosim pki init .* FILE makes one"):
         pki.issue(folder.parent / "nowhere", ["node.red"])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from foosim.cli import supervisor
+from foosim.cli import main
 from foosim.common import wall_clock
 from foosim.common.addresses import Address, Insecure
 from foosim.common.errors import BadValue, Refused
@@ -67,7 +67,7 @@ def test_the_supervisors_process_makes_the_same_plan(
     options: RunOptions, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    monkeypatch.setattr(sys, "argv", ["foosim-supervisor", "run", *options.arguments(), "--run", "mine"])
+    monkeypatch.setattr(sys, "argv", ["foosim", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
 
     def serve(settings: RunSettings, address: Address, pki: Path | None, folder: RunFolder, *others: Any) -> int:
@@ -76,7 +76,7 @@ def test_the_supervisors_process_makes_the_same_plan(
 
     monkeypatch.setattr(supervisor_main, "serve", serve)
     with pytest.raises(SystemExit) as ended:
-        supervisor.main()
+        main()
     assert ended.value.code == 0
     settings, address, pki, name = served
     plan = make_plan(options)

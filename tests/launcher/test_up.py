@@ -56,7 +56,7 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
 
     assert [ends() for _ in range(7)] == [2, 3, 4, 5, 6, 6, 6]
     assert said.getvalue().endswith(
-        f"red ended with exit code 1, is given up; foosim-supervisor start red tries it again; its log is "
+        f"red ended with exit code 1, is given up; foosim start red tries it again; its log is "
         f"{up.folder.log('red')}\n"
     )
     up._start_wanted({"red": 1, "blue": 1})
@@ -96,7 +96,7 @@ def test_what_follows_when_a_node_ends(
         up._launcher.children["red"].process.wait()
     assert (tmp_path / "node.log").read_text().count("started") == starts
     is_given_up = has_begun and ends == "exit 3"
-    assert ("is given up; foosim-supervisor start red tries it again" in said.getvalue()) == is_given_up
+    assert ("is given up; foosim start red tries it again" in said.getvalue()) == is_given_up
     up._launcher.close()
 
 
@@ -188,7 +188,7 @@ def test_the_command_that_is_printed_for_another_machine_has_no_path_of_this_one
     up._begin(up.plan.processes["blue"], RunInfo("run", "table", str(TABLE), 1, "", "tls/192.0.2.7:7400"))
     assert said.getvalue() == (
         "waiting for node blue; start it on its machine, DIR being the folder of its certificate there: "
-        "foosim-node --name blue --connect tls/192.0.2.7:7400 --pki DIR\n"
+        "foosim role node --name blue --connect tls/192.0.2.7:7400 --pki DIR\n"
     )
 
 
@@ -418,7 +418,7 @@ def test_a_capture_that_was_cut_off_is_named_with_the_command_that_completes_it(
     capture.write_bytes(b"\x89MCAP0\r\n")
     assert capture_lines(capture, {"recording": NOT_RECORDED}, journals) == [
         f"capture {capture} (unfinished)",
-        f"complete it with: foosim-replay recover {capture} --journals {journals}",
+        f"complete it with: foosim capture recover {capture} --journals {journals}",
     ]
     assert capture_lines(capture, None, journals) == [f"capture {capture} (unfinished)"], "the run can be resumed"
 

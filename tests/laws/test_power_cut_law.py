@@ -35,7 +35,7 @@ CAPTURE: Final = "/captures/a run.mcap"
 BAD: Final = Weather(1, MS, 2 * MS, loss=0.02, repeat=0.1)
 ENDS: Final = (
     r"vhub has lost the end of its journal: it ends at tick (\d+), {why}\. A new run begins with the last captured "
-    rf"frame: foosim-supervisor up table\.yaml --for 5s --from '{CAPTURE}@last'"
+    rf"frame: foosim up table\.yaml --for 5s --from '{CAPTURE}@last'"
 )
 KNOWN: Final = ENDS.format(why=r"deliveries are known up to tick (\d+)")
 UNKNOWN: Final = ENDS.format(why="its machine was lost meanwhile")

@@ -359,9 +359,9 @@ def test_a_run_without_such_a_form_has_none(world: World) -> None:
 
 
 COMMANDS: Final = {
-    "validate": "from foosim.cli.supervisor import main; main()",
-    "check-component": "from foosim.cli.supervisor import main; main()",
-    "rehearse": "from foosim.cli.rehearse import main; main()",
+    "validate": "from foosim.cli import main; main()",
+    "check-component": "from foosim.cli import main; main()",
+    "rehearse": "from foosim.cli import main; main()",
 }
 
 

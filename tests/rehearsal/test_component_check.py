@@ -343,7 +343,7 @@ def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path)
 
 # --- the command -----------------------------------------------------------------------------------------------------
 
-COMMAND: Final = "from foosim.cli.supervisor import main; main()"
+COMMAND: Final = "from foosim.cli import main; main()"
 
 
 def checking(*sets: str, ticks: int = 60) -> list[str]:

@@ -20,8 +20,8 @@ from typer.testing import CliRunner
 
 from foosim.capture.reader import open_capture
 from foosim.cli import rehearse as rehearse_command
+from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app
-from foosim.cli.replay import app as replay_app
 from foosim.client.player import Commands, Samples
 from foosim.common.errors import Refused
 from foosim.common.units import Pace

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch
+from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app as rehearse_app
-from foosim.cli.replay import app as replay_app
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.resimulation import Replica

@@ -135,7 +135,7 @@ def test_a_finished_capture_with_a_damaged_chunk_says_what_is_damaged_and_what_i
         assert told is not None and 0 < int(told[3]) == int(told[2]) - int(told[1]) - 1 < 60
     content = msgspec.json.decode(replay("recover", bad, "--json").out)
     assert content["finished_before"] and not content["whole"] and content["broken"][0]["byte"] == places[0]
-    words = shlex.split(lines[-1].partition("foosim-replay ")[2])
+    words = shlex.split(lines[-1].partition("foosim capture ")[2])
     assert replay(*words[:-1], part).code == 0
     cut = open_capture(part)
     assert cut.ticks.tolist() == list(range(content["until_ns"] // 2_000_000 + 1)) and len(cut.ticks) > 30

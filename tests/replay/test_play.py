@@ -322,7 +322,7 @@ def test_the_program_in_the_docs_listens(run: Path, capsys: pytest.CaptureFixtur
 
 # --- the command as a process ----------------------------------------------------------------------------------------
 
-COMMAND = str(Path(sysconfig.get_path("scripts")) / "foosim-replay")
+COMMAND = str(Path(sysconfig.get_path("scripts")) / "foosim capture")
 
 
 def test_without_a_terminal_it_says_plain_lines_and_ctrl_c_ends_it_in_order(run: Path) -> None:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from foosim.capture.reader import open_capture
-from foosim.cli.replay import app
+from foosim.cli.capture.command import app
 from foosim.common import limits
 from foosim.protocol.channels import SUPERVISOR
 from foosim.protocol.codec import decode, decode_any, encode

@@ -16,7 +16,7 @@ import pytest
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import PACKETS, EpochRow, OwnerRow, PacketRow
-from foosim.cli import replay_report
+from foosim.cli.capture import report as report_command
 from foosim.console.report.charts import drawings
 from foosim.console.report.collect import Band, BinReport, Mark, Report, _Gathered, bin_width_ns, gather
 from foosim.console.report.page import page
@@ -289,7 +289,7 @@ def test_the_command_writes_a_page_and_overwrites_none(radio_run: Path, tmp_path
 def test_a_page_that_the_disk_does_not_take_leaves_no_file(
     radio_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(replay_report, "page", lambda found: "x" * 100_000)
+    monkeypatch.setattr(report_command, "page", lambda found: "x" * 100_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))

@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.reader import CapturedTick, open_capture
 from foosim.capture.rows import OwnerRow
-from foosim.cli.options import BadCapture
+from foosim.cli.capture.command import app
+from foosim.cli.capture.options import BadCapture
 from foosim.cli.rehearse import app as rehearse_app
-from foosim.cli.replay import app
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from foosim.cli.replay_view import open_sources
+from foosim.cli.view import open_sources
 from foosim.client.replay_listener import Replay, hear_replay
 from foosim.common.errors import BadValue, Refused
 from foosim.console.recorded.capture_source import FileSource

@@ -14,8 +14,8 @@ from foosim.runtime import process
 from foosim.runtime.process import new_boot, start_log
 
 LIMIT_S = 900.0
-NODE = "from foosim.node.main import main; main()"
-PLAYER = "from foosim.client.main import main; main()"
+ROLE = "import sys; sys.argv[1:1] = ['role', '{}']; from foosim.cli import main; main()"
+NODE, PLAYER = ROLE.format("node"), ROLE.format("player")
 ASLEEP = """
 import threading, time
 from foosim.runtime.process import Stop
@@ -126,12 +126,12 @@ from foosim.vhub import main as vhub
 print([name for name in ("ssl", "cryptography", "foosim.capture.reader") if name in sys.modules])
 from foosim.deployment.schema import Deployment
 from foosim.world.parameters.table import Table
-from foosim.cli import supervisor as up
+from foosim.cli import control, up, verbs
 print([name for name in ("ssl", "cryptography") if name in sys.modules])
 print([model.__name__ for model in (Deployment, Table) if model.__pydantic_complete__])
 atexit.register(lambda: print(gc.get_freeze_count() > len(gc.get_objects())))
-sys.argv = ["foosim-node", "--version"]
-node.main()
+sys.argv = ["foosim", "--version"]
+verbs.main()
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     *nothing, version, is_left_out = done.stdout.splitlines()

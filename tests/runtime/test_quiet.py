@@ -56,8 +56,8 @@ def test_pybullet_is_imported_without_a_word() -> None:
 
 
 def test_a_rehearsal_prints_nothing_but_its_progress_and_result() -> None:
-    arguments = [str(TABLE), "--for", "20ms", "--engine", "bullet", "--json"]
-    program = f"import sys; sys.argv[1:] = {arguments}; from foosim.cli.rehearse import main; main()"
+    arguments = ["rehearse", str(TABLE), "--for", "20ms", "--engine", "bullet", "--json"]
+    program = f"import sys; sys.argv[1:] = {arguments}; from foosim.cli import main; main()"
     code, out, err = run(program)
     assert code == 0 and all(" of 0.02 s simulated, " in line for line in err.splitlines()), (
         "progress, on a slow machine"

@@ -99,7 +99,7 @@ def test_the_newest_live_run_is_meant_when_none_is_named() -> None:
 
 
 def test_without_a_live_run_it_says_how_to_start_one() -> None:
-    with pytest.raises(NoRun, match="no run is live; foosim-supervisor up FILE starts one") as caught:
+    with pytest.raises(NoRun, match="no run is live; foosim up FILE starts one") as caught:
         find_run()
     assert caught.value.exit_code == 1
 

@@ -236,7 +236,7 @@ def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:
     run.go()
     assert run.digests == undisturbed().digests and run.system.supervisor.state.members == ("n1",)
     node = run.system.processes["n2"].core
-    assert node.member.refusal == "n2 is stopped; `foosim-supervisor start n2` lets it take part again"
+    assert node.member.refusal == "n2 is stopped; `foosim start n2` lets it take part again"
 
 
 def test_what_cannot_be_stopped_or_started() -> None:

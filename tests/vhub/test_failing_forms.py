@@ -151,7 +151,7 @@ def test_a_body_that_fails_in_the_vhubs_process_ends_the_run_at_once(tmp_path: P
     """Of the capture, which draws it, where there are no radios."""
     (tmp_path / "hub_forms.py").write_text(f"{FORMS}\nacts.update({acts})\n")
     (tmp_path / "posts.yaml").write_text(YARD.partition("network:")[0])
-    command = [sys.executable, "-P", "-c", "from foosim.cli.supervisor import main; main()"]
+    command = [sys.executable, "-P", "-c", "from foosim.cli import main; main()"]
     done = subprocess.run(
         [*command, "up", "posts.yaml", "--for", "2s", "--capture", "run.mcap"],
         cwd=tmp_path,

@@ -249,7 +249,7 @@ def test_lines_are_for_people() -> None:
         "29.81 Mbit/s, 10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
     )
     lines = start_lines([wifi] * 40, "some.yaml")
-    assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim-net lint some.yaml"
+    assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim net lint some.yaml"
     assert start_lines([wifi], "some.yaml") == [f"network {summary_line(wifi)}"]
 
 

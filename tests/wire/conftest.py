@@ -98,7 +98,7 @@ class House:
         bare = () if players else ("--set", "players={}")
         apart = ("--processes", "each") if each else ()
         return self.start(
-            "foosim-supervisor", "up", self.table, "--set", LONG, "--pace", SLOW, *bare, *apart, *arguments
+            "foosim", "up", self.table, "--set", LONG, "--pace", SLOW, *bare, *apart, *arguments
         )
 
     def run(self, name: str, *arguments: str | Path) -> tuple[int, str, str]:
@@ -174,11 +174,11 @@ class House:
         if process == "supervisor":
             return info.pid
         addresses = [f"--connect {address}" for address in (info.simulation, f"run:{info.run}", info.radio)]
-        shared = processes_with(f"foosim-process {process} ")
+        shared = processes_with(f"foosim role roles {process} ")
         for pid, line in shared.items():
             if any(f"{mark} " in line for mark in (f"--run {info.run}", *addresses[:2])):
                 return pid
-        marks = {"vhub": "foosim-vhub"}
+        marks = {"vhub": "foosim role vhub"}
         mark = marks.get(process, f"--name {process}")
         (pid,) = [
             pid for address in addresses for pid, line in processes_with(address).items() if f"{mark} " in f"{line} "

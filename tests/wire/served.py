@@ -1,4 +1,4 @@
-"""Sources served to browsers from this process, as `foosim-replay view` serves them."""
+"""Sources served to browsers from this process, as `foosim view` serves them."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from foosim.cli.replay_view import open_sources
+from foosim.cli.view import open_sources
 from foosim.rehearsal.run import rehearse
 from tests.replay.conftest import TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
@@ -244,7 +244,7 @@ def end_the_run(page: Page) -> str:
     banner = page.text("#banner")
     page.until(f"!{STAT}.connected")
     assert page.text("#banner") == banner
-    assert "The run has ended at tick" in banner and "foosim-replay view" in banner
+    assert "The run has ended at tick" in banner and "foosim view" in banner
     state(page, "ended")
     page.until("['play', 'step', 'pace', 'down'].every((id) => document.getElementById(id).disabled)")
     return banner

@@ -125,16 +125,16 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     assert house.read_until(up.stderr, "console: ").strip() == addresses["text"]
     assert addresses["operate"] not in (house.live().logs / "console.log").read_text()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("foosim.console.main.serve_sources", lambda make, options: None)
-        code, out, err = house.ask("foosim-console", "--second", "walk.csv")
+        patch.setattr("foosim.cli.view.serve_sources", lambda make, options: None)
+        code, out, err = house.ask("foosim", "view", "--second", "walk.csv")
     assert (code, out, err) == (0, "", "second: walk.csv, compared by ball\n"), "the first line is the address"
     asyncio.run(look(addresses, house.kill))
     ((console, _),) = house.processes_with(f"--announce {path}").items()
     os.kill(console, signal.SIGKILL)
-    assert f"foosim-console {house.live().name}" in house.read_until(up.stderr, "console was killed by SIGKILL")
+    assert f"foosim view {house.live().name}" in house.read_until(up.stderr, "console was killed by SIGKILL")
     tick = house.ticking()["ticks"]
     house.ticking(tick + 20)
-    house.ask("foosim-supervisor", "down")
+    house.ask("foosim", "down")
     code, out, err = house.end(up)
     assert code == 0, err
     assert [entry["what"] for entry in last_json(out)["recoveries"]] == ["supervisor"]

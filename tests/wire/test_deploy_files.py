@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 TICKS: Final = 100
 NAMES: Final = {"node-0": "red", "node-1": "blue", "supervisor": "table"}
 """What pods are called where the other files say otherwise: nodes, and the run, which is named as its pod."""
-FIRST: Final = ("foosim-player", "foosim-node", "foosim-vhub", "foosim-supervisor")
+FIRST: Final = ("foosim", "role", "player", "foosim", "role", "node", "foosim", "role", "vhub", "foosim")
 
 
 def moved(words: tuple[str, ...], places: dict[str, str]) -> list[str]:

@@ -21,7 +21,7 @@ def test_players_that_share_a_process_are_what_they_would_be_alone(
     text = fleet_text(3, LONG, "players.pilot03.process=other")
     file = tmp_path / "hall.yaml"
     file.write_text(text)
-    code, out, err = house.run("foosim-supervisor", "up", file, "--pace", "fast", "--for", "2s", "--json")
+    code, out, err = house.run("foosim", "up", file, "--pace", "fast", "--for", "2s", "--json")
     assert code == 0, err
     content = json.loads(out.splitlines()[-1])
     assert content["reason"] == "done" and content["ticks"] == 100 and "score" not in content

@@ -51,7 +51,7 @@ def deployed(path: Path, hosts: dict[str, Any]) -> Path:
 
 def examined(house: House, *arguments: str | Path) -> tuple[int, dict[tuple[str, str, str], dict[str, str]]]:
     """Exit code and findings of the doctor, by host, check and subject."""
-    code, out, err = house.ask("foosim-doctor", *arguments, "--json")
+    code, out, err = house.ask("foosim", "doctor", *arguments, "--json")
     assert code in (0, 1), err
     content = json.loads(out)
     assert content["well"] == (code == 0)
@@ -68,10 +68,10 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     assert [finding["subject"] for finding in gone] == ["127.0.0.1"] and code == 1
     assert "cannot be reached" in gone[0]["text"] and gone[0]["remedy"].startswith("make `ssh -F ")
     root = found["there", "certificates", "ca.pem"]
-    assert root["state"] == "problem" and root["remedy"] == "foosim-pki init DIR FILE --send"
+    assert root["state"] == "problem" and root["remedy"] == "foosim pki init DIR FILE --send"
 
     deployed(file, {"there": host})
-    code, out, err = house.ask("foosim-pki", "init", folder, file, "--send")
+    code, out, err = house.ask("foosim", "pki", "init", folder, file, "--send")
     brought = sorted(line for line in out.split() if line.startswith(f"{there}/"))
     assert code == 0 and brought == [f"{there}/{name}" for name in OWN], err
     assert sorted(path.name for path in there.iterdir()) == list(OWN), "and nothing of others"
@@ -90,7 +90,7 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     digests = []
     for shape in ("each", "one"):
         run = [*asked, "--for", "20 ms", "--json", "--processes", shape]
-        code, out, err = house.end(house.start("foosim-supervisor", "up", *run))
+        code, out, err = house.end(house.start("foosim", "up", *run))
         assert code == 0, err
         content = last_json(out)
         assert capture_info(Path(house.folder / content["capture"])).finished, "home from the vHub's host"
@@ -110,7 +110,7 @@ def test_why_a_host_does_not_answer_is_said(other: There, monkeypatch: pytest.Mo
     silent = other.remote("-o", "ProxyCommand=sleep 1000", "-o", "ConnectTimeout=1000")
     assert why_silent(silent, 0.5) == ("no answer within 0.5 s", f"make `{silent.typed}` work")
     text, remedy = why_silent(other.remote(commands="/nowhere"))
-    assert "there is no /nowhere/foosim-guard on host there" in text and remedy.startswith("install foosim ")
+    assert "there is no /nowhere/foosim guard on host there" in text and remedy.startswith("install foosim ")
     text, remedy = why_silent(other.remote())
     assert text == "ended with exit code 2 on host there: :1:1: no YAML document, ''", "it was asked nonsense"
     monkeypatch.setattr(doctor_remote, "version", lambda name: "99.0")

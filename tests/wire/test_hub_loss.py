@@ -166,9 +166,9 @@ def test_a_vhub_that_is_killed_when_it_has_created_its_capture_goes_on_with_it(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = ["--set", "players={}", "--set", "engine=pure", "--for", "20 ms", "--pace", "fast", "--set", LONG]
-    supervisor = house.start("foosim-supervisor", "run", house.table, *run)
+    supervisor = house.start("foosim", "run", house.table, *run)
     connect = ["--connect", house.wait_for("the run file", house.live().info).simulation]
-    hub = ["foosim-vhub", *connect, "--capture", "run.mcap", "--run-folder", str(house.folder / "hub")]
+    hub = ["foosim", "role", "vhub", *connect, "--capture", "run.mcap", "--run-folder", str(house.folder / "hub")]
     (house.folder / "sitecustomize.py").write_text(TRAP)
     with monkeypatch.context() as trapped:
         trapped.setenv("PYTHONPATH", str(house.folder))
@@ -176,7 +176,7 @@ def test_a_vhub_that_is_killed_when_it_has_created_its_capture_goes_on_with_it(
     capture = house.folder / "run.mcap"
     assert code == -signal.SIGKILL and capture.exists(), err
     again = house.start(*hub)
-    nodes = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
+    nodes = [house.start("foosim", "role", "node", "--name", name, *connect) for name in ("red", "blue")]
     for process in (supervisor, again, *nodes):
         code, _, err = house.end(process)
         assert code == 0, err

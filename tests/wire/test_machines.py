@@ -72,7 +72,7 @@ class Cluster:
 
     def up(self, *arguments: str) -> subprocess.Popen[str]:
         """Start a run on the supervisor's machine."""
-        command = [command_path("foosim-supervisor"), "up", str(self.house.table), "--insecure", "--json", *arguments]
+        command = [command_path("foosim"), "up", str(self.house.table), "--insecure", "--json", *arguments]
         process = subprocess.Popen(
             self.sup.inside(*command),
             cwd=self.house.folder,
@@ -135,7 +135,8 @@ def test_machines_that_are_cut_off_come_back_to_the_same_world(cluster: Cluster)
     status = cluster.ask("status")
     hosts = {name: process["host"] for name, process in status["processes"].items()}
     assert hosts == {"red": "right", "blue": "left", "vhub": "hub", "supervisor": ""}
-    for machine, mark in ((cluster.right, "--name red"), (cluster.left, "--name blue"), (cluster.hub, "foosim-vhub")):
+    marks = (cluster.right, "--name red"), (cluster.left, "--name blue"), (cluster.hub, "foosim role vhub")
+    for machine, mark in marks:
         assert any(mark in line for line in machine.processes().values()), "it runs where it is said to"
     sup, left, right = cluster.sup, cluster.left, cluster.right
     left.limit("4mbit")
@@ -172,7 +173,8 @@ def test_each_way_of_being_cut_off(cluster: Cluster) -> None:
         return each
 
     cluster.disturb(both(Machine.deafen), both(Machine.heal), "red", times=2)
-    (hub,) = (pid for pid, line in cluster.hub.processes().items() if "foosim-vhub" in line and "guard" not in line)
+    lines = cluster.hub.processes().items()
+    (hub,) = (pid for pid, line in lines if "foosim role vhub" in line and "guard" not in line)
     os.kill(hub, signal.SIGKILL)
     cluster.told("vhub", "vhub")
     for machine in cluster.machines.by_name.values():

@@ -75,7 +75,7 @@ def killed(house: House, process: str, *arguments: str) -> dict[str, Any]:
     ticks = house.ticking(5)["ticks"]
     house.kill(process)
     house.ticking(ticks + 50)
-    assert house.ask("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0, err
     assert f"{process} was killed by SIGKILL, not by foosim, " in err
@@ -103,9 +103,9 @@ def test_a_process_with_all_roles_that_is_killed_goes_on_with_players_of_new_mem
 def test_a_node_that_shares_its_process_cannot_be_stopped_alone(house: House) -> None:
     up = house.up(*shape(("supervisor", "vhub", "nodes.red")))
     house.ticking(5)
-    code, _, err = house.ask("foosim-supervisor", "stop", "red")
+    code, _, err = house.ask("foosim", "stop", "red")
     assert code == 3 and "red shares process main with supervisor, vhub: it cannot be stopped alone" in err
-    assert house.ask("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim", "down")[0] == 0
     assert house.end(up)[0] == 0
 
 
@@ -163,9 +163,9 @@ def test_a_run_of_one_process_whose_launcher_died_is_resumed(house: House) -> No
     up.kill()
     house.end(up)
     house.wait_for("the process to die with it", lambda: not house.processes_with(f"--run {name} "))
-    resumed = house.start("foosim-supervisor", "up", "--resume", name, "--json")
+    resumed = house.start("foosim", "up", "--resume", name, "--json")
     house.ticking(20)
-    assert house.ask("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim", "down")[0] == 0
     code, out, err = house.end(resumed)
     assert code == 0, err
     content = last_json(out)

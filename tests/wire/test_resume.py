@@ -49,12 +49,12 @@ def flip(folder: Path, stem: str) -> None:
 
 def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     options = ("--run", "far", "--capture", "far.mcap")
-    code, out, err = house.run("foosim-supervisor", "up", house.table, *BARE, *options, "--detach")
+    code, out, err = house.run("foosim", "up", house.table, *BARE, *options, "--detach")
     assert (code, err) == (0, "") and "run far is up" in out
-    code, _, err = house.ask("foosim-supervisor", "up", "--resume", "far")
+    code, _, err = house.ask("foosim", "up", "--resume", "far")
     assert code == 3 and "run far is alive" in err
     before = house.ticking(100)["ticks"]
-    (launcher,) = [pid for pid, line in house.processes_with("--run far").items() if "foosim-supervisor up" in line]
+    (launcher,) = [pid for pid, line in house.processes_with("--run far").items() if "foosim up" in line]
     os.kill(launcher, signal.SIGKILL)
     folder = open_run("far")
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
@@ -67,17 +67,17 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     flip(folder.journals, channels.VHUB)
     (journal,) = journal_files(folder.journals, channels.VHUB)
     journal.rename(journal.with_suffix(".away"))
-    code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
+    code, out, err = house.ask("foosim", "up", "--resume", "far", "--json")
     why = f"run far cannot be resumed: the vHub's journal is gone from {folder.journals}. A new run begins with the "
-    why += f"last captured frame: foosim-supervisor up {house.table} "
+    why += f"last captured frame: foosim up {house.table} "
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
     assert last_json(out)["capture"] == str(house.folder / "far.mcap")
     journal.with_suffix(".away").rename(journal)
     _ends_where_inputs_are_lost(house, folder)
     tear(folder.journals, channels.SUPERVISOR, 9)
-    up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
+    up = house.start("foosim", "up", "--resume", "far", "--json")
     house.ticking(before + 100)
-    assert house.ask("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
@@ -88,7 +88,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert open_capture(house.folder / "far.mcap").about.finished
     verified = verify_capture(house.folder / "far.mcap")
     assert verified.ticks == content["ticks"]
-    code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
+    code, out, err = house.ask("foosim", "up", "--resume", "far", "--json")
     assert (code, last_json(out)) == (0, content) and "run far has ended: stopped" in err
 
 
@@ -96,7 +96,7 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     """Resume a run whose vHub lacks the end of its journal: it stays on the disk, and the capture begins a new one."""
     shutil.copytree(folder.journals, house.folder / "whole")
     tear(folder.journals, channels.VHUB, 60)
-    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    code, out, err = house.run("foosim", "up", "--resume", "far", "--json")
     assert code == 1 and folder.result() is None and "resumes it" not in err
     told = re.fullmatch(
         r".*: vhub has lost the end of its journal: it ends at tick (\d+), deliveries are known up to tick (\d+)\. "
@@ -105,7 +105,7 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     )
     assert told is not None, err
     words = shlex.split(told[3])
-    assert words[:3] == ["foosim-supervisor", "up", str(house.table)]
+    assert words[:3] == ["foosim", "up", str(house.table)]
     assert words[-2:] == ["--from", f"{house.folder / 'far.mcap'}@last"]
     begun = make_plan(RunOptions(Path(words[2]), sets=tuple(BARE[1::2]), branch=words[-1])).start
     captured = open_capture(house.folder / "far.mcap")
@@ -119,5 +119,5 @@ def test_a_run_that_does_not_come_up_says_why(house: House, monkeypatch: pytest.
     (house.folder / "sitecustomize.py").write_text(NO_HUB)
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
     alone = ("--processes", "each", "--detach", "--run", "lame")
-    code, _, err = house.run("foosim-supervisor", "up", house.table, *BARE, *alone)
+    code, _, err = house.run("foosim", "up", house.table, *BARE, *alone)
     assert code == 1 and "run lame has ended with exit code" in err and "no licence here" in err

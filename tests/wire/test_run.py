@@ -57,8 +57,8 @@ def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(hous
     assert info.radio.endswith(f":{port + 1}")
     before = house.ticking(5)["ticks"]
     lines = house.processes_with(f"--connect run:{info.run}")
-    assert any("foosim-node --name red --connect" in line for line in lines.values()), lines
-    assert any("foosim-vhub --connect" in line for line in lines.values()), lines
+    assert any("foosim role node --name red --connect" in line for line in lines.values()), lines
+    assert any("foosim role vhub --connect" in line for line in lines.values()), lines
     pids = [info.pid, *lines]
     assert all(os.getpgid(pid) == pid for pid in pids)
     logs = {path.name for path in house.live().logs.iterdir()}
@@ -75,8 +75,8 @@ def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(hous
 def assert_wrong_names_are_refused_with_the_nearest_one(house: House) -> None:
     robots = ", ".join(sorted(["camera", *(f"{team}.{line}" for team in TEAMS for line in LINE_NAMES)]))
     refused = (3, "", f"no robot 'red.gaol'; there are {robots}, nearest is red.goal\n")
-    assert house.ask("foosim-supervisor", "move", "red.gaol", "blue") == refused
-    code, _, err = house.ask("foosim-supervisor", "status", "--run", "tabel")
+    assert house.ask("foosim", "move", "red.gaol", "blue") == refused
+    code, _, err = house.ask("foosim", "status", "--run", "tabel")
     assert code == 1 and "no run 'tabel'" in err
     with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
         control.move("red.goal", "green")
@@ -100,7 +100,7 @@ def assert_a_viewer_sees_and_cannot_touch() -> None:
 
 def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None:
     def node(name: str, *arguments: str) -> tuple[int, str]:
-        code, _, err = house.run("foosim-node", "--name", name, "--connect", address, *arguments)
+        code, _, err = house.run("foosim", "role", "node", "--name", name, "--connect", address, *arguments)
         return code, err
 
     code, err = node("red")
@@ -198,7 +198,7 @@ import sys
 
 from foosim.players.football import Team
 
-if "foosim-player" in sys.argv[0]:
+if sys.argv[1:3] == ["role", "player"]:
     raise RuntimeError("no licence here")
 """
 
@@ -217,7 +217,7 @@ def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House, monk
 NO_HUB = """
 import os, sys
 
-if any("foosim-vhub" in word for word in sys.orig_argv):
+if "vhub" in sys.orig_argv:
     print("no licence here", file=sys.stderr, flush=True)
     os._exit(1)
 """
@@ -237,9 +237,9 @@ def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House, monk
 
 def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> None:
     (house.folder / "file").touch()
-    run = house.start("foosim-supervisor", "run", house.table, "--set", LONG, *NO_CAPTURE_TO_CLOSE, "--run", "mine")
+    run = house.start("foosim", "run", house.table, "--set", LONG, *NO_CAPTURE_TO_CLOSE, "--run", "mine")
     info = house.wait_for("the run file", house.live().info)
-    code, _, err = house.run("foosim-vhub", "--connect", info.simulation, "--capture", "file/run.mcap")
+    code, _, err = house.run("foosim", "role", "vhub", "--connect", info.simulation, "--capture", "file/run.mcap")
     assert code == 3 and "file/run.mcap: cannot be created" in err
     assert "; the run has not started, and waits" in house.read_until(run.stderr, f"lost the vHub: {CLOSED}")
     run.send_signal(signal.SIGTERM)
@@ -277,7 +277,7 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
     house.ticking(50)
     cut, healed = cut_and_healed(house)
     assert_top_shows_it(house)
-    code, out, _ = house.ask("foosim-supervisor", "pause", "--json")
+    code, out, _ = house.ask("foosim", "pause", "--json")
     paused = json.loads(out)
     assert (code, paused["text"]) == (0, f"paused at tick {paused['tick']}")
     tick = paused["tick"]
@@ -303,17 +303,17 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
 
 
 def cut_and_healed(house: House) -> tuple[int, int]:
-    """A partition by `foosim-net` and its heal: the ticks at which they take effect."""
-    code, out, err = house.ask("foosim-net", "partition", "player-red", "rest", "--json")
+    """A partition by `foosim net` and its heal: the ticks at which they take effect."""
+    code, out, err = house.ask("foosim", "net", "partition", "player-red", "rest", "--json")
     assert code == 0, err
     cut = json.loads(out)["tick"]
-    assert house.ask("foosim-net", "partition", "player-rde", "rest") == (
+    assert house.ask("foosim", "net", "partition", "player-rde", "rest") == (
         3,
         "",
         "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'\n",
     )
     house.ticking(cut + 20)
-    code, out, err = house.ask("foosim-net", "heal", "--json")
+    code, out, err = house.ask("foosim", "net", "heal", "--json")
     healed = json.loads(out)["tick"]
     assert (code, json.loads(out)["text"]) == (0, f"heal all, at tick {healed}")
     status = house.ticking(healed + 20)
@@ -322,7 +322,7 @@ def cut_and_healed(house: House) -> tuple[int, int]:
 
 
 def assert_top_shows_it(house: House) -> None:
-    top = house.start("foosim-net", "top")
+    top = house.start("foosim", "net", "top")
     first = house.read_until(top.stdout, "· tick ")
     line = house.read_until(top.stdout, "camera to player-red")
     assert "links" in first and "partition" in line and "/s, offered" in line
@@ -338,7 +338,7 @@ def assert_packets_were_cut(house: House, cut: int, healed: int) -> None:
     ticks = {row.sent_ns // capture.deployment.tick_ns for row in lost}
     assert ticks and min(ticks) >= cut and max(ticks) < healed
     one = next(row for row in lost if row.source == "camera")
-    code, out, err = house.ask("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
+    code, out, err = house.ask("foosim", "net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
     assert code == 0, err
     assert "policy        at sending cut by request 0, from " in out and ": partition\n" in out
     assert out.endswith("dropped at sending: partition (policy)\n")
@@ -391,9 +391,9 @@ def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -
 
 def altered_node(house: House, change: str, name: str, address: str) -> tuple[int, str]:
     """A node of which something was changed before it starts; return its exit code and errors."""
-    program = f"{change}; from foosim.node.main import main; main()"
+    program = f"{change}; from foosim.cli import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", program, "--name", name, "--connect", address],
+        [sys.executable, "-c", program, "role", "node", "--name", name, "--connect", address],
         cwd=house.folder,
         capture_output=True,
         text=True,
@@ -408,7 +408,7 @@ def test_a_run_waits_for_what_is_started_by_hand_and_ends_in_order_when_a_requir
     up = house.up("--json", *(f"--set={one}" for one in (*by_hand, "nodes.red.required=true")), players=True)
     line = house.read_until(up.stderr, "waiting for node blue; start it on its machine: ")
     command = line.split(": ", 1)[1].split()
-    assert command[:4] == ["foosim-node", "--name", "blue", "--connect"]
+    assert command[:6] == ["foosim", "role", "node", "--name", "blue", "--connect"]
     line = house.read_until(up.stderr, "waiting for player player-blue; start it in a terminal of its own: ")
     player = house.start(*line.split(": ", 1)[1].split())
     house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")

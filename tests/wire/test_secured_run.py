@@ -41,11 +41,12 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
         client.subscribe("camera", "ball")
         client.listen()
         assert client.receive(LIMIT_S)
-    code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation, "--pki", stranger)
+    node = ("foosim", "role", "node", "--connect", info.simulation)
+    code, _, error = house.run(*node, "--name", "red", "--pki", stranger)
     assert code == 3 and "its certificate is not accepted here" in error
-    code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation)
+    code, _, error = house.run(*node, "--name", "red")
     assert code == 2 and "needs certificates: give their folder by --pki DIR" in error
-    code, _, error = house.ask("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
+    code, _, error = house.ask(*node, "--name", "green", "--pki", folder)
     assert code == 3 and "has no certificate of node.green; it has: client.hand, node.blue" in error
     control.down()
     code, output, _ = house.end(running)
@@ -98,14 +99,14 @@ def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: H
 
 
 def assert_it_is_stopped_and_started_from_another_terminal(house: House, desk: Control) -> None:
-    code, out, err = house.ask("foosim-supervisor", "stop", "red")
+    code, out, err = house.ask("foosim", "stop", "red")
     assert (code, err) == (0, "") and out.startswith("red stopped at tick "), err
     red = f"--name red --connect run:{house.info().run}"  # and no other run's on this machine
     house.wait_for("red to be gone", lambda: not house.processes_with(red))
     status = desk.status()
     assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
-    code, _, err = house.ask("foosim-supervisor", "start", "red")
+    code, _, err = house.ask("foosim", "start", "red")
     assert code == 0, err
     house.wait_for("red to come back", lambda: went_on(desk, "join red", times=3))
     assert desk.status()["nodes"]["red"]["owned"] != []
-    assert house.ask("foosim-supervisor", "stop", "rde")[0] == 3
+    assert house.ask("foosim", "stop", "rde")[0] == 3

@@ -77,15 +77,15 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
     """Without a launcher nobody starts the supervisor again. The run has not ended: the vHub leaves its capture as a
     kill would. It can be recovered, and the run goes on with it as soon as all are started again."""
     run = ["--set", "players={}", "--set", "engine=pure", "--set", LONG, "--set", "deadlines.orphan=1 s"]
-    supervisor = house.start("foosim-supervisor", "run", house.table, *run)
+    supervisor = house.start("foosim", "run", house.table, *run)
     info = house.wait_for("the run file", house.live().info)
     connect = ["--connect", info.simulation]
     capture = house.folder / "alone.mcap"
     hub = ("--capture", capture, "--run-folder", house.folder / "hub")
 
     def start_others(*connect: str) -> list[subprocess.Popen[str]]:
-        nodes = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
-        return [*nodes, house.start("foosim-vhub", *connect, *hub)]
+        nodes = [house.start("foosim", "role", "node", "--name", name, *connect) for name in ("red", "blue")]
+        return [*nodes, house.start("foosim", "role", "vhub", *connect, *hub)]
 
     others = start_others(*connect)
     house.ticking(5)
@@ -99,13 +99,13 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
     recovered = recover_capture(copy, house.folder / "hub" / "journals")
     assert recovered is not None and recovered.is_whole and recovered.tick >= 5, "its journal is there, and fits"
     other_file = [*run[:-1], "deadlines.orphan=2 s", "--run", info.run]
-    again = house.start("foosim-supervisor", "run", house.table, *other_file)
+    again = house.start("foosim", "run", house.table, *other_file)
     code, _, err = house.end(again)
     assert code == 3 and f"run {info.run} was started with another deployment" in err
-    again = house.start("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    again = house.start("foosim", "run", house.table, *run, "--run", info.run)
     others = start_others("--connect", house.wait_for("the run file", house.live().info).simulation)
     house.ticking(recovered.tick + 50)
-    assert house.ask("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim", "down")[0] == 0
     for process in (again, *others):
         code, _, err = house.end(process)
         assert code == 0, err
@@ -119,14 +119,14 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
 
 def test_a_supervisor_that_is_started_again_by_hand_goes_on(house: House) -> None:
     run = ["--set", "players={}", "--set", "engine=pure", "--set", LONG, "--for", "2 s", "--pace", "fast"]
-    first = house.start("foosim-supervisor", "run", house.table, *run)
+    first = house.start("foosim", "run", house.table, *run)
     info = house.wait_for("the run file", house.live().info)
     connect = ["--connect", info.simulation]
-    others = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
-    others.append(house.start("foosim-vhub", *connect, "--no-capture", "--run-folder", house.folder / "hub"))
+    others = [house.start("foosim", "role", "node", "--name", name, *connect) for name in ("red", "blue")]
+    others.append(house.start("foosim", "role", "vhub", *connect, "--no-capture", "--run-folder", house.folder / "hub"))
     house.ticking(5)
     first.kill()
-    again = house.start("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    again = house.start("foosim", "run", house.table, *run, "--run", info.run)
     code, _, err = house.end(again)
     assert code == 0, err
     for other in others:
@@ -135,5 +135,5 @@ def test_a_supervisor_that_is_started_again_by_hand_goes_on(house: House) -> Non
     assert result is not None and result["ticks"] == 1000
     same = rehearse(house.table.read_text(), "table.yaml", 1000, None, ["players={}", "engine=pure"]).json
     assert result["digest"] == same["digest"]
-    code, _, err = house.run("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    code, _, err = house.run("foosim", "run", house.table, *run, "--run", info.run)
     assert code == 3 and f"run {info.run} has ended" in err

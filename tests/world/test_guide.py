@@ -20,8 +20,8 @@ from yaml import safe_load
 
 ROOT: Final = Path(__file__).parents[2]
 GUIDE: Final = ROOT / "docs" / "how-to" / "extending.md"
-REHEARSE: Final = "from foosim.cli.rehearse import main; main()"
-SUPERVISOR: Final = "from foosim.cli.supervisor import main; main()"
+REHEARSE: Final = "from foosim.cli import main; main()"
+SUPERVISOR: Final = "from foosim.cli import main; main()"
 PACKAGE: Final = "pyproject.toml"
 BASES: Final = ("omni.py", "omni_motion.py", "omni_drive.py", "yard.py", "rounds.py", "yard.yaml")
 

@@ -1,4 +1,4 @@
-"""The summary of a network as lines of text: for `foosim-net lint` without a terminal, and the start of a run.
+"""The summary of a network as lines of text: for `foosim net lint` without a terminal, and the start of a run.
 
 Pure: neighbours are `lint` (the figures), `supervisor.net_text` (tables), `main`, which logs them.
 """
@@ -83,5 +83,5 @@ def start_lines(summaries: Sequence[LinkSummary], file: str) -> list[str]:
         lines.sort(key=lambda line: not line.startswith("network warning: "))
         warned = sum(len(summary.warnings) for summary in summaries)
         kept = max(LINES_MAX - 1, warned)
-        return [*lines[:kept], f"and {len(lines) - kept} more: foosim-net lint {file}"]
+        return [*lines[:kept], f"and {len(lines) - kept} more: foosim net lint {file}"]
     return lines

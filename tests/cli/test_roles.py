@@ -1,10 +1,10 @@
-"""The command `foosim-process`: which options its roles need."""
+"""The command `foosim role roles`: which options its roles need."""
 
 from __future__ import annotations
 
 import pytest
 
-from foosim.cli import process
+from foosim.cli import roles
 from tests.conftest import Typed
 
 
@@ -30,6 +30,6 @@ from tests.conftest import Typed
 def test_a_process_without_what_its_roles_need_is_refused(
     typed: Typed, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], code: int, problem: str
 ) -> None:
-    monkeypatch.setattr(process, "end_with_stack", lambda: None)
-    done = typed("foosim-process", process.main)("main", *options)
+    monkeypatch.setattr(roles, "end_with_stack", lambda: None)
+    done = typed("role", "roles")("main", *options)
     assert done.code == code and problem in done.err

@@ -29,8 +29,7 @@ def reading() -> Iterator[None]:
         raise BadCapture(str(error)) from None
 
 
-Capture = Annotated[Path, typer.Argument(help="The capture, an MCAP file.", show_default=False)]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+Capture = Annotated[Path, typer.Argument(metavar="CAPTURE", help="The capture, an MCAP file.", show_default=False)]
 
 
 def time_of(option: str, text: str | None) -> int | None:

@@ -1,15 +1,19 @@
-"""The command `foosim-supervisor` without a run: help, what it refuses before anything starts, exit codes."""
+"""The command `foosim` without a run: help, completion, what it refuses before anything starts, exit codes."""
 
-import importlib
 import json
 import re
-import tomllib
+import sys
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
-from foosim.cli import supervisor
+from foosim.cli import main
+from foosim.cli.role import RoleVerbs
+from foosim.cli.verbs import Foosim, Verb
 from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Capture
@@ -17,39 +21,92 @@ from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher import plan
 from foosim.launcher.new_capture import check_capture, check_rooms
 from foosim.launcher.pki import certificates
-from foosim.node.main import main as run_node
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
+from foosim.runtime.help_text import summary_of
 from foosim.runtime.run_folder import runs_folder
 from tests.apart import apart
 from tests.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
-PROGRAMS: dict[str, str] = tomllib.loads((TABLE.parent.parent / "pyproject.toml").read_text())["project"]["scripts"]
-COMMANDS = (
-    *("up", "run", "status", "pause", "resume", "step", "rate", "add", "remove", "move", "push", "down", "validate"),
-)
 
 
 @pytest.fixture
 def command(typed: Typed) -> Command:
-    """Runs `foosim-supervisor`."""
-    return typed("foosim-supervisor", supervisor.main)
+    """Runs `foosim`."""
+    return typed()
 
 
-def test_help_names_every_command_and_the_exit_codes(command: Command) -> None:
-    done = command("--help")
+def groups() -> list[tuple[str, ...]]:
+    """The words before the verbs of each group that imports its verbs when they are called."""
+    return [(), ("role",)]
+
+
+@pytest.mark.parametrize("group", groups(), ids=" ".join)
+def test_help_shows_each_verb_with_the_whole_first_paragraph_of_its_own_help(
+    typed: Typed, group: tuple[str, ...]
+) -> None:
+    table = RoleVerbs.table if group else Foosim.table
+    done = typed(*group)("--help")
     assert done.code == 0
-    for name in COMMANDS:
-        assert f"\n  {name} " in done.out
-    assert "Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C" in done.out
+    shown = " ".join(done.out.split())
+    for name, verb in [row for verbs in table.values() for row in verbs.items()]:
+        own = typed(*group, *name.split())("--help")
+        assert own.code == 0 and own.out.startswith(f"Usage: foosim {' '.join((*group, name))} ")
+        assert summary_of(command_of(verb, name)) == verb.summary
+        assert f"{name} {verb.summary}" in shown
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_each_command_says_what_it_does(command: Command, name: str) -> None:
-    done = command(name, "--help")
-    assert done.code == 0
-    assert f"Usage: foosim-supervisor {name}" in done.out
+def command_of(verb: Verb, name: str) -> Any:
+    """What typer knows of a verb."""
+    command = typer.main.get_command(import_module(f"foosim.{verb.module}").app)
+    return getattr(command, "commands", {}).get(verb.name or name, command)
+
+
+@pytest.mark.parametrize("name", Foosim.plumbing)
+def test_what_help_does_not_show_is_called_too(typed: Typed, name: str) -> None:
+    done, hidden = typed(name)("--help"), typed()("--help")
+    assert done.code == 0 and done.out.startswith(f"Usage: foosim {name} ") and f"\n  {name} " not in hidden.out
+
+
+def test_no_word_prints_what_a_newcomer_can_do(typed: Typed, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four lines that parse."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["foosim"])
+        main()
+    lines = [line.split("  ")[1] for line in capsys.readouterr().out.splitlines() if line.startswith("  foosim ")]
+    assert len(lines) == 4
+    for line in lines:
+        words = line.split()[1:]
+        verb, arguments = Foosim(name="foosim").resolve_command(None, words)[1:]
+        while hasattr(verb, "commands"):
+            verb, arguments = verb.commands[arguments[0]], arguments[1:]
+        assert verb.make_context("foosim", list(arguments)).params
+
+
+def shell_words(typed: Typed, monkeypatch: pytest.MonkeyPatch, words: str) -> str:
+    """What bash is offered for the last of some words."""
+    monkeypatch.setenv("_FOOSIM_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
+    return typed()().out
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("foosim rec", ""),
+        ("foosim reh", "rehearse"),
+        ("foosim capture wh", "what-if"),
+        ("foosim net par", "partition"),
+        ("foosim role pl", "player"),
+        ("foosim up --proc", "--processes"),
+    ],
+)
+def test_shells_complete_verbs_and_options(
+    typed: Typed, monkeypatch: pytest.MonkeyPatch, words: str, offered: str
+) -> None:
+    assert shell_words(typed, monkeypatch, words).split() == offered.split()
 
 
 def test_the_version_is_that_of_the_package(command: Command) -> None:
@@ -57,14 +114,14 @@ def test_the_version_is_that_of_the_package(command: Command) -> None:
 
 
 def test_a_valid_file_is_summed_up(command: Command) -> None:
-    refused = command("validate", TABLE, "--set", "table.ball.mass=20")
+    refused = command("check", TABLE, "--set", "table.ball.mass=20")
     assert refused.code == 2 and "--set:1:17: table.ball.mass: not a mass" in refused.err
-    assert "seed: 77\n" in command("validate", TABLE, "--set", "seed=77", "--expanded").out
-    assert command("validate", TABLE).out == f"{TABLE}: valid, world table, 9 robots on 2 nodes, 2 players\n"
+    assert "seed: 77\n" in command("check", TABLE, "--set", "seed=77", "--expanded").out
+    assert command("check", TABLE).out == f"{TABLE}: valid, world table, 9 robots on 2 nodes, 2 players\n"
     warehouse = TABLE.with_name("warehouse.yaml")
-    written_out = load_deployment(command("validate", warehouse, "--expanded").out, "expanded")
+    written_out = load_deployment(command("check", warehouse, "--expanded").out, "expanded")
     assert written_out == load_deployment(warehouse.read_text(), "warehouse")
-    assert json.loads(command("validate", TABLE, "--json").out) == {
+    assert json.loads(command("check", TABLE, "--json").out) == {
         "world": "table",
         "robots": 9,
         "nodes": ["blue", "red"],
@@ -75,7 +132,7 @@ def test_a_valid_file_is_summed_up(command: Command) -> None:
 def test_all_problems_of_a_file_are_shown_with_their_places(command: Command, tmp_path: Path) -> None:
     path = tmp_path / "bad.yaml"
     path.write_text(TABLE.read_text().replace("seed: 1\n", "seed: -1\n").replace("engine: bullet", "engine: bulet"))
-    done = command("validate", path)
+    done = command("check", path)
     assert done.code == 2
     lines = done.err.splitlines()
     assert [line.split(": ")[1] for line in lines] == ["seed", "engine"]
@@ -89,7 +146,7 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     path, text = tmp_path / "own.yaml", apart()
     assert text.count("class: foosim.players.football:Team") == 2
     path.write_text(text.replace("class: foosim.players.football:Team", "class: own_team:Team"))
-    done = command("validate", path)
+    done = command("check", path)
     assert done.code == 2
     whose = [line.split(": ")[1] for line in done.err.splitlines()]
     assert whose == ["players.player-red.class", "players.player-blue.class"]
@@ -100,7 +157,7 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
     away = path.read_text().replace("class: own_team:Team", "class: own_team:Team\n    host: arm")
     path.write_text(f"{away}\nhosts:\n  arm:\n    address: 192.0.2.7\n")
-    assert command("validate", path).code == 0
+    assert command("check", path).code == 0
 
 
 def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
@@ -141,13 +198,13 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (
             ("--qqq",),
             2,
-            "foosim-supervisor up: there is no such option, '--qqq'; options are --pace, --for, --seed,",
+            "foosim up: there is no such option, '--qqq'; options are --pace, --for, --seed,",
         ),
-        (("--sed", "3"), 2, "foosim-supervisor up: there is no such option, '--sed', nearest is --seed\n"),
-        (("--seed", "x"), 2, "foosim-supervisor up --seed: a whole number is needed, 'x'\n"),
-        (("--for",), 2, "foosim-supervisor up --for: its value is missing; of it --help says: End after this much"),
-        (("--json=1",), 2, "foosim-supervisor up --json: it takes no value, '1'\n"),
-        (("more.yaml",), 2, "foosim-supervisor up: too many arguments, 'more.yaml'; it takes FILE\n"),
+        (("--sed", "3"), 2, "foosim up: there is no such option, '--sed', nearest is --seed\n"),
+        (("--seed", "x"), 2, "foosim up --seed: a whole number is needed, 'x'\n"),
+        (("--for",), 2, "foosim up --for: its value is missing; of it --help says: End after this much"),
+        (("--json=1",), 2, "foosim up --json: it takes no value, '1'\n"),
+        (("more.yaml",), 2, "foosim up: too many arguments, 'more.yaml'; it takes FILE\n"),
     ],
 )
 def test_what_is_wrong_with_a_run_is_said_before_anything_starts(
@@ -223,12 +280,12 @@ def test_the_folder_of_a_capture_is_made_and_left_empty(tmp_path: Path) -> None:
     [("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)],
 )
 def test_without_a_live_run_there_is_nobody_to_control(command: Command, arguments: tuple[str, ...]) -> None:
-    assert command(*arguments) == (1, "", "no run is live; foosim-supervisor up FILE starts one\n")
+    assert command(*arguments) == (1, "", "no run is live; foosim up FILE starts one\n")
 
 
 def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
     for typed in ("many", "0", "-3", "1.5"):
-        wanted = f"foosim-supervisor step COUNT: a whole number from 1 on is needed, '{typed}'\n"
+        wanted = f"foosim step COUNT: a whole number from 1 on is needed, '{typed}'\n"
         assert command("step", typed) == (2, "", wanted)
 
 
@@ -237,10 +294,10 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
     [
         (
             ("rate", "quick"),
-            "foosim-supervisor rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'",
+            "foosim rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'",
         ),
-        (("rate", "0x"), "foosim-supervisor rate PACE: out of range 0.001x to 1000x, '0x'"),
-        (("rate", "-1x"), "foosim-supervisor rate PACE: out of range 0.001x to 1000x, '-1x'"),
+        (("rate", "0x"), "foosim rate PACE: out of range 0.001x to 1000x, '0x'"),
+        (("rate", "-1x"), "foosim rate PACE: out of range 0.001x to 1000x, '-1x'"),
         (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
         (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
         (
@@ -260,13 +317,13 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
         (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),
         (
             ("add", "--position", "0", "1"),
-            "foosim-supervisor add --position: 3 values are needed, X Y Z; here are 2, '0 1'",
+            "foosim add --position: 3 values are needed, X Y Z; here are 2, '0 1'",
         ),
-        (("step", "3", "4"), "foosim-supervisor step: too many arguments, '4'; it takes COUNT"),
-        (("status", "x"), "foosim-supervisor status: it takes no arguments, 'x'"),
-        (("move", "red.goal"), "foosim-supervisor move: NODE is missing; needed are ROBOT, NODE"),
-        (("puhs", "1"), "foosim-supervisor: there is no such command, 'puhs', nearest is push"),
-        (("--json", "up"), "foosim-supervisor: there is no such option, '--json', nearest is --version"),
+        (("step", "3", "4"), "foosim step: too many arguments, '4'; it takes COUNT"),
+        (("status", "x"), "foosim status: it takes no arguments, 'x'"),
+        (("move", "red.goal"), "foosim move: NODE is missing; needed are ROBOT, NODE"),
+        (("puhs", "1"), "foosim: there is no such command, 'puhs', nearest is push"),
+        (("--versoin", "up"), "foosim: there is no such option, '--versoin', nearest is --version"),
     ],
 )
 def test_a_value_that_no_run_could_take_is_bad_input(command: Command, arguments: tuple[str, ...], text: str) -> None:
@@ -278,19 +335,27 @@ def test_options_that_cannot_be_read_are_told_in_the_object_too(command: Command
     assert done.code == 2 and json.loads(done.out)["reason"] == done.err.strip()
 
 
-def test_a_command_without_words_shows_its_help(command: Command, typed: Typed) -> None:
-    done = command()
-    assert (done.code, done.out) == (2, "") and done.err.startswith("Usage: foosim-supervisor ")
-    done = typed("foosim-node", run_node)()
-    assert done == (2, "", "foosim-node: --name is missing; needed are --name, --connect\n")
-
-
-@pytest.mark.parametrize("program", sorted(PROGRAMS))
-def test_every_program_says_in_its_words_what_was_typed(typed: Typed, program: str) -> None:
-    module, _, name = PROGRAMS[program].partition(":")
-    done = typed(program, getattr(importlib.import_module(module), name))("--qqq")
+@pytest.mark.parametrize("group", [("net",), ("capture",), ("pki",), ("role",)], ids=" ".join)
+def test_a_group_without_words_shows_its_help(typed: Typed, group: tuple[str, ...]) -> None:
+    done = typed(*group)()
+    assert (done.code, done.out) == (2, "") and done.err.startswith(f"Usage: foosim {' '.join(group)} ")
+    done = typed(*group)("--qqq")
     assert done.code == 2 and done.out == ""
-    assert done.err.startswith(f"{program}: there is no such option, '--qqq'; options are --")
+    assert done.err.startswith(f"foosim {' '.join(group)}: there is no such option, '--qqq'; options are --help")
+
+
+def test_what_is_missing_is_named(typed: Typed) -> None:
+    done = typed("role", "node")()
+    assert done == (2, "", "foosim role node: --name is missing; needed are --name, --connect\n")
+
+
+@pytest.mark.parametrize(
+    "words", [("status",), ("capture", "info", "no.mcap"), ("net", "clog", "a", "b"), ("pki", "show", "no")]
+)
+def test_a_command_that_is_refused_prints_its_object_too(typed: Typed, words: tuple[str, ...]) -> None:
+    done = typed(*words)("--json")
+    content = json.loads(done.out)
+    assert done.code in (1, 2, 3) and content == {"failed": True, "reason": done.err.strip()}
 
 
 def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Command, tmp_path: Path) -> None:

@@ -1,7 +1,4 @@
-"""The command `foosim-replay`: shows, verifies, recovers, plays, exports and compares captures.
-
-Here are `info`, `verify` and `recover`, shells over the reader, `verify` and the recovery.
-"""
+"""The verbs of `foosim capture`; here are `info`, `verify` and `recover`, shells over reader, `verify` and recovery."""
 
 from __future__ import annotations
 
@@ -17,13 +14,15 @@ from foosim.capture.info import CaptureInfo, capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import FAILED_RUN, NEXT, whole_path
 from foosim.capture.reader import read_about
-from foosim.cli import replay_export, replay_play, replay_report, replay_view, replay_whatif
-from foosim.cli.options import BadCapture, Capture, Json, reading
+from foosim.cli.capture.export import cut, diff, export
+from foosim.cli.capture.options import BadCapture, Capture, reading
+from foosim.cli.capture.play import control, play
+from foosim.cli.capture.report import report
+from foosim.cli.capture.what_if import what_if
 from foosim.common import limits
 from foosim.common.errors import BadValue, Failed
-from foosim.common.json_text import encode_json
 from foosim.replay.verify import Verified, verify_capture
-from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.runtime.journal import JournalError
 from foosim.vhub.recording.recovery import recover_capture
 
@@ -31,7 +30,7 @@ app = new_app()
 
 
 @app.callback()
-def foosim_replay(version: VersionOption = False) -> None:
+def capture_group() -> None:
     """Look into a capture, play it, compare it, take parts of it, and simulate it again.
 
     Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one), 3 refused, or recovered with loss,
@@ -40,13 +39,16 @@ def foosim_replay(version: VersionOption = False) -> None:
 
 
 @app.command()
-def info(capture: Capture, json: Json = False) -> None:
+def info(capture: Capture, json: JsonOption = False) -> None:
     """Show the content of a capture: run, duration, digests, nodes and their arithmetic, packets by fate, cause and
     channel, recoveries, topics, files and versions.
     """
     with reading():
         found = capture_info(capture)
-    typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
+    if json:
+        print_json(msgspec.to_builtins(found))
+    else:
+        print(_describe(found))
 
 
 def _describe(found: CaptureInfo) -> str:
@@ -101,7 +103,7 @@ def verify(
     from_first_frame: Annotated[
         bool, typer.Option("--from-first-frame", help="Verify a cut: the ticks after its first frame.")
     ] = False,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
 
@@ -120,7 +122,10 @@ def verify(
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     with reading():
         found = verify_capture(capture, nodes, from_first_frame=from_first_frame)
-    typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
+    if json:
+        print_json(_as_json(found))
+    else:
+        print(_verdict(found))
     if found.tick >= 0 and found.other_arithmetic:
         typer.echo(
             f"the capture's arithmetic is {', '.join(found.other_arithmetic)}, this machine's is {found.arithmetic}: "
@@ -166,12 +171,12 @@ def recover(
         Path | None,
         typer.Option("--out", "-o", help="The capture to write; by default CAPTURE's name with .recovered."),
     ] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Write a valid capture from an unfinished one and the vHub's journal.
 
     The new file has everything up to the last whole chunk, or up to the first damage, and the ticks that the journal
-    adds. CAPTURE is not changed. `foosim-supervisor up` recovers the captures that earlier runs of the same user left
+    adds. CAPTURE is not changed. `foosim up` recovers the captures that earlier runs of the same user left
     unfinished. For a finished but damaged capture the damage and the undamaged ticks are printed.
 
     Exit codes: 0 everything that was recorded is in the new capture, or CAPTURE is finished, 1 CAPTURE is damaged or
@@ -188,7 +193,7 @@ def recover(
     if damage is not None:
         if json:
             content = {"finished_before": True, "whole": False, **msgspec.to_builtins(damage), "problem": str(damage)}
-            typer.echo(encode_json(content).decode())
+            print_json(content)
             raise typer.Exit(FAILED)
         raise Failed(str(damage))
     if json:
@@ -201,7 +206,7 @@ def recover(
             "added_ticks": 0 if found is None else found.added_ticks,
             "problem": "" if found is None else found.problem,
         }
-        typer.echo(encode_json(content).decode())
+        print_json(content)
     else:
         typer.echo(f"capture {capture} is finished already" if found is None else str(found))
     raise typer.Exit(DONE if found is None or found.is_whole else WITH_LOSS)
@@ -228,15 +233,5 @@ WITH_LOSS: Final = 3
 UNFINISHED: Final = 4
 """Exit code of `verify`."""
 
-_COMMANDS: Final = (
-    *(replay_play.play, replay_play.control),
-    *(replay_export.export, replay_export.cut, replay_export.diff),
-    *(replay_whatif.whatif, replay_report.report, replay_view.view),
-)
-for command in _COMMANDS:
+for command in (export, cut, diff, play, control, what_if, report):
     app.command()(command)
-
-
-def main() -> None:
-    """The entry point of `foosim-replay`."""
-    run_app(app, "foosim-replay")

@@ -1,10 +1,11 @@
-"""The commands `foosim-replay export`, `cut` and `diff`.
+"""The commands `foosim capture export`, `cut` and `diff`.
 
 They are shells over `export.export_capture`, `vhub.capture_cut.cut_capture` and `diff.diff_captures`.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -15,11 +16,10 @@ from foosim.analysis.diff import Diff, Difference, diff_captures
 from foosim.analysis.export import STANDARD_OUTPUT, Format, export_capture
 from foosim.analysis.tables import table_names
 from foosim.capture.cut import cut_capture
-from foosim.cli.options import Capture, Json, reading, time_of
+from foosim.cli.capture.options import Capture, reading, time_of
 from foosim.common.errors import BadValue, show
-from foosim.common.json_text import encode_json
 from foosim.common.names import nearest_name
-from foosim.runtime.command import DONE, FAILED
+from foosim.runtime.command import DONE, FAILED, JsonOption, print_json
 
 _TABLES = ", ".join(table_names())
 
@@ -33,7 +33,7 @@ def export(
     form: Annotated[
         str | None, typer.Option("--format", help="csv or parquet; by default from the file's suffix, csv for -.")
     ] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Write a table of a capture as CSV or Parquet.
 
@@ -46,7 +46,7 @@ def export(
     if json:
         columns = [asdict(column) for column in done.columns]
         content = {"path": str(done.path), "table": what, "rows": done.rows, "columns": columns}
-        typer.echo(encode_json(content).decode(), err=out == STANDARD_OUTPUT)
+        print_json(content, sys.stderr if out == STANDARD_OUTPUT else None)
     elif out != STANDARD_OUTPUT:
         typer.echo(f"{done.path}: {done.rows} rows of {what}, {len(done.columns)} columns")
 
@@ -67,7 +67,7 @@ def cut(
     out: Annotated[Path, typer.Option("--out", "-o", help="The capture to write.", show_default=False)],
     begin: Annotated[str | None, typer.Option("--from", help="Time at which it begins, e.g. 10s.")] = None,
     end: Annotated[str | None, typer.Option("--to", help="Time at which it ends, e.g. 20s.")] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Write a part of a capture as a new capture.
 
@@ -78,7 +78,7 @@ def cut(
     with reading():
         done = cut_capture(capture, out, from_ns, to_ns)
     if json:
-        typer.echo(encode_json({**asdict(done), "path": str(done.path)}).decode())
+        print_json({**asdict(done), "path": str(done.path)})
         return
     first, last = (tick * done.tick_ns / 1e9 for tick in (done.first_tick, done.last_tick))
     typer.echo(
@@ -94,7 +94,7 @@ def diff(
         list[str] | None,
         typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated."),
     ] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Compare two captures: the first difference of each channel, and the number of rows in both.
 
@@ -105,7 +105,10 @@ def diff(
     """
     with reading():
         found = diff_captures(one, other, ignore or ())
-    typer.echo(encode_json(_diff_json(found)).decode() if json else _diff_text(found))
+    if json:
+        print_json(_diff_json(found))
+    else:
+        print(_diff_text(found))
     raise typer.Exit(DONE if found.equal else FAILED)
 
 

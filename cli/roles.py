@@ -1,4 +1,4 @@
-"""The command `foosim-process`: a process with several roles of a run, which `foosim-supervisor up` starts."""
+"""The command `foosim role roles`: a process with several roles of a run, which `foosim up` starts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foosim.common.errors import BadValue
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import launched_options
 from foosim.process.roles import Roles, run_roles
-from foosim.runtime.command import PathOption, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.command import PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import die_with_parent, end_with_stack
 from foosim.runtime.run_folder import open_run
@@ -41,11 +41,10 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     path: PathOption = None,
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
-    version: VersionOption = False,
 ) -> None:
     """Run several roles of a run in one process: supervisor, vHub, nodes, players.
 
-    `foosim-supervisor up` starts such processes where the deployment, or its option --processes, says that roles share
+    `foosim up` starts such processes where the deployment, or its option --processes, says that roles share
     one. The process ends with the run; killed and started again with the same options, it resumes from its journals.
 
     Exit codes: 0 the run ended, 1 it failed, 3 refused.
@@ -71,12 +70,3 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
         hub = read_options(capture, no_capture, run_folder), address
     given = tuple(node or ()), tuple(player or ())
     raise typer.Exit(run_roles(Roles(name, supervisor, hub, *given, connect, radio, pki, progress_file)))
-
-
-def main() -> None:
-    """Entry of `foosim-process`."""
-    run_app(app, "foosim-process")
-
-
-if __name__ == "__main__":
-    main()

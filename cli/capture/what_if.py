@@ -1,4 +1,4 @@
-"""The command `foosim-replay whatif`: a shell over `whatif.what_if` and `whatif_picture.picture`."""
+"""The command `foosim capture what-if`: a shell over `whatif.what_if` and `whatif_picture.picture`."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from rich.table import Table
 
 from foosim.analysis.new_file import check_name, new_file
 from foosim.capture.reader import CaptureData, open_capture
-from foosim.cli.options import Capture, Json, reading
+from foosim.cli.capture.options import Capture, reading
 from foosim.common.errors import BadValue
-from foosim.common.json_text import encode_json
 from foosim.deployment.loader import Text, load_deployment, with_network
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_files, read_source_file
-from foosim.replay.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if
+from foosim.replay import what_if as calculation
+from foosim.replay.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf
 from foosim.replay.what_if_chart import picture
+from foosim.runtime.command import JsonOption, print_json
 from foosim.vhub.network.custom_models import check_link_models, differing_models
 
 LINKS_SHOWN = 40
 
 
-def whatif(
+def what_if(
     capture: Capture,
     network: Annotated[
         Path | None,
@@ -41,7 +42,7 @@ def whatif(
     drawing: Annotated[
         Path | None, typer.Option("--picture", help="Draw the changes per link into NAME.svg.", show_default=False)
     ] = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Send a capture's packets through another network.
 
@@ -56,7 +57,7 @@ def whatif(
         deployment = _deployment(opened, network, settings or [])
         for line in differing_models(deployment.network, opened.about.versions):
             typer.echo(f"warning: {line}", err=True)
-        found = what_if(opened, deployment)
+        found = calculation.what_if(opened, deployment)
     for line in found.caveats:
         typer.echo(f"warning: {capture}: {line}", err=True)
     if drawing is not None:
@@ -64,7 +65,7 @@ def whatif(
             part.write_text(picture(found, capture.name), encoding="utf-8")
     if json:
         content = asdict(found)
-        typer.echo(encode_json(content if packets else {**content, "changes": []}).decode())
+        print_json(content if packets else {**content, "changes": []})
         return
     earlier = f", {found.earlier} sent before it begins" if found.earlier else ""
     typer.echo(f"{found.packets} packets, {found.changed} changed{earlier}")

@@ -1,4 +1,4 @@
-"""The command `foosim-replay report`: a shell over `report.gather` and `report_page.page`."""
+"""The command `foosim capture report`: a shell over `report.gather` and `report_page.page`."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import typer
 
 from foosim.analysis.new_file import check_name, new_file
 from foosim.capture.reader import open_capture
-from foosim.cli.options import Capture, Json, reading
-from foosim.common.json_text import encode_json
+from foosim.cli.capture.options import Capture, reading
 from foosim.console.report.collect import gather
 from foosim.console.report.page import page
+from foosim.runtime.command import JsonOption, print_json
 
 
 def report(
     capture: Capture,
     out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.", show_default=False)],
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Write an HTML report about the network of a captured run.
 
@@ -33,7 +33,7 @@ def report(
     with new_file(out) as part:
         part.write_text(page(found), encoding="utf-8")
     if json:
-        typer.echo(encode_json(asdict(found)).decode())
+        print_json(asdict(found))
     else:
         packets, dropped = found.fates["offered"], found.fates["dropped"]
         typer.echo(f"{out}: {packets} packets on {len(found.links)} links, {dropped} dropped")

@@ -1,4 +1,4 @@
-"""The commands `foosim-replay play` and `control`: shells over `play_capture` and `hear_replay`."""
+"""The commands `foosim capture play` and `control`: shells over `play_capture` and `hear_replay`."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from typing import Annotated, Any
 
 import typer
 
-from foosim.cli.options import Capture, Json, reading, time_of
+from foosim.cli.capture.options import Capture, reading, time_of
 from foosim.client.replay_listener import hear_replay
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue, UnknownName, read_at
-from foosim.common.json_text import encode_json
 from foosim.common.limits import LAG_ANCHOR_NS
 from foosim.common.units import TIME, parse_ns, parse_pace
 from foosim.replay.address_file import newest_place
 from foosim.replay.main import PlayOptions, PlayResult, Stopper, play_capture
 from foosim.replay.requests import ARGUMENTS, SEEK, STEP
 from foosim.replay.terminal import Lines
-from foosim.runtime.command import DONE, FAILED, PKI_VARIABLE, PkiOption
+from foosim.runtime.command import DONE, FAILED, PKI_VARIABLE, JsonOption, PkiOption, print_json
 from foosim.runtime.process import Stop
 
 
@@ -45,7 +44,7 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
         bool, typer.Option("--insecure", help="Listen for other machines without certificates.")
     ] = False,
     pki: PkiOption = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Publish captured packets, poses, scenes, logs and rows, at the times at which they were released.
 
@@ -54,7 +53,7 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
     capture is played up to its last whole chunk.
 
     Keys in a terminal: space pauses and resumes, s steps a tick, up and down double and halve the rate, left and right
-    seek by 5 s, q quits. `foosim-replay control` controls the replay from another terminal. Ctrl-C ends it in order.
+    seek by 5 s, q quits. `foosim capture control` controls the replay from another terminal. Ctrl-C ends it in order.
 
     Exit codes: 0 played or stopped, 1 the capture is damaged, 2 bad input, 3 refused.
     """
@@ -76,7 +75,7 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
     with reading():
         result = play_capture(capture, options, lines, stopper)
     if json:
-        typer.echo(encode_json(asdict(result)).decode())
+        print_json(asdict(result))
     else:
         lines.print(_played_text(result))
     raise typer.Exit(FAILED if result.failed else DONE)
@@ -101,7 +100,7 @@ def control(
     ] = None,
     address: Annotated[str | None, typer.Option(help="Address of the replay; by default this user's newest.")] = None,
     pki: PkiOption = None,
-    json: Json = False,
+    json: JsonOption = False,
 ) -> None:
     """Control a running replay: pause, resume, step [N], seek 12.5s, rate 2x, stop, status.
 
@@ -116,7 +115,7 @@ def control(
     with hear_replay(address, (), pki=pki) as replay:
         status = replay.ask(request, **arguments)
     if json:
-        typer.echo(encode_json(status).decode())
+        print_json(status)
     else:
         typer.echo(f"{status['capture']}: {status['time_ns'] / 1e9:.3f} s, {status['state']} {status['rate']}")
 

@@ -1,0 +1,168 @@
+"""The verbs that control a live run, from this terminal or another machine: shells over `client.control`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from foosim.client import control
+from foosim.common.errors import BadValue, read_at
+from foosim.common.units import parse_pace
+from foosim.protocol.messages import Answer
+from foosim.runtime.command import JsonOption, RunOption, new_app, print_json
+
+app = new_app()
+
+
+@app.command()
+def status(run: RunOption = None, json: JsonOption = False) -> None:
+    """Show the state of a run: time, lag, nodes, links, score."""
+    from foosim.launcher.display import render_text
+
+    content = control.status(run)
+    if json:
+        print_json(content)
+    else:
+        print(render_text(content).rstrip())
+
+
+@app.command()
+def pause(run: RunOption = None, json: JsonOption = False) -> None:
+    """Pause simulated time, after the ticks that are released already."""
+    show_answer(control.pause(run), json)
+
+
+@app.command()
+def resume(run: RunOption = None, json: JsonOption = False) -> None:
+    """Continue after a pause."""
+    show_answer(control.resume(run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def step(
+    count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1,
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Simulate a number of ticks, then pause."""
+    show_answer(control.step(count, run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def rate(
+    pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.", show_default=False)],
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Change how fast simulated time passes."""
+    read_at("foosim rate PACE", parse_pace, pace)
+    show_answer(control.rate(pace, run), json)
+
+
+Numbers = tuple[float, float, float]
+Words = tuple[str, str, str]
+
+
+@app.command()
+def add(
+    name: Annotated[str | None, typer.Argument(help="Its name; by default the next free one.")] = None,
+    position: Annotated[Words | None, typer.Option(metavar="X Y Z", help="Where, in m.")] = None,
+    velocity: Annotated[Words | None, typer.Option(metavar="X Y Z", help="How fast, in m/s.")] = None,
+    model: Annotated[str | None, typer.Option(help="Of which model; by default the first that can be added.")] = None,
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Add an entity to the world; by default it rests where the first one of its model starts."""
+    place = None if position is None else _three("position", "m", position)
+    speed = None if velocity is None else _three("velocity", "m/s", velocity)
+    show_answer(control.add(name, place, speed, run, model), json)
+
+
+@app.command()
+def remove(
+    name: Annotated[str, typer.Argument(help="Which entity.", show_default=False)],
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Remove an entity that was added."""
+    show_answer(control.remove(name, run), json)
+
+
+@app.command()
+def move(
+    robot: Annotated[str, typer.Argument(help="Which robot.", show_default=False)],
+    node: Annotated[str, typer.Argument(help="To which node.", show_default=False)],
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Move a robot to another node; the world stays the same."""
+    show_answer(control.move(robot, node, run), json)
+
+
+@app.command()
+def balance(run: RunOption = None, json: JsonOption = False) -> None:
+    """Move robots from busy nodes to idle ones, once; prints the robots and the loads."""
+    show_answer(control.balance(run), json)
+
+
+Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
+
+
+@app.command()
+def stop(node: Node, run: RunOption = None, json: JsonOption = False) -> None:
+    """Stop a node, after its robots have moved to the other nodes."""
+    show_answer(control.stop(node, run), json)
+
+
+@app.command()
+def start(node: Node, run: RunOption = None, json: JsonOption = False) -> None:
+    """Start a node that was stopped, or that its launcher has given up; its robots move back.
+
+    `up` starts the process of a local node and counts its failures anew. A node with `launch: manual` is started by
+    hand.
+    """
+    show_answer(control.start(node, run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def push(
+    impulse: Annotated[
+        list[str], typer.Argument(metavar="X Y Z", help="Impulse in N s along x, y and z.", show_default=False)
+    ],
+    name: Annotated[str | None, typer.Option(help="Which free body; by default the first by name.")] = None,
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Apply an impulse to a free body.
+
+    An impulse of 0.021 N s changes the velocity of a body of 21 g by 1 m/s.
+    """
+    show_answer(control.push(_three("impulse", "N s", impulse), name, run), json)
+
+
+def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
+    """Return three numbers; raises BadValue with what the numbers are, which typer's message lacks."""
+    needed = f"{what}: three numbers are needed, X Y Z in {unit}"
+    if len(words) != 3:
+        raise BadValue(f"{needed}; here are {len(words)}", " ".join(words))
+    try:
+        x, y, z = map(float, words)
+    except ValueError:
+        raise BadValue(f"{needed}; not all of these are numbers", " ".join(words)) from None
+    return x, y, z
+
+
+@app.command()
+def down(run: RunOption = None, json: JsonOption = False) -> None:
+    """End a run in order."""
+    show_answer(control.down(run), json)
+
+
+def show_answer(answer: Answer, json: bool) -> None:
+    """Print the supervisor's answer."""
+    if json:
+        print_json({"tick": answer.tick, "text": answer.text})
+    else:
+        print(answer.text)

@@ -1,0 +1,30 @@
+"""The verbs of `foosim role`: processes of a run, which `up` starts, on this machine and its hosts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from foosim.cli.verbs import Verb, Verbs
+from foosim.runtime.command import new_app
+
+
+class RoleVerbs(Verbs):
+    """The processes of a run, other than `foosim run`, the supervisor alone."""
+
+    table: ClassVar[Mapping[str, Mapping[str, Verb]]] = {
+        "Commands": {
+            "node": Verb("node.main", "Run a simulation node."),
+            "vhub": Verb("vhub.main", "Run the virtual hub of a run."),
+            "player": Verb("client.main", "Run players: the classes that the deployment names for them."),
+            "roles": Verb("cli.roles", "Run several roles of a run in one process: supervisor, vHub, nodes, players."),
+        }
+    }
+
+
+app = new_app(RoleVerbs)
+
+
+@app.callback()
+def role_group() -> None:
+    """Run a process of a run, as `up` does; for a node with `launch: manual`, and for other launchers."""
