@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import typer
@@ -29,7 +28,7 @@ METAVARS: Final = {
     "worse_for": "WHOM",
 }
 """What stands for the value of an option that gives no other word, by the name of its parameter."""
-OF_TYPES: Final = {int: "N", float: "NUMBER", Path: "FILE"}
+OF_TYPES: Final = {"int": "N", "float": "NUMBER", "Path": "FILE"}
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -42,7 +41,9 @@ class Command(TyperCommand):
             if parameter.metavar is None:
                 name, kind = str(parameter.name), ""
                 if isinstance(parameter, TyperOption):
-                    kind = METAVARS.get(name) or OF_TYPES.get(parameter.type_descriptor.annotation, "")
+                    kind = METAVARS.get(name) or OF_TYPES.get(
+                        getattr(parameter.type_descriptor.annotation, "__name__", ""), ""
+                    )
                 parameter.metavar = kind or name.upper().replace("_", "-")
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:

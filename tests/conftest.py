@@ -198,6 +198,7 @@ def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], t
     """Return a function that makes a command of foosim, by its verb; it runs in an empty folder."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr("foosim.cli.note_signals", lambda: None)  # this process goes on after the command
     monkeypatch.chdir(tmp_path)
 
     def make(*verb: str) -> Command:

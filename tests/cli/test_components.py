@@ -124,7 +124,7 @@ def test_a_form_is_told_of_with_what_it_brings(about: tuple[str, str]) -> None:
 
 
 def test_all_are_told_of_in_json() -> None:
-    found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])
+    found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
     assert [(one["form"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
     by_name = {(one["form"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]
@@ -151,7 +151,7 @@ def test_bounds_are_told_of_as_they_are(site: Path) -> None:
 
 def test_what_modules_print_is_not_in_the_output(site: Path) -> None:
     out, err = told("components", "--json", folder=site)
-    assert "bounded" in [one["name"] for one in json.loads(out)] and err == "said at import\n"
+    assert "bounded" in [one["name"] for one in json.loads(out)["components"]] and err == "said at import\n"
     out, err = told("schema", folder=site)
     Draft202012Validator.check_schema(json.loads(out))
     assert "bounded" in out and err == "said at import\n"

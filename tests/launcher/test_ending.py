@@ -85,6 +85,16 @@ def test_what_is_killed_on_a_machine_after_its_end_is_not_held_against_a_process
     counts = [OomKills(0, 5), OomKills(0, 6)]
     monkeypatch.setattr(processes, "oom_kills", lambda: counts.pop(0))
     ended: Any = SimpleNamespace(poll=lambda: -9)
-    child = Child("red", ("foosim", "role", "node",), tmp_path / "log", ended, oom_kills=OomKills(0, 5))
+    child = Child(
+        "red",
+        (
+            "foosim",
+            "role",
+            "node",
+        ),
+        tmp_path / "log",
+        ended,
+        oom_kills=OomKills(0, 5),
+    )
     for _ in range(2):
         assert child.ending == "was killed by SIGKILL, not by foosim"

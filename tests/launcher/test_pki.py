@@ -326,6 +326,6 @@ def test_a_whole_deployment_is_issued_in_one_command(folder: Path) -> None:
     }
     assert set(certificates.identities_in(folder)) == everybody
     code, output = run("show", folder, "--json")
-    shown = {its["identity"]: its for its in json.loads(output)}
+    shown = {its["identity"]: its for its in json.loads(output)["certificates"]}
     assert code == 0 and shown.keys() == everybody | {"foosim"}
     assert "10.0.0.1" in shown["vhub"]["hosts"] and not any(its["problem"] for its in shown.values())

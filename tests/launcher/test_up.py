@@ -56,8 +56,7 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
 
     assert [ends() for _ in range(7)] == [2, 3, 4, 5, 6, 6, 6]
     assert said.getvalue().endswith(
-        f"red ended with exit code 1, is given up; foosim start red tries it again; its log is "
-        f"{up.folder.log('red')}\n"
+        f"red ended with exit code 1, is given up; foosim start red tries it again; its log is {up.folder.log('red')}\n"
     )
     up._start_wanted({"red": 1, "blue": 1})
     assert ends() == 8, "once for the word, and once again after the first wait"

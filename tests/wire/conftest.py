@@ -97,9 +97,7 @@ class House:
         """
         bare = () if players else ("--set", "players={}")
         apart = ("--processes", "each") if each else ()
-        return self.start(
-            "foosim", "up", self.table, "--set", LONG, "--pace", SLOW, *bare, *apart, *arguments
-        )
+        return self.start("foosim", "up", self.table, "--set", LONG, "--pace", SLOW, *bare, *apart, *arguments)
 
     def run(self, name: str, *arguments: str | Path) -> tuple[int, str, str]:
         """Run a command to its end; return exit code, output and errors."""
