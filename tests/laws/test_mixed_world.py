@@ -23,7 +23,7 @@ from foosim.world.forms.registry import FORMS, own_module
 from tests.forms.worlds import driver
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-TICKS: Final = 200
+TICKS: Final = 120
 NAME: Final = "mixed.yaml"
 MODIFIERS: Final[dict[str, Any]] = {
     "pose": [
