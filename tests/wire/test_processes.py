@@ -42,14 +42,14 @@ def table(house: House) -> None:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_run_with_certificates_has_the_same_bytes_in_every_shape(house: House, name: str) -> None:
     """The supervisor's needs none for its nodes and players; another one's has the grants of all its roles."""
-    folder, arguments = house.folder / "certs", [*SHAPES[name]]
+    folder = house.folder / "certs"
     who = ["supervisor", "vhub", "operator.admin"]
     if name != "one":
         who += ["process.main", "node.blue", "client.player-red", "client.player-blue"]
     certificates.init(folder)
     certificates.issue(folder, who)
-    run = ["--pki", folder, "--pace", "fast", "--for", "300 ms", "--json", "--set", "capture.frames_every=1 tick"]
-    code, out, err = house.end(house.up(*run, *arguments, players=True))
+    run = ["--pace", "fast", "--for", "300 ms", "--json", "--set", "capture.frames_every=1 tick", *SHAPES[name]]
+    code, out, err = house.end(house.up("--pki", folder, *run, players=True))
     assert code == 0, err
     content, capture = last_json(out), house.folder / "run.mcap"
     text, fast = house.table.read_text(), parse_pace("fast")
