@@ -16,8 +16,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from hashlib import blake2b
 from math import isfinite
-from typing import Final
+from typing import Any, Final
 
 import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
 from foosim.deployment.loader import load_deployment
@@ -32,6 +33,7 @@ from foosim.world.layout import Entity, build_layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import Body, Shape, Vector, place, shape_box
 from foosim.world.scenery import SceneryMesh
+from foosim.world.spec import WorldSpec
 
 TICKS: Final = 100
 CPU_S: Final = 5
@@ -42,6 +44,10 @@ DONE: Final = "done"
 COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
 
 
+_passed: Final[set[tuple[str, ...]]] = set()
+"""What passed in this process, which rehearses a world several times: on other nodes, or with further sensors."""
+
+
 def check_models(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
     """Try the meshes and hulls of a deployment, whose text is given, with its engine. Its files must have been read.
 
@@ -49,6 +55,9 @@ def check_models(deployment: Deployment, name: str, text: str, command: Sequence
     """
     tries = {label: f"{file}: {label}" for label, (file, _) in _tries(deployment, name).items()}
     if not tries:
+        return
+    tried = (*command, _matter(deployment))
+    if tried in _passed:
         return
     one_thread = {"OPENBLAS_NUM_THREADS": "1"}  # of which each takes address space
     try:
@@ -65,11 +74,21 @@ def check_models(deployment: Deployment, name: str, text: str, command: Sequence
     except subprocess.TimeoutExpired as late:
         code, lines = -signal.SIGALRM, (late.stdout or b"").decode(errors="replace").splitlines()
     if code == 0 and lines and lines[-1] == DONE:
+        _passed.add(tried)
         return
-    tried = [line for line in lines if line in tries]
+    begun = [line for line in lines if line in tries]
     said = [line for line in lines if line not in tries and line != DONE]
-    where = tries[tried[-1]] if tried else f"{name}: its shapes"
+    where = tries[begun[-1]] if begun else f"{name}: its shapes"
     raise AssetError(f"{where} failed its trial with the engine {deployment.engine}: {_reason(code, said)}")
+
+
+def _matter(deployment: Deployment) -> str:
+    """Return what a trial depends on: the world and its files, without sensors and whatever computes it."""
+    world: dict[str, Any] = {field: getattr(deployment, field) for field in WorldSpec.model_fields}
+    world["robots"] = {name: robot.model_copy(update={"sensors": {}}) for name, robot in deployment.robots.items()}
+    files = {path: blake2b(content).hexdigest() for path, content in deployment.asset_files.items()}
+    parts = {**world, "files": files}
+    return repr([(name, sorted(part.items()) if isinstance(part, dict) else part) for name, part in parts.items()])
 
 
 def _tries(deployment: Deployment, name: str) -> dict[str, tuple[str, SceneryMesh | Entity]]:
