@@ -84,7 +84,7 @@ def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
     for kept in (
-        *(sources._spec, sources._source, sources._imports, sources._folder, sources._distribution),
+        *(sources._spec, sources._source, sources._imports, sources._folder, sources.distributions),
         *(loader._applied, registry._entry_points),
     ):
         kept.cache_clear()
