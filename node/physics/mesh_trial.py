@@ -83,8 +83,10 @@ def check_models(deployment: Deployment, name: str, text: str, command: Sequence
 
 
 def _digest(deployment: Deployment, command: Sequence[str]) -> bytes:
-    """Return a digest of what a trial depends on: the world and its files, whichever nodes compute it."""
-    found = sha256(repr([command, *(getattr(deployment, field) for field in WorldSpec.model_fields)]).encode())
+    """Return a digest of what a trial depends on: the world without its sensors and nodes, and its files."""
+    world = {field: getattr(deployment, field) for field in WorldSpec.model_fields}
+    world["robots"] = {name: robot.model_copy(update={"sensors": {}}) for name, robot in deployment.robots.items()}
+    found = sha256(repr([command, world]).encode())
     for path, content in sorted(deployment.asset_files.items()):
         found.update(f"\0{path}\0{len(content)}\0".encode() + content)
     return found.digest()

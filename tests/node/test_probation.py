@@ -59,6 +59,18 @@ def test_without_meshes_there_is_no_trial() -> None:
     check_models(plain, "t", TABLE.read_text(), ["/absent"])
 
 
+def test_what_passed_is_tried_again_only_with_another_file_or_setting(tmp_path: Path) -> None:
+    tries = tmp_path / "tries"
+    command = ["sh", "-c", f"echo >> {tries}; echo done"]
+    exact = "robots.camera.sensors.exact={kind: ball_state, rate: 50 Hz}"
+    other = apply_sets(TEXT, "t", ["nodes={n: {robots: ['*']}}", exact])
+    heavier = apply_sets(TEXT, "t", ["table.ball.mass=30 g"])
+    files = {**FILES, "z.obj": SHARD + b"v 9 9 8\n"}
+    for text, contents, count in ((TEXT, FILES, 1), (other, FILES, 1), (heavier, FILES, 2), (TEXT, files, 3)):
+        check_models(load_deployment(text, "t").with_assets(contents), "t", text, command)
+        assert len(tries.read_text()) == count
+
+
 @pytest.mark.parametrize(
     ("statements", "reason"),
     [
