@@ -164,7 +164,6 @@ SHELLS = {
     "capture/start_frame.py",
     "capture/contents.py",
     "capture/cut.py",
-    "capture/damage.py",
     "vhub/recording/file.py",
     "capture/info.py",
     "vhub/recording/unfinished.py",
