@@ -64,8 +64,6 @@ CLOCK_WARN_NS: Final = 50_000_000
 TIME_ERROR: Final = 5
 """Result of `adjtimex` for a clock that is not synchronized."""
 PYTHON_TESTED: Final = (3, 11)
-IMPORT_S: Final = 20.0
-"""Time limit for importing the players' modules: half of a host's limit for all its answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,7 +383,7 @@ def _players(case: Case) -> Iterator[_Said]:
     """Whether the classes of the players that are to run on this machine can be imported here."""
     deployment, elsewhere = case.deployment, places(case.deployment)
     here = [name for name in sorted(deployment.players) if elsewhere.get(name) == case.host]
-    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here, IMPORT_S)}
+    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here)}
     for name in here:
         found, path = wrong.get(name), deployment.players[name].class_
         if found is None:
