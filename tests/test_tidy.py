@@ -73,7 +73,7 @@ SHELLS = {
     "console/server/serving.py",
     "node/physics/mesh_trial.py",
     "node/main.py",
-    "node/slow_forms.py",
+    "node/slow_watch.py",
     "deployment/assets.py",
     "deployment/text/files.py",
     "runtime/transport/certificate_files.py",
