@@ -437,16 +437,14 @@ def connect(
     world: str = "",
     timeout_s: float = CONNECT_S,
     pki: str | os.PathLike[str] | None = None,
-    password: str = "",
 ) -> Client:
     """Connect to a run as the declared client `name`; `address` is the vHub's radio plane, `tcp/HOST:PORT`.
 
     `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
-    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key; or, where clients
-    have passwords, `password` is the one of the user `name`. Raises BadValue for a name or address that is none,
-    CertificateError for a folder without valid certificates, ConnectionFailed without an answer within
-    `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will not have the
-    client.
+    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. Raises BadValue for
+    a name or address that is none, CertificateError for a folder without valid certificates, ConnectionFailed without
+    an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will
+    not have the client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)
@@ -454,7 +452,7 @@ def connect(
     from foosim.runtime.transport.session import ConnectError, Session
     from foosim.runtime.transport.settings import Security
 
-    credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}", password)
+    credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}")
     security = None if credentials is None else Security(credentials)
     begun_ns = time.monotonic_ns()
     try:

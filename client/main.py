@@ -97,7 +97,7 @@ class PlayerShell:
 def run_players(
     names: Sequence[str], connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None
 ) -> int:
-    """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
+    """Run declared players until their run ends; return the exit code. `pki` has their certificates.
 
     Raises Refused when no vHub can be reached.
     """
