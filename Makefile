@@ -90,7 +90,7 @@ lint: environment
 	@$(PYTHON) -m ruff check .
 	@mkdir -p .typecheck/foosim
 	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
-	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench docs/*.py)
+	@$(PYTHON) -m mypy .typecheck/foosim tests examples $(wildcard bench docs/*.py)
 
 # What is checked in is what this makes: tests/console/test_page_bundle.py compares.
 page:

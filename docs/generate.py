@@ -32,7 +32,6 @@ from foosim.deployment.json_schema import deployment_schema, deployment_schema_t
 from foosim.fitting.main import app as table_app
 from foosim.node.main import app as node_app
 from foosim.protocol.channels import CHANNELS
-from foosim.rehearsal.learning.main import app as learn_app
 from foosim.runtime.health import app as probe_app
 from foosim.vhub.main import app as vhub_app
 
@@ -44,7 +43,6 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-replay": replay_app,
     "foosim-net": net_app,
     "foosim-table": table_app,
-    "foosim-learn": learn_app,
     "foosim-console": console_app,
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,

@@ -103,6 +103,7 @@ SHELLS = {
     "analysis/export.py",
     "rehearsal/interrupts.py",
     "analysis/new_file.py",
+    "analysis/picture.py",
     "replay/main.py",
     "cli/replay_play.py",
     "replay/address_file.py",
@@ -115,12 +116,8 @@ SHELLS = {
     "rehearsal/env/episodes.py",
     "rehearsal/env/parallel.py",
     "rehearsal/env/single.py",
-    "rehearsal/learning/main.py",
-    "rehearsal/learning/shots.py",
-    "rehearsal/learning/training.py",
     "rehearsal/simulation.py",
     "players/learning/exercises.py",
-    "players/learning/learned.py",
     "cli/rehearse.py",
     "cli/replay.py",
     "cli/replay_report.py",
@@ -233,7 +230,7 @@ def modules() -> list[str]:
 
 
 SOURCES = python_files(*PACKAGES)
-ALL_FILES = python_files(*PACKAGES, "tests", "bench")
+ALL_FILES = python_files(*PACKAGES, "tests", "bench", "examples")
 
 
 def edges() -> dict[str, set[str]]:

@@ -147,7 +147,6 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     assert len(list(installed.packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
     learning = installed.packages / "foosim" / "players" / "learning"
     assert (learning / "table.yaml").read_text() == (ROOT / "deploy" / "table.yaml").read_text()
-    assert (learning / "defend_shot.json").is_file()
     scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert "foosim-supervisor" in scripts
     assert not [script for script in scripts if not (installed.commands / script).is_file()]
