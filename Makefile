@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/laws -x'
 
-PACKAGES := analysis capture cli client common console deployment fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
+PACKAGES := analysis capture cli client common console deployment door fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 N ?=
@@ -89,7 +89,8 @@ slow: environment
 lint: environment
 	@$(PYTHON) -m ruff check .
 	@mkdir -p .typecheck/foosim
-	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
+	@for package in $(filter-out door,$(PACKAGES)); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
+	@ln -sfn $(patsubst %,../../%,$(wildcard door/*.py door/py.typed)) .typecheck/foosim
 	@$(PYTHON) -m mypy .typecheck/foosim tests examples $(wildcard bench docs/*.py)
 
 # What is checked in is what this makes: tests/console/test_page_bundle.py compares.

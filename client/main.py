@@ -18,7 +18,7 @@ from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import report_failure
 from foosim.client.loading import load_player, look_in
-from foosim.client.player import PlayerLoop
+from foosim.client.playing import PlayerLoop
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity

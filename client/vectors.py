@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.client.packets import Outgoing
+from foosim.client.player import Packet
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
@@ -166,7 +166,7 @@ class CommandVector:
         self._highs = [column.high for column in self.columns]
         self._pack = Struct(f"<{len(self.columns)}d").pack
 
-    def packets(self, vector: Vector) -> list[Outgoing]:
+    def packets(self, vector: Vector) -> list[Packet]:
         """Return the commands of a vector as packets, in the order of (robot, channel).
 
         Numbers beyond a column's limits are clipped to these. Raises BadValue for a vector of another shape, and for a
@@ -183,4 +183,4 @@ class CommandVector:
             for number, low, high in zip(numbers, self._lows, self._highs, strict=True)
         ]
         packed = self._pack(*clipped)  # as a codec packs numbers
-        return [Outgoing(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]
+        return [Packet(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]

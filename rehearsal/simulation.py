@@ -11,12 +11,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from msgspec import Struct
-
 from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
-from foosim.client.packets import Outgoing
-from foosim.client.player import Acting, Sample
+from foosim.client.player import Commands, Packet, Sample
+from foosim.client.playing import Acting
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.channel_kinds import channel_codec
@@ -110,7 +108,7 @@ class Agent:
                     continue
             newest[pair] = packet
 
-    def numbered(self, packets: Sequence[Outgoing], now_ns: int) -> list[Sent]:
+    def numbered(self, packets: Sequence[Packet], now_ns: int) -> list[Sent]:
         """Return packets as they are sent, with the client's numbers."""
         first = self.sequence + 1
         self.sequence += len(packets)
@@ -287,14 +285,14 @@ class Simulation:
 
     # --- stepping ----------------------------------------------------------------------------------------------------
 
-    def step(self, commands: Mapping[str, Struct] | None = None, ticks: int = 1) -> dict[Pair, Sample]:
+    def step(self, commands: Commands | None = None, ticks: int = 1) -> dict[Pair, Sample]:
         """Send commands, by robot, at the present frame, and compute some ticks; return the readings then.
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
-        takes no such command, BadValue for a command that is not finite, ComponentError and
+        takes no such command, BadValue for names and numbers that are none of a command, ComponentError and
         PlayerError for a form and a player that fail.
         """
-        by_agent: dict[str, list[Outgoing]] = {name: [] for name in self.agents}
+        by_agent: dict[str, list[Packet]] = {name: [] for name in self.agents}
         if self._encoder is None:
             self._encoder = CommandEncoder(self.declared)
         for robot, command in sorted((commands or {}).items()):
@@ -302,11 +300,11 @@ class Simulation:
             if owner is None:
                 theirs = [robot for agent in self.agents.values() for robot in agent.robots]
                 raise UnknownName("no robot of an agent", robot, theirs)
-            by_agent[owner].append(Outgoing(robot, *self._encoder.encode(robot, command)))
+            by_agent[owner] += [Packet(robot, *one) for one in self._encoder.encode(robot, command)]
         self.advance(by_agent, ticks)
         return self.readings
 
-    def advance(self, packets: Mapping[str, Sequence[Outgoing]], ticks: int) -> None:
+    def advance(self, packets: Mapping[str, Sequence[Packet]], ticks: int) -> None:
         """Send packets of agents, by name, at the present frame, and compute some ticks."""
         if ticks < 1:
             raise BadValue("ticks of a step are 1 or more", ticks)

@@ -25,7 +25,7 @@ FILES_OF_A_FOLDER_MAX = 16
 # The packages from the top to the bottom: each may import what stands below it. Those in one line do not import each
 # other.
 ORDER: list[set[str]] = [
-    {"cli"},
+    {"cli", "door"},
     {"replay", "console"},
     {"process"},
     {"analysis", "launcher", "rehearsal"},
@@ -75,6 +75,8 @@ SHELLS = {
     "node/main.py",
     "node/slow_watch.py",
     "deployment/assets.py",
+    "door/_capture.py",
+    "door/_rehearse.py",
     "deployment/text/files.py",
     "runtime/transport/certificate_files.py",
     "runtime/transport/certificate_folder.py",
@@ -226,7 +228,7 @@ def _imports_of(path: Path) -> Iterator[tuple[int, str]]:
 def modules() -> list[str]:
     """The dotted names of all modules and packages under foosim."""
     dotted = (".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)) for path in python_files(*PACKAGES))
-    return [name.removesuffix(".__init__") for name in dotted]
+    return [name.replace("foosim.door", "foosim").removesuffix(".__init__") for name in dotted]
 
 
 SOURCES = python_files(*PACKAGES)
@@ -539,8 +541,10 @@ def are_floats(values: list[ast.expr]) -> bool:
 def test_every_package_folder_is_in_the_wheel() -> None:
     folders = sorted({path.parent.relative_to(ROOT) for path in SOURCES})
     setuptools = PYPROJECT["tool"]["setuptools"]
-    assert setuptools["packages"] == [".".join(("foosim", *folder.parts)) for folder in folders]
-    assert setuptools["package-dir"] == {f"foosim.{package}": package for package in PACKAGES}
+    named = sorted(".".join(("foosim", *folder.parts)).removesuffix(".door") for folder in folders)
+    assert setuptools["packages"] == named
+    dirs = {f"foosim.{package}".removesuffix(".door"): package for package in PACKAGES}
+    assert list(setuptools["package-dir"].items()) == sorted(dirs.items())
     assert [folder for folder in folders if not (ROOT / folder / "__init__.py").is_file()] == []
     assert [package for package in PACKAGES if not (ROOT / package / "py.typed").is_file()] == []
 

@@ -140,11 +140,12 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 
 def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     files = [path.relative_to(ROOT) for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
-    modules = [".".join(("foosim", *file.with_suffix("").parts)).removesuffix(".__init__") for file in files]
+    modules = [".".join(("foosim", *file.with_suffix("").parts)) for file in files]
+    modules = [name.replace("foosim.door", "foosim").removesuffix(".__init__") for name in modules]
     program = "from importlib import import_module as get; import sys\n"
     program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
     run(installed.commands / "python", "-I", "-W", "error", "-c", program, *modules, cwd=tmp_path)
-    assert len(list(installed.packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
+    assert len(list(installed.packages.glob("foosim/**/py.typed"))) == len(PACKAGES)
     learning = installed.packages / "foosim" / "players" / "learning"
     assert (learning / "table.yaml").read_text() == (ROOT / "deploy" / "table.yaml").read_text()
     scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)

@@ -95,7 +95,8 @@ def test_a_player_that_raises_ends_the_match_with_its_place(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "stumbling.py").write_text(
-        "class Stumbling:\n"
+        "from foosim import Player\n"
+        "class Stumbling(Player):\n"
         "    def __init__(self, deployment, parameters):\n"
         "        if deployment.seed == 2:\n"
         "            raise RuntimeError('no shoes')\n"

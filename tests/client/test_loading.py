@@ -19,9 +19,9 @@ from foosim.players.football import Team
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWN = """
-class Acts:
-    def __init__(self, deployment, parameters):
-        pass
+from foosim import Player
+
+class Acts(Player):
     def act(self, tick, samples):
         return {}
 
@@ -35,6 +35,9 @@ class Takes(Acts):
 class Bare:
     def act(self, tick, samples):
         return {}
+
+class Nothing(Player):
+    pass
 
 class Hears(Acts):
     def act(self, tick):
@@ -79,14 +82,15 @@ CASES = [
     ("own_typo:Acts",
      "importing own_typo failed: SyntaxError: invalid syntax (FOLDER/own_typo.py:2: def act(self tick))"),
     ("own_leaver:Acts", "importing own_leaver failed: SystemExit: 0 (FOLDER/own_leaver.py:3: sys.exit(0))"),
-    ("own_player:Atcs", "there is no class Atcs in own_player (there are: Acts, Bare, Hears, Takes),"
+    ("own_player:Atcs", "there is no class Atcs in own_player (there are: Acts, Bare, Hears, Nothing, Takes),"
      " nearest is 'own_player:Acts'"),
-    ("own_player:Sits", "Sits is no class with a method act(tick, samples)"),
-    ("own_player:number", "number is no class with a method act(tick, samples)"),
+    ("own_player:Sits", "Sits is no Player (FOLDER/own_player.py:8: class Sits:);"
+     " write: from foosim import Player, class Sits(Player):"),
+    ("own_player:number", "number is no class, 3"),
     ("own_player:Takes", "Takes cannot be made with (deployment, parameters): its constructor takes (deployment)"),
-    ("own_player:Bare", "Bare cannot be made with (deployment, parameters): its constructor takes ()"),
+    ("own_player:Bare", "Bare is no Player (FOLDER/own_player.py:15: class Bare:);"
+     " write: from foosim import Player, class Bare(Player):"),
     ("own_player:Hears", "Hears.act cannot be called with (tick, samples): it takes (self, tick)"),
-    ("foosim.client.player:Player", "Player is abstract: none can be made of it"),
 ]  # fmt: skip
 
 
@@ -101,6 +105,7 @@ def test_a_class_that_cannot_be_loaded_says_why(modules: Path, path: str, text: 
 def test_a_class_is_found_by_its_path() -> None:
     assert load_player("foosim.players.football:Team") is Team
     assert load_player("own_player:Acts").__name__ == "Acts"
+    assert load_player("own_player:Nothing")(None, {}).act(0, {}) == {}, "all hooks of a player are empty"
 
 
 # --- before a run begins ---------------------------------------------------------------------------------------------
@@ -115,7 +120,7 @@ def test_all_that_cannot_play_is_found_and_what_modules_print_goes_to_standard_e
     assert {path: fault.problem.partition(" (")[0] for path, fault in faults.items()} == {
         "own_leaver:A": "importing own_leaver failed: SystemExit: 0",
         "own_player:Atcs": "there is no class Atcs in own_player",
-        "own_player:Sits": "Sits is no class with a method act(tick, samples)",
+        "own_player:Sits": "Sits is no Player",
         "foosim.players.football:Teem": "there is no class Teem in foosim.players.football",
     }
     printed = capfd.readouterr()
@@ -144,7 +149,7 @@ def test_a_rehearsal_refuses_all_that_cannot_play_before_it_begins(modules: Path
     red, blue = ran.exception.problems
     assert red == (
         "--set:1:26: players.player-red.class: there is no class Atcs in own_player"
-        " (there are: Acts, Bare, Hears, Takes), 'own_player:Atcs', nearest is 'own_player:Acts'"
+        " (there are: Acts, Bare, Hears, Nothing, Takes), 'own_player:Atcs', nearest is 'own_player:Acts'"
     )
     assert blue.startswith(
         "--set:2:27: players.player-blue.class: importing own_importer failed: ModuleNotFoundError: "

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import yaml
 from msgspec import Struct
 
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Player, Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import write_yaml
@@ -33,7 +33,7 @@ CHARGER: Final = {"tag": "vehicle", "radius": "1 m", "power": "2 W"}
 LINK: Final = {"id": "all", "from": "*", "to": "*", "delay": "2 ms", "loss": "10 %", "order": "fifo"}
 
 
-class Driver:
+class Driver(Player):
     """Gives each of its robots another command in each of its turns, drawn within a range and its actuator's limits."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

@@ -18,8 +18,7 @@ import pytest
 import yaml
 
 from foosim.capture.rows import PacketRow
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.journals import ENDINGS, Ending
@@ -45,11 +44,11 @@ Rows = dict[Key, PacketRow]
 """By source, destination, channel, time of sending, count within the channel (a client's number) and copy."""
 
 
-class Ear:
+class Ear(Player):
     """Hears what it is told to, and has a rod answer twice at each of its turns."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
-        self.echoes = [Outgoing("red.goal", "echo", bytes([n])) for n in range(int(parameters.get("echoes", 0)))]
+        self.echoes = [Packet("red.goal", "echo", bytes([n])) for n in range(int(parameters.get("echoes", 0)))]
 
     def act(self, tick: int, samples: Samples) -> Turn:
         return Turn({}, self.echoes)

@@ -113,8 +113,8 @@ def test_a_game_ends_when_the_rules_say_so() -> None:
 
 def test_a_player_that_fails_ends_its_game_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "tripping.py").write_text(
-        "class Tripping:\n"
-        "    def __init__(self, deployment, parameters): pass\n"
+        "from foosim import Player\n"
+        "class Tripping(Player):\n"
         "    def act(self, tick, samples): raise RuntimeError('fell over')\n"
     )
     monkeypatch.syspath_prepend(tmp_path)

@@ -85,7 +85,7 @@ def test_without_a_network_it_has_the_digests_of_a_node_that_gets_the_same_comma
                 for robot, command in sorted(commands.items()):
                     number += 1
                     now_ns = tick * deployment.tick_ns
-                    what = encoder.encode(robot, command)
+                    (what,) = encoder.encode(robot, command)
                     delivered.append(Delivered(now_ns, "waver", number, 0, robot, *what))
                 simulation.step(commands)
                 assert simulation.frame.digest == replica.step([], delivered).digest, tick

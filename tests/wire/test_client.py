@@ -44,7 +44,7 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
                 goal.actuators["position"].set(slide=float("nan"), spin=0.0)
             goal.actuators["position"].set(slide=-0.1, spin=0.0)
             goal.actuators["position"].set(slide=0.1, spin=0.5)
-            attack.actuators["position"].set(slide=-0.05, spin=0.0)
+            client.command({"red.attack": {"slide": -0.05, "spin": 0.0}})
             if len(seen) == TICKS:
                 break
         assert seen == list(range(0, 5 * TICKS, 5))
@@ -74,8 +74,8 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
     info = house.info()
     assert_strangers_are_refused(info)
     with (
-        connect(info.radio, "ear", timeout_s=PATIENCE_S) as client,
-        connect(info.radio, "hand", timeout_s=PATIENCE_S) as other,
+        connect("run:newest", "ear", timeout_s=PATIENCE_S) as client,
+        connect(f"run:{info.run}", "hand", timeout_s=PATIENCE_S) as other,
     ):
         with pytest.raises(ConnectionRefused, match="a client hand is already here"):
             connect(info.radio, "hand", timeout_s=PATIENCE_S)

@@ -108,8 +108,8 @@ def test_a_player_that_raises_in_a_process_with_the_others_ends_the_run_in_order
     house: House, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "wrong.py").write_text(
-        "class Wrong:\n"
-        "    def __init__(self, deployment, parameters): pass\n"
+        "from foosim import Player\n"
+        "class Wrong(Player):\n"
         "    def act(self, tick, samples):\n"
         "        raise ValueError('too much')\n"
     )
