@@ -11,7 +11,6 @@ from foosim.common.finding import Finding
 from foosim.common.keyed_random import chance_threshold
 from foosim.common.spec_base import Force, Length, Mass, Rate, SpecBase, Speed, Spin, Torque, default
 from foosim.common.units import Quantity
-from foosim.vhub.network.custom_models import Judged
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
 from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import Mounted
@@ -49,6 +48,10 @@ from foosim.world.matter.physics import Physics
 from foosim.world.placing import MountedAt
 from foosim.world.scene import ORIGIN, Body, Box, Capsule, Cylinder, Link, Shape, Sphere
 from foosim.world.spec import WorldSpec
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from foosim.vhub.network.custom_models import Judged
 
 __all__ = [
     "CONCRETE",
@@ -131,3 +134,14 @@ __all__ = [
     "sin",
     "units",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Import what link models return where one is made: no other component needs the network."""
+    import sys
+
+    if name == "Judged":
+        from foosim.vhub.network import custom_models
+
+        return custom_models.Judged
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

@@ -18,6 +18,7 @@ from foosim.client.playing import Acting
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
@@ -28,6 +29,7 @@ from foosim.rehearsal.stepping.world import SteppedWorld
 from foosim.vhub.network.memory import Joining
 from foosim.world.assembly.initial_state import first_frame
 from foosim.world.assembly.world import build_scene, world_status
+from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.scene import Scene
@@ -191,6 +193,8 @@ class Simulation:
         self._world: SteppedWorld | None = None
         self._carrier: Carrier
         self._residents: dict[str, Resident] = {}
+        self._events: list[Disrupt] = []
+        """What happens to the network from the next frame on."""
         self.reset(start, seed)
 
     # --- beginning ---------------------------------------------------------------------------------------------------
@@ -230,6 +234,7 @@ class Simulation:
             joining.append(Joining(name, period, hears, offset, arrivals))
         carrier = EmulatedNetwork if self._has_network else Bypass
         self._carrier = carrier(deployment, frame.tick, joining)
+        self._events = []
         self._open()
 
     # --- what there is -----------------------------------------------------------------------------------------------
@@ -304,6 +309,24 @@ class Simulation:
         self.advance(by_agent, ticks)
         return self.readings
 
+    def partition(self, *groups: str | Sequence[str]) -> None:
+        """Cut the network between groups of endpoints, names or selectors, from the next frame on until `heal`:
+        `partition("red.*", ["camera", "player-blue"])`.
+
+        Raises BadEvent for groups that are none, BadValue without a network.
+        """
+        self._disrupt({"partition": [[group] if isinstance(group, str) else [*group] for group in groups]})
+
+    def heal(self) -> None:
+        """End all partitions and clogs, and take back changed settings, from the next frame on. Raises BadValue."""
+        self._disrupt({"heal": "all"})
+
+    def _disrupt(self, event: dict[str, Any]) -> None:
+        if not self._has_network:
+            raise BadValue("this simulation has no network: network=True gives it one")
+        effective_ns = (self.tick + 1) * self.deployment.tick_ns
+        self._events.append(Disrupt(event_text(self.deployment, event, effective_ns)))
+
     def advance(self, packets: Mapping[str, Sequence[Packet]], ticks: int) -> None:
         """Send packets of agents, by name, at the present frame, and compute some ticks."""
         if ticks < 1:
@@ -318,7 +341,8 @@ class Simulation:
     def _open(self) -> None:
         """Let robots send and clients hear what reaches them at the frame; residents that are due act in `_close`."""
         world = self._stepped
-        self._due = self._carrier.open(world.frame, world.sense())
+        self._due = self._carrier.open(world.frame, world.sense(), self._events)
+        self._events = []
         for name, agent in self.agents.items():
             arrived = self._carrier.take(name)
             if arrived:

@@ -44,7 +44,7 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
                 goal.actuators["position"].set(slide=float("nan"), spin=0.0)
             goal.actuators["position"].set(slide=-0.1, spin=0.0)
             goal.actuators["position"].set(slide=0.1, spin=0.5)
-            client.command({"red.attack": {"slide": -0.05, "spin": 0.0}})
+            client.command({"blue.attack": {"slide": -0.05, "spin": 0.0}})
             if len(seen) == TICKS:
                 break
         assert seen == list(range(0, 5 * TICKS, 5))
