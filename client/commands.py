@@ -5,7 +5,7 @@ A command is numbers by name, numbers in their order, or the command's own type;
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from typing import Any, NamedTuple
 
 from msgspec import Struct, structs
@@ -20,7 +20,8 @@ from foosim.world.forms.registry import find_component
 
 
 class Taker(NamedTuple):
-    """What takes commands of a robot: its channel, how they are packed, and the joints that the deployment names."""
+    """What takes commands of a robot: its channel, how they are packed, and the joints that the deployment names where
+    a command is a number for each."""
 
     robot: str
     channel: str
@@ -46,6 +47,8 @@ class Taker(NamedTuple):
                 raise self.wrong(f"a {type(command).__name__} is none of these")
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
+        if self.joints:
+            self._check_length(getattr(command, codec.fields[0].name))
         try:
             return codec.encode_checked(command)
         except BadValue as error:
@@ -76,15 +79,18 @@ class Taker(NamedTuple):
             raise self.wrong("not numbers by name or in their order", command)
         values: list[Any] = [*command]  # type: ignore[misc]
         fields = self.codec.fields
-        if len(fields) == 1 and fields[0].is_several and not (len(values) == 1 and _is_sequence(values[0])):
-            if self.joints and len(values) != len(self.joints):
-                raise self._of_another_length(values)
+        if _is_several(self.codec) and not (len(values) == 1 and _is_sequence(values[0])):
             return {fields[0].name: tuple(values)}
         if len(values) != len(fields):
             raise self._of_another_length(values)
         return {field.name: value for field, value in zip(fields, values, strict=True)}
 
-    def _of_another_length(self, values: Sequence[object]) -> BadValue:
+    def _check_length(self, values: object) -> None:
+        """Raise BadValue for numbers that are not one for each joint; what is no sequence is none of a command."""
+        if isinstance(values, Sized) and len(values) != len(self.joints):
+            raise self._of_another_length(values)
+
+    def _of_another_length(self, values: Sized) -> BadValue:
         return self.wrong(f"{len(values)} number{'' if len(values) == 1 else 's'} given")
 
 
@@ -138,16 +144,20 @@ class CommandEncoder:
         return self._takers[robot]
 
     def _takers_of(self, robot: str) -> tuple[Taker, ...]:
-        actuators = sorted(self._deployment.robots[robot].actuators.items())
-        return tuple(
-            [Taker(robot, name, codec_of(its.kind, "actuator"), self._joints_of(its)) for name, its in actuators]
-        )
-
-    def _joints_of(self, settings: Any) -> Sequence[str]:
-        return find_component("actuator", settings.kind).joints_named(settings) or ()
+        takers = []
+        for channel, its in sorted(self._deployment.robots[robot].actuators.items()):
+            codec = codec_of(its.kind, "actuator")
+            named = find_component("actuator", its.kind).joints_named(its) if _is_several(codec) else None
+            takers.append(Taker(robot, channel, codec, named or ()))
+        return tuple(takers)
 
     def _takes(self, robot: str, command: Struct) -> bool:
         return any(isinstance(command, one.codec.kind) for one in self.actuators(robot))
+
+
+def _is_several(codec: PayloadCodec) -> bool:
+    """Whether a value is several numbers under one name, as a number for each joint."""
+    return len(codec.fields) == 1 and codec.fields[0].is_several
 
 
 def _is_command(value: object) -> bool:

@@ -350,6 +350,9 @@ def test_joints_that_the_deployment_does_not_name_are_commanded_in_their_order(n
         ({"reech": (0.1, 0.2)}, f"{REACH}; {TURN}: arm has no such actuator (there are: reach, turn), 'reech',"
          " nearest is 'reach'"),
         ({"reach": (0.1,)}, f"{REACH}: 1 number given"),
+        ({"reach": {"positions": (0.1, 0.2, 0.3)}}, f"{REACH}: 3 numbers given"),
+        ({"reach": JointPositions((0.1,))}, f"{REACH}: 1 number given"),
+        (JointPositions((0.1,)), f"{REACH}: 1 number given"),
         ({"reach": {"elbow": 0.1}}, f"{REACH}: shoulder is missing"),
         ({"reach": {"shoulder": 0.0, "elbwo": 0.1}}, f"{REACH}: no such name, 'elbwo', nearest is 'elbow'"),
         ({"reach": {"position": (0.1, 0.2)}}, f"{REACH}: no such name, 'position'"),
