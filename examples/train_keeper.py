@@ -22,11 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.client.player import Commands, Samples
-from foosim.deployment.schema import Deployment
-from foosim.players.learning.exercises import TABLE
-from foosim.rehearsal.simulation import Simulation
-from foosim.world.actuators.rod_position import Command
+from foosim import Commands, Deployment, Player, Samples, Simulation
+from foosim.env import TABLE
 
 HIDDEN, INPUTS = 4, 5
 WEIGHTS = HIDDEN * INPUTS + HIDDEN + INPUTS
@@ -68,7 +65,7 @@ def environment() -> Any:
     """Return this process's environment: red's goalkeeper against one shot."""
     import gymnasium
 
-    return gymnasium.make("foosim.rehearsal.env:foosim/DefendShot-v0", ages=True)
+    return gymnasium.make("foosim.env:foosim/DefendShot-v0", ages=True)
 
 
 def mean_reward(weights: Numbers, seeds: Sequence[int]) -> float:
@@ -107,7 +104,7 @@ def train(pool: Executor, asked: argparse.Namespace) -> tuple[Numbers, list[floa
     return best, rewards
 
 
-class Keeper:
+class Keeper(Player):
     """A player: a team's trained goalkeeper; its other rods rest. Parameters: `team`, and the file `weights`."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -122,7 +119,7 @@ class Keeper:
         if ball is None:
             return {}
         place = np.array([self.side * ball.value.x, ball.value.y])
-        return {self.rod: Command(slide=self.policy.slide(tick * self.tick_s, ball.sent_ns * 1e-9, place), spin=0.0)}
+        return {self.rod: {"slide": self.policy.slide(tick * self.tick_s, ball.sent_ns * 1e-9, place), "spin": 0.0}}
 
 
 def match(player: str, parameters: Mapping[str, str], minutes: float) -> str:

@@ -51,13 +51,15 @@ def test_a_wrong_name_is_python_s_own_error_with_the_nearest(tmp_path: Path) -> 
 
 
 def imports_in(source: str) -> list[str]:
-    """The modules of foosim that a program imports."""
+    """The modules of foosim that a program imports, or has Gymnasium import."""
     found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom):
             found.append(str(node.module))
         elif isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.Constant) and ":foosim/" in str(node.value):
+            found.append(str(node.value).partition(":")[0])
     return [name for name in found if name.partition(".")[0] == "foosim"]
 
 

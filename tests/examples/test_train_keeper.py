@@ -60,5 +60,5 @@ def test_it_plays_for_either_team(example: Any, tmp_path: Path) -> None:
             commands = keeper.act(tick + 1, {("camera", "ball"): sample})
         ((rod, command),) = commands.items()
         assert rod == f"{team}.goal"
-        slides[team] = command.slide
+        slides[team] = command["slide"]
     assert slides["red"] == slides["blue"] != 0.0
