@@ -29,7 +29,7 @@ help:
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make numbers the bits and errors of elementary functions, the statistics of noise, over millions of values'
-	@echo 'make forms   each form in a world of its own: the laws by further seeds, settings at their limits'
+	@echo 'make forms   each form in a world of its own: the laws, by several seeds, and settings at their limits'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/how-to/testing.md'
 	@echo 'make lint    ruff and mypy alone'
