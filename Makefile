@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/laws -x'
 
-PACKAGES := analysis capture cli client common console deployment fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
+PACKAGES := analysis capture cli client common console deployment door fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 N ?=
@@ -29,7 +29,7 @@ help:
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make numbers the bits and errors of elementary functions, the statistics of noise, over millions of values'
-	@echo 'make forms   each form in a world of its own: the laws by further seeds, settings at their limits'
+	@echo 'make forms   each form in a world of its own: the laws, by several seeds, and settings at their limits'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/how-to/testing.md'
 	@echo 'make lint    ruff and mypy alone'
@@ -89,8 +89,9 @@ slow: environment
 lint: environment
 	@$(PYTHON) -m ruff check .
 	@mkdir -p .typecheck/foosim
-	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
-	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench docs/*.py)
+	@for package in $(filter-out door,$(PACKAGES)); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
+	@ln -sfn $(patsubst %,../../%,$(wildcard door/*.py door/py.typed)) .typecheck/foosim
+	@$(PYTHON) -m mypy .typecheck/foosim tests examples $(wildcard bench docs/*.py)
 
 # What is checked in is what this makes: tests/console/test_page_bundle.py compares.
 page:

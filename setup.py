@@ -26,7 +26,7 @@ from setuptools.errors import BaseError, CCompilerError
 PROJECT: Final = tomllib.loads(Path("pyproject.toml").read_text())["tool"]
 COMPILED: Final = PROJECT["foosim"]["compiled"]
 """What `[tool.foosim.compiled]` of pyproject.toml lists: modules by path, each with what it does so often."""
-PACKAGES: Final = tuple(PROJECT["setuptools"]["package-dir"].values())
+PACKAGES: Final = PROJECT["setuptools"]["package-dir"]
 TYPED: Final = Path("build", "typed")
 """Where the folders stand under the name that they are imported by, for mypyc."""
 MADE: Final = Path("build", "c")
@@ -165,8 +165,9 @@ def extensions() -> list[Extension]:
     say(f"mypyc makes C of {len(COMPILED)} modules; FOOSIM_COMPILE=never leaves that out")
     begun_s = time.monotonic()
     shutil.rmtree(TYPED, ignore_errors=True)
-    for package in PACKAGES:
-        shutil.copytree(package, TYPED / "foosim" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for package, folder in PACKAGES.items():
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(folder, TYPED / package.replace(".", "/"), ignore=ignored, dirs_exist_ok=True)
     os.environ["MYPYPATH"] = str(TYPED)
     files = [str(TYPED / "foosim" / f"{name}.py") for name in COMPILED]
     library, *shims = mypycify([*MYPY, *files], multi_file=True, target_dir=str(MADE), group_name=LIBRARY)

@@ -15,10 +15,19 @@ class Existing(Refused):
 
 
 def check_name(option: str, out: Path, what: str, endings: tuple[str, ...]) -> None:
-    """Raise BadValue for a name with another ending than `what` has, Existing where something is there already."""
+    """Raise BadValue for a name with another ending than `what` has, before anything is computed for it.
+
+    Raises Existing where something is there already, and Failed where no file can be made.
+    """
     if out.suffix.lower() not in endings:
         raise BadValue(f"{option}: the name of {what} ends with {' or '.join(endings)}", str(out))
     check_absent(out)
+    part = _part(out)
+    try:
+        part.touch()
+        part.unlink()
+    except OSError as error:
+        raise _failed(out, error) from None
 
 
 def check_absent(out: Path) -> None:
@@ -33,12 +42,21 @@ def new_file(out: Path) -> Iterator[Path]:
     Raises Existing, and Failed when it cannot be written.
     """
     check_absent(out)
-    part = out.with_name(f".{out.name}.part")
+    part = _part(out)
     try:
         yield part
         part.rename(out)
     except OSError as error:
-        raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None
+        raise _failed(out, error) from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def _part(out: Path) -> Path:
+    """Return the name of a file until it is whole."""
+    return out.with_name(f".{out.name}.part")
+
+
+def _failed(out: Path, error: OSError) -> Failed:
+    return Failed(f"{out}: cannot be written, {error.strerror or error}")

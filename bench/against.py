@@ -89,7 +89,7 @@ Measure = Callable[[Path], float]
 def _environment(tree: Path) -> dict[str, str]:
     """Return the environment in which `foosim` is that of a tree: as it is installed beside it, if it is.
 
-    Else it is a folder with a link for each of its packages.
+    Else it is a folder with a link for each of its packages, and for each file of the door, which is `foosim` itself.
     """
     installed = tree.parent / f"{tree.name}-installed"
     if installed.exists():
@@ -99,8 +99,10 @@ def _environment(tree: Path) -> dict[str, str]:
     if not packages.exists():
         packages.mkdir(parents=True)
         for package in tree.glob("*/__init__.py"):
-            if package.parent.name not in ("tests", "bench"):
+            if package.parent.name not in ("tests", "bench", "door"):
                 (packages / package.parent.name).symlink_to(package.parent)
+        for file in tree.glob("door/*.*"):
+            (packages / file.name).symlink_to(file)
     return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
 
 

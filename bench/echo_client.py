@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from foosim.client.core import ClientCore
-from foosim.client.packets import Outgoing
+from foosim.client.player import Packet
 from foosim.common import limits
 from foosim.common.names import CHANNEL_ECHO
 from foosim.protocol import channels
@@ -117,7 +117,7 @@ class EchoClient:
     def _send(self, numbers: range | list[int]) -> None:
         now_ns = time.monotonic_ns()
         robots = self._robots
-        packets = [Outgoing(robots[number % len(robots)], CHANNEL_ECHO, PAYLOAD.pack(number)) for number in numbers]
+        packets = [Packet(robots[number % len(robots)], CHANNEL_ECHO, PAYLOAD.pack(number)) for number in numbers]
         self._sent_ns.update(dict.fromkeys(numbers, now_ns))
         self.core.send(packets, now_ns)
         self._perform()

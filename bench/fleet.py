@@ -18,7 +18,7 @@ import yaml
 
 from bench.bare_tick import bare_tick_us
 from bench.meter import Meter
-from foosim.client.player import Samples
+from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
@@ -35,7 +35,7 @@ SENSORS: Final = {
 }
 
 
-class Rounds:
+class Rounds(Player):
     """Sends each robot round a circle of its own, once; it may hear of them, and does nothing with that."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

@@ -23,7 +23,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from foosim.capture.mcap.checks import CHECKS, CaptureError, compare, read_metadata
-from foosim.capture.mcap.format import MAGIC, RECORD, Content, McapFile, Message, chunk_records
+from foosim.capture.mcap.format import MAGIC, RECORD, Content, Damaged, McapFile, Message, chunk_records
 
 FOOTER: Final = struct.Struct("<BQQQI8s")
 """The last record of an MCAP file, and the magic bytes behind it."""
@@ -155,7 +155,7 @@ def end_of(path: Path) -> dict[str, str] | None:
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
     except (EndOfFile, struct.error, ValueError) as error:
-        raise CaptureError(f"{path}: a damaged summary, {error}") from None
+        raise Damaged(f"{path}: a damaged summary, {error}") from None
 
 
 def has_end(last: Path) -> bool:

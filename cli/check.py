@@ -31,7 +31,7 @@ def check(
     """Check a deployment file, with settings if there are any.
 
     Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
-    classes of the players on this machine are imported, in a separate process.
+    classes of the players on this machine are imported.
     """
     from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan

@@ -10,19 +10,22 @@ import typer
 
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
+from foosim.common.names import is_name
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.hosts.ssh import Remote
 from foosim.launcher.pki import certificates
 from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
-from foosim.launcher.pki.hosts import files_for, passwords_of, send_files
+from foosim.launcher.pki.hosts import files_for, send_files
+from foosim.protocol import identity
 from foosim.protocol.identity import identities_of
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 
 app = new_app()
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of certificates.", show_default=False)]
+Days = Annotated[int, typer.Option(help="Validity of a new certificate, in days.")]
 
 
 @app.callback()
@@ -30,6 +33,7 @@ def pki_group() -> None:
     """Create and check the certificates of a run on several machines.
 
     `init` creates the certificates of a deployment's processes; with --send it copies them to the deployment's hosts.
+    `client` creates that of one client.
     Any other machine needs ca.pem, and the certificates and keys of its own processes. ca.key stays where
     certificates are issued.
 
@@ -46,7 +50,7 @@ def init(
         list[str] | None,
         typer.Option(help="A name or address of this machine, for supervisor and vHub; may be repeated."),
     ] = None,
-    days: Annotated[int, typer.Option(help="Validity of a new certificate, in days.")] = LEAF_DAYS,
+    days: Days = LEAF_DAYS,
     within: Annotated[
         int, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Renew certificates that expire within this many days.")
     ] = RENEW_DAYS,
@@ -57,18 +61,15 @@ def init(
     Existing files are kept, so the command can be repeated after a change of the deployment. A certificate that
     expires soon, has another root or lacks a --host is renewed, with the same key, validity, names and addresses; a
     process reads it at its next start. The certificates of supervisor and vHub have this machine's names and every
-    --host. With `access: {radio: password}` in the deployment each client gets a random password in
-    client.NAME.password.
+    --host.
 
-    --send copies ca.pem, and the certificates, keys and passwords of the processes on a host, through ssh into the
-    folder in the host's `pki` setting. Files there are replaced; only the ssh user can read them.
+    --send copies ca.pem, and the certificates and keys of the processes on a host, through ssh into the folder in the
+    host's `pki` setting. Files there are replaced; only the ssh user can read them.
     """
     deployment = load_deployment(read_source_file(file), str(file))
     if send and not places(deployment):
         raise BadValue("--send: the deployment places nothing on a host", deployment.world)
-    everybody = identities_of(deployment)
-    passwords = passwords_of(deployment, everybody)
-    for path in certificates.provide(folder, everybody, passwords, host or (), days, within):
+    for path in certificates.provide(folder, identities_of(deployment), host or (), days, within):
         print(path)
     if send and not _is_sent(deployment, folder):
         raise typer.Exit(FAILED)
@@ -84,6 +85,26 @@ def _is_sent(deployment: Deployment, folder: Path) -> bool:
             failures.append(str(failure))
             print(failure, file=sys.stderr)
     return not failures
+
+
+@app.command()
+def client(
+    folder: Folder,
+    name: Annotated[
+        list[str], typer.Argument(metavar="NAME...", help="Names of clients, as in the deployment.", show_default=False)
+    ],
+    days: Days = LEAF_DAYS,
+) -> None:
+    """Create a certificate and key for a client, client.NAME.pem and client.NAME.key.
+
+    The client needs these two and ca.pem. A run lets it in if its deployment declares the client or player NAME.
+    Nothing is overwritten, and DIR needs the ca.key of the run's root.
+    """
+    for one in name:
+        if not is_name(one):
+            raise BadValue("not a name for a client", one)
+    for path in certificates.issue(folder, [identity.client(one) for one in name], days=days):
+        print(path)
 
 
 @app.command()

@@ -1,11 +1,11 @@
 """The library for programs and people: connect to a run, read its robots, command them, send and receive packets.
 
-    with connect("tcp/127.0.0.1:7450", "hand") as client:
+    with connect("run:newest", "hand") as client:
         client.subscribe("red.attack", "encoder")
         robot = client.robots["red.attack"]
         for tick in client.lockstep(100):
             sample = robot.sensors["encoder"]
-            robot.actuators["position"].set(slide=0.05, spin=0.0)
+            client.command({"red.attack": {"slide": 0.05, "spin": 0.0}})
 
 The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
 until the loop's body is done; after `listen` it goes on by itself. Everything travels as packets through the emulated
@@ -29,8 +29,9 @@ from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
 from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded
-from foosim.client.packets import Outgoing, check_packet, check_subscription
-from foosim.client.player import NS_PER_S, Newest, Sample
+from foosim.client.packets import check_packet, check_subscription
+from foosim.client.player import Commands, Packet, Sample
+from foosim.client.playing import NS_PER_S, Newest
 from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.common.names import is_name
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
     from foosim.runtime.transport.session import Session
 
 CONNECT_S: Final = 10.0
+RUN: Final = "run:"
+"""Before the name of a run in an address."""
+NEWEST: Final = "newest"
 _LOG: Final = logging.getLogger("foosim.client")
 _LOG.addHandler(logging.NullHandler())
 
@@ -56,7 +60,7 @@ Turns = tuple[int, int, tuple[tuple[str, str], ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class Arrived:
     """One packet that has reached the client. `sent_ns` and `due_ns` are simulated time."""
 
     source: str
@@ -104,18 +108,19 @@ class Actuator:
     @property
     def fields(self) -> tuple[Field, ...]:
         """The numbers of its commands, in their order, with their units."""
-        return self._client._encoder.codec(self._robot, self._channel).fields
+        return self._client._encoder.actuator(self._robot, self._channel).codec.fields
 
     def set(self, *numbers: float, **named: float) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
 
         What the numbers of its kind mean `foosim components actuator KIND` says. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
-        its last command. Raises BadValue for numbers that are not finite, or not those of a command;
-        NotJoined, RunEnded.
+        its last command. Raises BadValue for names and numbers that are none of a command; NotJoined, RunEnded.
         """
-        payload = self._client._encoder.encode_numbers(self._robot, self._channel, numbers, named)
-        self._client._command(self._robot, self._channel, payload)
+        taker = self._client._encoder.actuator(self._robot, self._channel)
+        if numbers and named:
+            raise taker.wrong("numbers are given by name or in their order, not both")
+        self._client._command(self._robot, self._channel, taker.pack(named or numbers))
 
 
 class Robot:
@@ -213,7 +218,7 @@ class Client:
         self.name: Final = link.core.name
         self.deployment: Final = deployment
         """The run's deployment: the whole world in SI units."""
-        self.packets: list[Packet] = []
+        self.packets: list[Arrived] = []
         """What has arrived with the last tick of `lockstep` or the last `receive`, in order of arrival."""
         robots = {name: Robot(self, name) for name in deployment.robots}
         self.robots: Final[Named[Robot]] = Named("unknown robot", robots, robots.__getitem__)
@@ -224,10 +229,10 @@ class Client:
         self._period: int | None = None
         self._turns: Turns = (0, 0, ())
         """As it has joined."""
-        self._commands: dict[tuple[str, str], Outgoing] = {}
+        self._commands: dict[tuple[str, str], Packet] = {}
         """By robot and channel."""
         self._encoder = CommandEncoder(deployment)
-        self._outgoing: deque[Outgoing] = deque()
+        self._outgoing: deque[Packet] = deque()
 
     # --- what it is --------------------------------------------------------------------------------------------------
 
@@ -285,13 +290,23 @@ class Client:
 
     # --- packets -----------------------------------------------------------------------------------------------------
 
+    def command(self, commands: Commands) -> None:
+        """Command robots, by name: `{"red.goal": {"slide": 0.05, "spin": 0.0}}`; see `Actuator.set`.
+
+        Raises UnknownName for a robot or an actuator, BadValue for names and numbers that are none of a command;
+        NotJoined, RunEnded.
+        """
+        for robot, command in sorted(commands.items()):
+            for channel, payload in self._encoder.encode(robot, command):
+                self._command(robot, channel, payload)
+
     def send(self, destination: str, channel: str, payload: bytes) -> None:
         """Send opaque bytes to a robot's (or another client's) channel; to an empty destination: see `broadcast`.
 
         After `listen` at once, in lockstep with the tick. Delivery is not confirmed. Raises UnknownName
         for a destination, PacketError for a size, NotJoined, RunEnded and ConnectionFailed.
         """
-        packet = Outgoing(destination, channel, bytes(payload))
+        packet = Packet(destination, channel, bytes(payload))
         check_packet(self.deployment, packet)
         self._check_sending()
         if self._period:
@@ -309,7 +324,7 @@ class Client:
         """
         self.send("", channel, payload)
 
-    def receive(self, timeout_s: float = 1.0) -> list[Packet]:
+    def receive(self, timeout_s: float = 1.0) -> list[Arrived]:
         """After `listen`: return what has arrived, waiting for it up to `timeout_s` of wall time.
 
         The list is empty when nothing has. Sensors have their new samples with it. Raises RunEnded once the run is over
@@ -395,7 +410,7 @@ class Client:
     def _command(self, robot: str, channel: str, payload: bytes) -> None:
         if self._period:
             self._check_sending()
-            self._commands[robot, channel] = Outgoing(robot, channel, payload)
+            self._commands[robot, channel] = Packet(robot, channel, payload)
         else:
             self.send(robot, channel, payload)
 
@@ -418,7 +433,7 @@ class Client:
         self._newest.take(received)
         self.packets = [self._packet(packet) for packet in received]
 
-    def _packet(self, packet: Received) -> Packet:
+    def _packet(self, packet: Received) -> Arrived:
         value: Value | None = packet.payload
         if packet.source in self.deployment.robots:
             try:
@@ -426,9 +441,20 @@ class Client:
                 value = packet.payload if codec is None else codec.decode(packet.payload)
             except (UnknownName, Malformed):
                 value = None
-        return Packet(
+        return Arrived(
             packet.source, packet.channel, packet.sequence, packet.sent_ns, packet.due_ns, packet.payload, value
         )
+
+
+def _address_of(name: str) -> str:
+    """Return the address of the radio plane of a run of this user. Raises NoRun."""
+    from foosim.runtime.run_folder import NoRun, find_run
+
+    folder = find_run(None if name == NEWEST else name)
+    info = folder.info()
+    if info is None or not info.radio:
+        raise NoRun(f"run {folder.name} is starting, and its vHub does not listen yet")
+    return info.radio
 
 
 def connect(
@@ -437,24 +463,27 @@ def connect(
     world: str = "",
     timeout_s: float = CONNECT_S,
     pki: str | os.PathLike[str] | None = None,
-    password: str = "",
 ) -> Client:
-    """Connect to a run as the declared client `name`; `address` is the vHub's radio plane, `tcp/HOST:PORT`.
+    """Connect to a run as the declared client `name`.
 
+    `address` is `run:newest` or `run:NAME` for a run of this user on this machine, else that of the vHub's radio plane,
+    `tcp/HOST:PORT`.
     `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
-    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key; or, where clients
-    have passwords, `password` is the one of the user `name`. Raises BadValue for a name or address that is none,
-    CertificateError for a folder without valid certificates, ConnectionFailed without an answer within
-    `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will not have the
-    client.
+    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. Raises BadValue for
+    a name or address that is none, CertificateError for a folder without valid certificates, NoRun for a run that is
+    not live, ConnectionFailed without
+    an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will
+    not have the client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)
+    if address.startswith(RUN):
+        address = _address_of(address.removeprefix(RUN))
     from foosim.runtime.transport.certificates import load_credentials
     from foosim.runtime.transport.session import ConnectError, Session
     from foosim.runtime.transport.settings import Security
 
-    credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}", password)
+    credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}")
     security = None if credentials is None else Security(credentials)
     begun_ns = time.monotonic_ns()
     try:

@@ -1,26 +1,97 @@
-"""Commands of robots as packets: on the channel of the actuator that takes them. Limits are the node's to apply."""
+"""Commands of robots as packets: on the channel of the actuator that takes them. Limits are the node's to apply.
+
+A command is numbers by name, numbers in their order, or the command's own type; one function turns each into bytes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from collections.abc import Mapping, Sequence, Sized
+from typing import Any, NamedTuple
 
-from msgspec import Struct
+from msgspec import Struct, structs
 
-from foosim.common.errors import BadValue, UnknownName
+from foosim.client.player import Command
+from foosim.common.errors import ABSENT, BadValue, UnknownName
+from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-
-NO_NAMES: Final[Mapping[str, Any]] = MappingProxyType({})
+from foosim.world.forms.registry import find_component
 
 
 class Taker(NamedTuple):
-    """What takes commands of a robot: its channel, and how they are packed."""
+    """What takes commands of a robot: its channel, how they are packed, and the joints that the deployment names where
+    a command is a number for each."""
 
+    robot: str
     channel: str
     codec: PayloadCodec
+    joints: Sequence[str]
+
+    @property
+    def takes(self) -> str:
+        """What it takes, in words: its fields with their units."""
+        whose = f" of {', '.join(self.joints)}" if self.joints else ""
+        fields = [f"{field.name}{f' ({field.unit})' if field.unit else ''}{whose}" for field in self.codec.fields]
+        return f"{self.robot}/{self.channel} takes {', '.join(fields)}"
+
+    def wrong(self, what: str, value: object = ABSENT, nearest: str | None = None) -> BadValue:
+        """Return the error of a command."""
+        return BadValue(f"{self.takes}: {what}", value, None if nearest is None else repr(nearest))
+
+    def pack(self, command: object) -> bytes:
+        """Return the payload of a command. Raises BadValue for one that is none of this actuator."""
+        codec = self.codec
+        if not isinstance(command, codec.kind):
+            if isinstance(command, Struct):
+                raise self.wrong(f"a {type(command).__name__} is none of these")
+            values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
+            command = codec.kind(**values)
+        if self.joints:
+            self._check_length(getattr(command, codec.fields[0].name))
+        try:
+            return codec.encode_checked(command)
+        except BadValue as error:
+            what = error.problem.removeprefix(f"{codec.name}.").removeprefix(f"{codec.name}: ")
+            raise type(error)(f"{self.takes}: {what}", error.value) from None
+
+    def _named(self, command: Mapping[Any, Any]) -> dict[str, Any]:
+        """Return the values of fields, or of joints, by their names."""
+        fields = [field.name for field in self.codec.fields]
+        if self.joints and not any(name in fields for name in command):
+            self._check_names(command, self.joints, self.joints)
+            return {fields[0]: tuple(command[joint] for joint in self.joints)}
+        needed = [field.name for field in structs.fields(self.codec.kind) if field.required]
+        self._check_names(command, fields, needed)
+        return dict(command)
+
+    def _check_names(self, command: Mapping[Any, Any], valid: Sequence[str], needed: Sequence[str]) -> None:
+        for name in command:
+            if name not in valid:
+                raise self.wrong("no such name", name, nearest_name(name, valid))
+        missing = [name for name in needed if name not in command]
+        if missing:
+            raise self.wrong(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
+
+    def _ordered(self, command: object) -> dict[str, Any]:
+        """Return the values of fields from numbers in their order."""
+        if not _is_sequence(command):
+            raise self.wrong("not numbers by name or in their order", command)
+        values: list[Any] = [*command]  # type: ignore[misc]
+        fields = self.codec.fields
+        if _is_several(self.codec) and not (len(values) == 1 and _is_sequence(values[0])):
+            return {fields[0].name: tuple(values)}
+        if len(values) != len(fields):
+            raise self._of_another_length(values)
+        return {field.name: value for field, value in zip(fields, values, strict=True)}
+
+    def _check_length(self, values: object) -> None:
+        """Raise BadValue for numbers that are not one for each joint; what is no sequence is none of a command."""
+        if isinstance(values, Sized) and len(values) != len(self.joints):
+            raise self._of_another_length(values)
+
+    def _of_another_length(self, values: Sized) -> BadValue:
+        return self.wrong(f"{len(values)} number{'' if len(values) == 1 else 's'} given")
 
 
 class CommandEncoder:
@@ -30,36 +101,39 @@ class CommandEncoder:
         self._deployment = deployment
         self._takers: dict[str, tuple[Taker, ...]] = {}
 
-    def encode(self, robot: str, command: Struct) -> tuple[str, bytes]:
-        """Return the channel and the payload of a command.
+    def encode(self, robot: str, command: Command) -> list[tuple[str, bytes]]:
+        """Return the channels and the payloads of a robot's command, in the channels' order.
 
-        A node clamps numbers beyond the actuator's limits, and counts such commands. Raises UnknownName for a robot
-        without an actuator that takes it, BadValue for numbers that are not finite, or not as many as the command has.
+        Of a robot with several actuators a command is commands by actuator, or of a type that one of them takes. A
+        node clamps numbers beyond the actuator's limits, and counts such commands. Raises UnknownName for a robot or
+        an actuator that takes no such command, BadValue for names and numbers that are none of a command.
         """
-        for one in self.actuators(robot):
-            if isinstance(command, one.codec.kind):
-                return one.channel, one.codec.encode_checked(command)
-        fitting = [name for name in self._deployment.robots if self._takes(name, command)]
-        raise UnknownName(f"no robot that takes a {type(command).__name__}", robot, fitting)
+        takers = self.actuators(robot)
+        if isinstance(command, Struct):
+            for one in takers:
+                if isinstance(command, one.codec.kind):
+                    return [(one.channel, one.pack(command))]
+            fitting = [name for name in self._deployment.robots if self._takes(name, command)]
+            raise UnknownName(f"no robot that takes a {type(command).__name__}", robot, fitting)
+        if not takers:
+            commanded = [name for name, its in self._deployment.robots.items() if its.actuators]
+            raise UnknownName("no robot that takes commands", robot, commanded)
+        if isinstance(command, Mapping) and command and all(map(_is_command, command.values())):
+            channels = {one.channel: one for one in takers}
+            if len(takers) > 1 or all(name in channels for name in command):
+                return [(name, self.actuator(robot, name).pack(its)) for name, its in sorted(command.items())]
+        if len(takers) > 1:
+            each = "; ".join(one.takes for one in takers)
+            raise BadValue(f"{each}: a command of {robot} is commands by actuator", command)
+        return [(takers[0].channel, takers[0].pack(command))]
 
-    def encode_numbers(
-        self, robot: str, channel: str, numbers: Sequence[Any], named: Mapping[str, Any] = NO_NAMES
-    ) -> bytes:
-        """Return the payload of the command with these numbers on a robot's channel. Raises as `encode` does."""
-        one = self._actuator(robot, channel)
-        names = [field.name for field in one.codec.fields]
-        given = {**dict(zip(names, numbers, strict=False)), **named}
-        if len(numbers) + len(named) != len(names) or {*given} != {*names}:
-            said = ", ".join([*map(str, numbers), *named]) or "nothing"
-            raise BadValue(f"{robot}'s {channel} takes {', '.join(names)}, each once", said)
-        return one.codec.encode_checked(one.codec.kind(**given))
-
-    def codec(self, robot: str, channel: str) -> PayloadCodec:
-        """Return the codec of the commands on a robot's channel, which is an actuator's."""
-        return self._actuator(robot, channel).codec
-
-    def _actuator(self, robot: str, channel: str) -> Taker:
-        return next(one for one in self.actuators(robot) if one.channel == channel)
+    def actuator(self, robot: str, channel: str) -> Taker:
+        """Return a robot's actuator. Raises UnknownName."""
+        takers = {one.channel: one for one in self.actuators(robot)}
+        if channel not in takers:
+            each = "; ".join(one.takes for one in takers.values())
+            raise UnknownName(f"{each}: {robot} has no such actuator", channel, takers)
+        return takers[channel]
 
     def actuators(self, robot: str) -> tuple[Taker, ...]:
         """Return what takes commands of a robot; of what is none, nothing."""
@@ -70,8 +144,29 @@ class CommandEncoder:
         return self._takers[robot]
 
     def _takers_of(self, robot: str) -> tuple[Taker, ...]:
-        actuators = sorted(self._deployment.robots[robot].actuators.items())
-        return tuple([Taker(name, codec_of(its.kind, "actuator")) for name, its in actuators])
+        takers = []
+        for channel, its in sorted(self._deployment.robots[robot].actuators.items()):
+            codec = codec_of(its.kind, "actuator")
+            named = find_component("actuator", its.kind).joints_named(its) if _is_several(codec) else None
+            takers.append(Taker(robot, channel, codec, named or ()))
+        return tuple(takers)
 
     def _takes(self, robot: str, command: Struct) -> bool:
         return any(isinstance(command, one.codec.kind) for one in self.actuators(robot))
+
+
+def _is_several(codec: PayloadCodec) -> bool:
+    """Whether a value is several numbers under one name, as a number for each joint."""
+    return len(codec.fields) == 1 and codec.fields[0].is_several
+
+
+def _is_command(value: object) -> bool:
+    """Whether a value by an actuator's name may be its command: it is no number."""
+    return isinstance(value, Struct | Mapping) or _is_sequence(value)
+
+
+def _is_sequence(value: object) -> bool:
+    """Whether that is a list, a tuple, an array: numbers in an order."""
+    if isinstance(value, str | bytes):
+        return False
+    return isinstance(value, Sequence) or (hasattr(value, "__array__") and getattr(value, "ndim", 0) == 1)

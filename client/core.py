@@ -17,7 +17,8 @@ from typing import Any, Final
 from msgspec import structs
 
 from foosim.client.errors import PacketError
-from foosim.client.packets import Outgoing, check_packet, check_subscription, split
+from foosim.client.packets import check_packet, check_subscription, split
+from foosim.client.player import Packet
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import load_deployment
@@ -227,7 +228,7 @@ class ClientCore:
         self._again_after_ns = AGAIN_NS
         self._again_ns = self._now_ns + AGAIN_NS
 
-    def done(self, packets: Sequence[Outgoing]) -> None:
+    def done(self, packets: Sequence[Packet]) -> None:
         """Answer the open Go with the packets of its tick. Raises UnknownName or PacketError, and the Go stays open."""
         assert self.go is not None and self.deployment is not None, "nothing to answer"
         # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
@@ -241,7 +242,7 @@ class ClientCore:
         self._answered += 1
         self._publish(payload)
 
-    def send(self, packets: Sequence[Outgoing], stamp_ns: int = 0) -> None:
+    def send(self, packets: Sequence[Packet], stamp_ns: int = 0) -> None:
         """Send packets, free-running; `stamp_ns` is the client's own clock. Raises UnknownName or PacketError.
 
         Where more than `UPLINKS_KEPT_MAX` would wait to be recorded, they are not sent, and counted.
@@ -393,7 +394,7 @@ class ClientCore:
 
     # --- sending ---------------------------------------------------------------------------------------------------
 
-    def _numbered(self, packets: Sequence[Outgoing], stamp_ns: int) -> list[Sent]:
+    def _numbered(self, packets: Sequence[Packet], stamp_ns: int) -> list[Sent]:
         """Return the packets with their numbers, checked; nothing is counted yet."""
         if len(packets) > limits.PACKETS_PER_MESSAGE_MAX:
             raise PacketError(f"{len(packets)} packets at once, at most {limits.PACKETS_PER_MESSAGE_MAX} are allowed")

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, describe, in_library, place_of
+from foosim.client.player import Player
 from foosim.common.errors import CHOICES_MAX
 from foosim.common.names import class_path_of, nearest_name
 
@@ -84,15 +85,16 @@ def _not_found(path: str, missing: str) -> ClassPathError:
 
 
 def _may_be_player(value: object) -> bool:
-    return inspect.isclass(value) and hasattr(value, "act") and not getattr(value, "_is_protocol", False)
+    return inspect.isclass(value) and hasattr(value, "act") and value is not Player
 
 
 def _unfit(made: Any, name: str) -> str:
     """Return why something is no player's class, as far as that shows without calling it; empty when it may be one."""
-    call: Any = getattr(made, "act", None)
-    if not inspect.isclass(made) or not callable(call):
-        return f"{name} is no class with a method act(tick, samples)"
-    if inspect.isabstract(made) or getattr(made, "_is_protocol", False):
+    if not inspect.isclass(made):
+        return f"{name} is no class, {made!r:.{SHOWN_MAX}}"
+    if not issubclass(made, Player):
+        return f"{name} is no Player{_place_of_class(made)}; write: from foosim import Player, class {name}(Player):"
+    if inspect.isabstract(made):
         return f"{name} is abstract: none can be made of it"
     taken = _other_arguments(made, *MADE_WITH)
     if taken:
@@ -101,8 +103,17 @@ def _unfit(made: Any, name: str) -> str:
     if inspect.isfunction(method):
         taken = _other_arguments(method, "self", *CALLED_WITH)
     elif isinstance(method, staticmethod | classmethod):
-        taken = _other_arguments(call, *CALLED_WITH)
+        taken = _other_arguments(made.act, *CALLED_WITH)
     return f"{name}.act cannot be called with ({', '.join(CALLED_WITH)}): it takes {taken}" if taken else ""
+
+
+def _place_of_class(made: type) -> str:
+    """Return ` (file:line: code)` of a class; empty where its source is not there."""
+    try:
+        lines, line = inspect.getsourcelines(made)
+        return f" ({inspect.getsourcefile(made)}:{line}: {lines[0].strip()})"
+    except (OSError, TypeError):
+        return ""
 
 
 def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:

@@ -18,7 +18,7 @@ from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import report_failure
 from foosim.client.loading import load_player, look_in
-from foosim.client.player import PlayerLoop
+from foosim.client.playing import PlayerLoop
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity
@@ -97,7 +97,7 @@ class PlayerShell:
 def run_players(
     names: Sequence[str], connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None
 ) -> int:
-    """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
+    """Run declared players until their run ends; return the exit code. `pki` has their certificates.
 
     Raises Refused when no vHub can be reached.
     """

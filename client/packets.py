@@ -6,9 +6,10 @@ The vHub refuses and counts invalid ones; these checks raise an error at the sen
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Final, NamedTuple
+from typing import Final
 
 from foosim.client.errors import PacketError
+from foosim.client.player import Packet
 from foosim.common import limits
 from foosim.common.errors import UnknownName
 from foosim.common.names import CHANNEL_ECHO
@@ -19,18 +20,7 @@ PACKET_OVERHEAD_BYTES: Final = 128
 """No packet takes more in a message beside its payload: two names and two numbers."""
 
 
-class Outgoing(NamedTuple):
-    """A packet to send: opaque `payload` to a robot's (or another client's) `channel`.
-
-    An empty `destination` is a broadcast: it goes to all who have subscribed to this client's `channel`.
-    """
-
-    destination: str
-    channel: str
-    payload: bytes
-
-
-def check_packet(deployment: Deployment, packet: Outgoing) -> None:
+def check_packet(deployment: Deployment, packet: Packet) -> None:
     """Raise UnknownName or PacketError for a packet that could not be sent."""
     destination = packet.destination
     known = deployment.robots, deployment.players, deployment.clients

@@ -1,33 +1,33 @@
-"""Players: the interface of a controller's class, and the loop that runs it.
+"""Players: the base class of a controller, what it gets, and what it returns.
 
-A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
-robots that it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
-process `foosim role player` and the rehearsal run this same loop.
+The deployment names a player's class as `module:Class`, with a rate, the robots that it may command and hear, and
+parameters. `client.playing` runs it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from msgspec import Struct
+from mypy_extensions import mypyc_attr
 
-from foosim.client.commands import CommandEncoder
-from foosim.client.core import NEVER_NS, ClientCore
-from foosim.client.errors import PacketError, PlayerError
-from foosim.client.failing import Unanswered, failed
-from foosim.client.loading import load_player
-from foosim.client.packets import Outgoing, check_packet
-from foosim.common.errors import Malformed, Refused, UnknownName
-from foosim.deployment.channel_kinds import channel_codec
-from foosim.deployment.schema import Deployment
-from foosim.deployment.schema import Player as Declaration
-from foosim.protocol.messages import Received
-from foosim.world.forms.failures import place_of_method
-from foosim.world.forms.payloads import PayloadCodec, Value
+from foosim.world.forms.payloads import Value
 
-NS_PER_S: Final = 1_000_000_000
+if TYPE_CHECKING:
+    from foosim.deployment.schema import Deployment
+
+
+class Packet(NamedTuple):
+    """A packet to send: opaque `payload` to a robot's (or another client's) `channel`.
+
+    An empty `destination` is a broadcast: it goes to all who have subscribed to this client's `channel`.
+    """
+
+    destination: str
+    channel: str
+    payload: bytes
 
 
 class Sample(NamedTuple):
@@ -41,219 +41,34 @@ class Sample(NamedTuple):
     value: Value
 
 
-Samples = Mapping[tuple[str, str], Sample]
+Samples: TypeAlias = Mapping[tuple[str, str], Sample]
 """The newest sample of each (endpoint, channel) so far; a channel without one is absent."""
-Commands = Mapping[str, Struct]
-"""Commands by robot name, of the type that the robot's actuator takes; a robot without one keeps its last command."""
+Command: TypeAlias = Struct | Mapping[str, Any] | Sequence[Any]
+"""A command of a robot: numbers by name, `{"slide": 0.05, "spin": 0.0}`, or in their order, or the command's own type.
+Of a robot with several actuators, commands by actuator: `{"drive": {...}, "arm": {...}}`."""
+Commands: TypeAlias = Mapping[str, Command]
+"""Commands by robot; a robot without one keeps its last command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Result of a player that also sends packets: its commands, and the packets in the order of sending.
-
-    A packet without a destination is a broadcast to all subscribers of the player's channel.
-    """
+    """Result of a player that also sends packets: its commands, and the packets in the order of sending."""
 
     commands: Commands
-    packets: Sequence[Outgoing] = ()
+    packets: Sequence[Packet] = ()
 
 
-class Player(Protocol):
-    """A controller. It sees packets only: samples are as old as the network made them, and some never come."""
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Player:
+    """A controller: derive from it and override what is needed. It sees packets only: samples are as old as the network
+    made them, and some never come."""
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        """Called once, with the checked deployment and the player's `parameters` in it."""
 
     def act(self, tick: int, samples: Samples) -> Commands | Turn:
         """Return commands at `tick`, or a Turn that has packets, too.
 
         Equal calls in equal order must give equal results: use no clock, no dice.
         """
-
-
-PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
-"""Makes a player from the deployment and its own parameters; usually the player's class."""
-
-
-class Newest:
-    """Keeps the newest sample of each channel by sending time; packets may arrive out of order."""
-
-    def __init__(self, codecs: Mapping[tuple[str, str], PayloadCodec | None]) -> None:
-        """`codecs` are those of each (endpoint, channel), None for bytes; packets of others are ignored."""
-        self.samples: dict[tuple[str, str], Sample] = {}
-        self.malformed = 0
-        """Samples that did not fit their channel."""
-        self._codecs = codecs
-
-    def take(self, packets: Iterable[Received]) -> None:
-        """Take packets in order of arrival."""
-        for packet in packets:
-            pair = (packet.source, packet.channel)
-            known = self.samples.get(pair)
-            if pair not in self._codecs or (known is not None and known.sequence >= packet.sequence):
-                continue
-            codec = self._codecs[pair]
-            try:
-                value = packet.payload if codec is None else codec.decode(packet.payload)
-            except Malformed:
-                self.malformed += 1
-                continue
-            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
-
-
-class Acting:
-    """The player that a deployment declares under a name, made, and what it has heard: `act` is one turn of it."""
-
-    def __init__(
-        self, deployment: Deployment, name: str, load: Callable[[str], PlayerFactory] = load_player, tick: int = -1
-    ) -> None:
-        """`tick` is the newest tick that is known, for messages.
-
-        Raises PlayerError for a name that is not declared, and for a player that cannot be loaded or made.
-        """
-        if name not in deployment.players:
-            raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
-        self.name = name
-        self.declared: Declaration = deployment.players[name]
-        self.hears = deployment.heard_by(name)
-        """The (endpoint, channel) that it subscribes to."""
-        self._deployment = deployment
-        self.player = self._make(load, tick)
-        self._encoder = CommandEncoder(deployment)
-        self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in self.hears})
-
-    def _make(self, load: Callable[[str], PlayerFactory], tick: int) -> Player:
-        """Make the player that is declared."""
-        factory = load(self.declared.class_)
-        try:
-            return factory(self._deployment, self.declared.parameters)
-        except Refused as error:
-            raise PlayerError(f"player {self.name}: {error}") from error
-        except (KeyboardInterrupt, Unanswered):
-            raise
-        except BaseException as error:
-            when = f"at tick {tick}" if tick >= 0 else "before its first tick"
-            raise failed(f"{self.name} failed {when}", error, _module_of(self.declared)) from error
-
-    def act(self, tick: int) -> list[Outgoing]:
-        """Call the player and check its packets and commands; commands are last, in the robots' name order.
-
-        Raises PlayerError for a player that fails, or gives an invalid command.
-        """
-        where = f"{self.name} failed at tick {tick}"
-        try:
-            turn = self.player.act(tick, self.newest.samples)
-        except (KeyboardInterrupt, Unanswered):
-            raise
-        except BaseException as error:  # SystemExit, too: the run cannot continue without the player
-            raise failed(where, error, _module_of(self.declared)) from error
-        if not isinstance(turn, Turn):
-            turn = Turn(turn)
-        return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
-
-    def _packets(self, packets: object, where: str) -> list[Outgoing]:
-        """Return the player's packets to others, and to its robots' channels."""
-        deployment, declared = self._deployment, self.declared
-        if not isinstance(packets, Sequence) or not all(isinstance(packet, Outgoing) for packet in packets):
-            raise PlayerError(f"{where}: a turn's packets are a {type(packets).__name__}, not a sequence of Outgoing")
-        for packet in packets:
-            to = packet.destination
-            if to in deployment.robots and to not in declared.robots:
-                raise PlayerError(f"{where}: {UnknownName('not one of its robots', to, declared.robots)}")
-            if not isinstance(packet.payload, bytes):
-                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}, not bytes")
-            try:
-                check_packet(deployment, packet)
-            except (UnknownName, PacketError) as error:
-                raise PlayerError(f"{where}: {error}") from error
-        return list(packets)
-
-    def _commands(self, commands: object, where: str) -> list[Outgoing]:
-        """Return a player's commands as packets, in the robots' name order."""
-        declared, encoder = self.declared, self._encoder
-        if not isinstance(commands, Mapping):
-            kind = type(commands).__name__
-            raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to Commands")
-        packets = []
-        for robot, command in sorted(commands.items(), key=_by_name):
-            if robot not in declared.robots:
-                raise PlayerError(f"{where}: {UnknownName('not one of its robots', robot, declared.robots)}")
-            if not isinstance(command, Struct):
-                raise PlayerError(f"{where}: {robot} gets a {type(command).__name__}, not a command")
-            try:
-                packets.append(Outgoing(robot, *encoder.encode(robot, command)))
-            except Refused as error:
-                place = place_of_method(self.player.act)
-                raise PlayerError(f"{where}: command of {robot}: {error}{place}") from error
-        return packets
-
-
-class PlayerLoop:
-    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
-
-    def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
-        self.core = core
-        self.newest = Newest({})
-        self._load = load
-        self._acting: Acting | None = None
-        self._beat_ns = NEVER_NS
-        self._period_ns = 0
-
-    def step(self, now_ns: int) -> None:
-        """Advance: begin after the welcome, then act at each Go or period.
-
-        Raises PlayerError for a player that cannot be loaded, fails, or gives an invalid command.
-        """
-        core = self.core
-        if core.deployment is None or core.ended:
-            return
-        if self._acting is None:
-            self._begin(core.deployment, now_ns)
-        if core.go is not None:
-            self.newest.take(core.go.packets)
-            self._say(core.go.tick, now_ns)
-        elif self._period_ns:
-            self.newest.take(core.arrivals)
-            core.arrivals.clear()
-            if now_ns >= self._beat_ns and not core.is_away:
-                self._say(max(core.tick, 0), now_ns)
-                self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
-
-    @property
-    def player(self) -> Player | None:
-        """The player that acts; None before the welcome."""
-        return None if self._acting is None else self._acting.player
-
-    def deadline_ns(self) -> int:
-        """When a free-running player acts next."""
-        return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
-
-    def _begin(self, deployment: Deployment, now_ns: int) -> None:
-        acting = self._acting = Acting(deployment, self.core.name, self._load, self.core.tick)
-        self.newest, declared = acting.newest, acting.declared
-        if declared.lockstep:
-            period, offset = deployment.turns(declared)
-            self.core.join(period, acting.hears, offset, deployment.arrivals_of(acting.name))
-        else:
-            self.core.join(0, acting.hears)
-            self._period_ns = int(NS_PER_S / declared.rate_hz)
-            self._beat_ns = now_ns + self._period_ns
-
-    def _say(self, tick: int, now_ns: int) -> None:
-        """Call the player and send its packets."""
-        assert self._acting is not None
-        core, packets = self.core, self._acting.act(tick)
-        try:
-            if core.go is not None:
-                core.done(packets)
-            else:
-                core.send(packets, now_ns)
-        except PacketError as error:
-            raise PlayerError(f"{core.name} failed at tick {tick}: {error}") from error
-
-
-def _by_name(item: tuple[object, object]) -> str:
-    """Sort key of a command's name, which may have any type."""
-    return str(item[0])
-
-
-def _module_of(declaration: Declaration) -> str:
-    """The module of a player's class."""
-    return declaration.class_.partition(":")[0]
+        return {}

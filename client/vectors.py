@@ -16,8 +16,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples
+from foosim.client.player import Packet
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
@@ -125,7 +124,6 @@ class ReadingVector:
         self.columns: tuple[Column, ...] = (*table.columns, *aged)
         self.sizes = {part.pair: 8 * (part.stop - part.start) for part in table.parts}
         """The bytes of a payload of each channel."""
-        self._codecs = [part.fitted.codec for part in table.parts]
         self._nothing = [bytes(size) for size in self.sizes.values()]
         self._ages = ages
 
@@ -137,16 +135,6 @@ class ReadingVector:
             return np.frombuffer(b"".join(payloads)).copy()
         ages = np.array([NEVER_S if one is None else (now_ns - one.sent_ns) * 1e-9 for one in found])
         return np.concatenate((np.frombuffer(b"".join(payloads)), ages))
-
-    def of_samples(self, samples: Samples, now_ns: int) -> Vector:
-        """Return the vector of a player's samples, at a time (ns): equal to that of their payloads."""
-        newest = {}
-        for pair, codec in zip(self.pairs, self._codecs, strict=True):
-            sample = samples.get(pair)
-            if sample is not None:
-                payload = codec.encode(sample.value)
-                newest[pair] = Received(pair[0], sample.sequence, 0, pair[1], sample.sent_ns, sample.due_ns, payload)
-        return self.join(newest, now_ns)
 
 
 class CommandVector:
@@ -178,7 +166,7 @@ class CommandVector:
         self._highs = [column.high for column in self.columns]
         self._pack = Struct(f"<{len(self.columns)}d").pack
 
-    def packets(self, vector: Vector) -> list[Outgoing]:
+    def packets(self, vector: Vector) -> list[Packet]:
         """Return the commands of a vector as packets, in the order of (robot, channel).
 
         Numbers beyond a column's limits are clipped to these. Raises BadValue for a vector of another shape, and for a
@@ -195,4 +183,4 @@ class CommandVector:
             for number, low, high in zip(numbers, self._lows, self._highs, strict=True)
         ]
         packed = self._pack(*clipped)  # as a codec packs numbers
-        return [Outgoing(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]
+        return [Packet(robot, channel, packed[start:stop]) for robot, channel, start, stop in self._cuts]

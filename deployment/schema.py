@@ -121,11 +121,10 @@ class Capture(SpecBase):
 
 
 class AccessSpec(SpecBase):
-    """Who may control the run, who may look at it, and how clients prove who they are, in a run with certificates."""
+    """Who may control the run, and who may look at it, in a run with certificates."""
 
     operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
     viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)
-    radio: Literal["certificate", "password"] = "certificate"
 
 
 class Deadlines(SpecBase):

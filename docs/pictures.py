@@ -110,7 +110,7 @@ def go_on_to(page: Page, tick: int) -> None:
 def running(folder: Path) -> Iterator[tuple[int, str]]:
     """Run the table with its console, paused; gives the launcher's process id and the address for who operates."""
     command = (
-        *(Path(sys.executable).parent / "foosim-supervisor", "up", TABLE, "--run", RUN, "--seed", str(SEED)),
+        *(Path(sys.executable).parent / "foosim", "up", TABLE, "--run", RUN, "--seed", str(SEED)),
         *("--pace", SLOW, "--console", "--no-capture", "--json"),
     )
     with (folder / "up.log").open("w") as log:

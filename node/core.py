@@ -262,10 +262,10 @@ class NodeCore:
             stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout, is_watched=self.is_watched)
         return stepper
 
-    def present(self) -> tuple[int, Stepper | None]:
-        """Return the tick that is computed and its stepper; -1 and None without one. Any thread may call this."""
+    def present_tick(self) -> int:
+        """Return the tick that is computed, -1 without one. Any thread may call this."""
         frame, term = self.frame, self._term
-        return (-1, None) if frame is None or term is None else (frame.tick, term.stepper)
+        return -1 if frame is None or term is None else frame.tick
 
     def islands_ahead(self, ticks: int) -> list[tuple[tuple[Entity, ...], tuple[Entity, ...]]]:
         """Return the bodies and movers of islands that this node may have to solve within some ticks."""
@@ -283,9 +283,9 @@ class NodeCore:
             for island in term.assignment.approaching(frame.numbers, self.name, ticks)
         ]
 
-    def slow_form(self, text: str) -> Publish:
+    def slow_tick(self, text: str) -> Publish:
         """Return what tells the supervisor of what takes long at a tick. Any thread may call this."""
-        tick = max(0, self.present()[0])
+        tick = max(0, self.present_tick())
         text = sendable(text)[: limits.TEXT_LENGTH_MAX]
         beat = Heartbeat(self.name, tick, self.epoch, "", "", self.busy, b"", slow=text)
         return Publish(channels.HEARTBEAT, self.name, encode(beat))

@@ -16,7 +16,7 @@ from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
-from foosim.node.slow_forms import SlowForm, SlowWatch
+from foosim.node.slow_watch import SlowWatch
 from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
@@ -50,8 +50,8 @@ class NodeShell:
         self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._shell.watch_router(self._wire, SUPERVISOR)
         self._slow: deque[str] = deque()
-        """Of slow forms, what the supervisor is to be told at the next turn."""
-        self._watch = SlowWatch(self.core.present, self._name_slow)
+        """What the supervisor is to be told of slow ticks at the next turn."""
+        self._watch = SlowWatch(self.core.present_tick, self._name_slow)
 
     def is_over(self) -> bool:
         """Whether the run has ended, or this node leaves it."""
@@ -92,26 +92,25 @@ class NodeShell:
             core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
         while self._slow:
-            core.actions.append(core.slow_form(self._slow.popleft()))
+            core.actions.append(core.slow_tick(self._slow.popleft()))
         core.advance(now_ns)
         self._build()
 
-    def _name_slow(self, form: SlowForm) -> None:
-        """Log a slow form and tell the supervisor, from the thread that watches.
+    def _name_slow(self, text: str) -> None:
+        """Log where a tick takes long and tell the supervisor, from the thread that watches.
 
         That is at once, as it may never end, but in a process of several roles, whose bus has one thread.
         """
-        text = str(form)
         self._shell.log.warning(text)
         if self._wire.is_alone:
-            told = self.core.slow_form(text)
+            told = self.core.slow_tick(text)
             self._wire.put(told.channel, told.name, told.payload)
         else:
             self._slow.append(text)
 
     def _name_miss(self, text: str) -> None:
         """Log that an engine was built within a tick, and tell the supervisor, which names it if the tick is late."""
-        self.core.actions += [Log("info", text), self.core.slow_form(text)]
+        self.core.actions += [Log("info", text), self.core.slow_tick(text)]
 
     def _work(self, now_ns: int) -> bool:
         """Solve the current tick, if there is one to be solved."""

@@ -24,9 +24,9 @@ from foosim.node.physics.touch_log import clear_touches
 from foosim.world.assembly.rest import Rest, wake_edited
 from foosim.world.assembly.standing import Standing
 from foosim.world.assembly.world import World
-from foosim.world.components.fitted import named_modifiers, sensors_of
+from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.view import SensingView, View, WritableView, called_of
+from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame
@@ -100,18 +100,6 @@ class Stepper:
         """Readings with a number that is not finite, which are not sent, by robot and channel."""
         self.quarantined: list[str] = []
         """Who came into quarantine, and why, in words; whoever reads it empties it."""
-
-    def forms(self) -> Iterator[tuple[object, str]]:
-        """Yield the objects that compute ticks beside the engine, and what each is called."""
-        for fitted in self._sensors.values():
-            for one in fitted:
-                yield one.sensor, called_of(f"sensor {one.channel}", one.robot)
-                yield from named_modifiers(one.modifiers)
-        yield from self.world.forms()
-
-    def forms_together(self) -> list[tuple[object, str]]:
-        """Return what computes several sensors or modifiers together, and their names."""
-        return self._sensing.groups()
 
     def sense(self, frame: Frame, robots: Sequence[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         """Return what these robots send at the frame's tick, and what their sensors remember.

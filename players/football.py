@@ -8,10 +8,11 @@ milliseconds ago, and what is commanded happens some milliseconds later.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 from mypy_extensions import mypyc_attr
 
+from foosim.client.player import Commands, Player, Samples
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.players.table.rod import Rod, Sight, View
@@ -19,9 +20,6 @@ from foosim.players.table.senses import Senses, rods_of, team_of
 from foosim.players.table.shot import DOWN, LIFTED, Shots
 from foosim.world.actuators.rod_position import Command
 from foosim.world.parameters.table import LineName, table_of
-
-if TYPE_CHECKING:
-    from foosim.client.player import Commands, Samples
 
 RESTS_M: Final = 0.06
 BEHIND_M: Final = 0.02
@@ -138,7 +136,7 @@ def _striker(deployment: Deployment, team: str) -> list[Hand]:
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Keeper:
+class Keeper(Player):
     """Guards with the goal and defence rods, and clears what it can reach. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -151,7 +149,7 @@ class Keeper:
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Striker:
+class Striker(Player):
     """Takes the ball, aims and shoots low with the midfield and attack rods. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -164,7 +162,7 @@ class Striker:
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Team:
+class Team(Player):
     """A keeper and a striker for one team. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -177,7 +175,7 @@ class Team:
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Passive:
+class Passive(Player):
     """Does nothing: its rods rest. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

@@ -12,15 +12,13 @@ import os
 import struct
 import sys
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
 from foosim.players.table.by_hand import SWING_RAD_MAX, ByHand
 from foosim.players.table.senses import team_of
-
-if TYPE_CHECKING:
-    from foosim.client.player import Commands, Samples
 
 DEVICE: Final = "/dev/input/js0"
 _EVENT: Final = struct.Struct("=IhBB")
@@ -39,7 +37,7 @@ AGAIN_TICKS: Final = 500
 EVENTS_READ: Final = 64
 
 
-class Gamepad:
+class Gamepad(Player):
     """A person with a gamepad. Parameters: `team`, red or blue; `device`, /dev/input/js0 unless it is given.
 
     Raises BadValue where there is no such device, or it cannot be read. Rods stay where they are while it is unplugged.

@@ -13,17 +13,15 @@ import sys
 import termios
 import tty
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
 from foosim.players.table.by_hand import ByHand
 from foosim.players.table.senses import team_of
 from foosim.runtime.keys import is_foreground, split_keys
 from foosim.world.parameters.table import LINE_NAMES
-
-if TYPE_CHECKING:
-    from foosim.client.player import Commands, Samples
 
 SLIDE_M: Final = 0.015
 SWING_RAD: Final = 0.2
@@ -35,7 +33,7 @@ KEYS: Final = (
 )
 
 
-class Keyboard:
+class Keyboard(Player):
     """A person at the terminal that this process was started in. Parameter: `team`, red or blue.
 
     Raises BadValue where there is no such terminal.

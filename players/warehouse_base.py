@@ -10,8 +10,7 @@ from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
 from foosim.players.beacons import FLEET, TELEMETRY, Entry, Telemetry, decode_telemetry, encode_fleet
@@ -25,7 +24,7 @@ ENTRIES_MAX: Final = 30
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Dispatch:
+class Dispatch(Player):
     """The player. Its one parameter is `cell_m`, the patrols' own: both number the spots of the same roadmap."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -57,4 +56,4 @@ class Dispatch:
         known = sorted((now_s - said_s, number) for number, (said_s, _) in self.fleet.items())
         newest = [(age, self.fleet[number][1]) for age, number in known if age <= FORGOTTEN_S][:ENTRIES_MAX]
         entries = [Entry(told.number, told.here, told.goal, age) for age, told in newest]
-        return Turn({}, [Outgoing("", FLEET, encode_fleet(entries))] if entries else [])
+        return Turn({}, [Packet("", FLEET, encode_fleet(entries))] if entries else [])

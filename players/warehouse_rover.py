@@ -15,8 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.schema import Deployment
@@ -118,7 +117,7 @@ class Heard(NamedTuple):
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Patrol:
+class Patrol(Player):
     """The player: one rover's controller. Its knowledge of others comes by radio only."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -315,7 +314,7 @@ class Patrol:
         speed = self.settings.alone_speed if self.is_alone else self.settings.speed
         return self._steering.towards(self._estimate, self._map.spots[self._goal], ranges, speed)
 
-    def _say(self, now_s: float) -> list[Outgoing]:
+    def _say(self, now_s: float) -> list[Packet]:
         """Return the beacon, and the telemetry, when they are due."""
         packets = []
         estimate = self._estimate
@@ -326,11 +325,11 @@ class Patrol:
             visits = tuple((spot, now_s - visited_s) for spot, visited_s in self._visits.items())
             where = estimate.x, estimate.y, estimate.heading, self._here, self._goal
             beacon = Beacon(self.number, *where, self._share, self._seen, visits)
-            packets.append(Outgoing("", BEACON, encode_beacon(beacon)))
+            packets.append(Packet("", BEACON, encode_beacon(beacon)))
         if self.settings.base and now_s >= self._telemetry_due_s:
             self._telemetry_due_s = now_s + TELEMETRY_S
             hears = sum(now_s - known.at_s <= CLAIM_S for known in self.heard.values())
             spots = self._here, self._goal
             told = Telemetry(self.number, estimate.x, estimate.y, self._share, estimate.driven, hears, *spots)
-            packets.append(Outgoing(self.settings.base, TELEMETRY, encode_telemetry(told)))
+            packets.append(Packet(self.settings.base, TELEMETRY, encode_telemetry(told)))
         return packets

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from math import hypot
 from typing import Any, Final
 
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Player, Samples, Turn
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.yard_reports import Heard
@@ -32,7 +32,7 @@ STAY_S: Final = 1.0
 """How long it stays over a lane."""
 
 
-class Arm:
+class Arm(Player):
     """The player. Its parameters are `arm` and the list `scouts`, the robots to which it gives way."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

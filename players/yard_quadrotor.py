@@ -10,8 +10,7 @@ from dataclasses import dataclass, fields
 from math import cos, pi, sin
 from typing import Any, Final
 
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.flight import Flight, Navigation
@@ -63,7 +62,7 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     return settings
 
 
-class Watch:
+class Watch(Player):
     """The player: a quadrotor's controller. It knows where it is from its sensors `imu` and `gps` alone."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -99,7 +98,7 @@ class Watch:
             return Turn(commands)
         self._watch_s = now_s + WATCH_S
         fresh = [told for _, told in sorted(self.heard.reports.items()) if now_s - told.time < FRESH_S]
-        return Turn(commands, [Outgoing("", WATCH, encode_watch(fresh))] if fresh else [])
+        return Turn(commands, [Packet("", WATCH, encode_watch(fresh))] if fresh else [])
 
     def _sense(self, samples: Samples) -> None:
         for channel in ("imu", "gps"):

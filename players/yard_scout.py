@@ -15,8 +15,7 @@ from dataclasses import dataclass, fields
 from math import atan2, cos, hypot, sin
 from typing import Any, Final
 
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.steering import Estimate, wrapped
@@ -119,7 +118,7 @@ def _are(values: object, kind: Any) -> bool:
     return isinstance(values, list) and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
 
 
-class Scout:
+class Scout(Player):
     """The player: one scout's controller."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -174,7 +173,7 @@ class Scout:
         self._report_s = now_s + REPORT_S
         at = self._estimate
         report = Report(self.number, now_s, at.x, at.y, len(self.done), tuple(self.done))
-        return Turn({robot: motion}, [Outgoing("", REPORT, encode_report(report))])
+        return Turn({robot: motion}, [Packet("", REPORT, encode_report(report))])
 
     def _next(self, distances: tuple[float, ...]) -> Motion:
         match self.phase:

@@ -87,7 +87,7 @@ def run_roles(roles: Roles) -> int:
             assert simulation is not None
             options, address = roles.vhub
             own = load_credentials(roles.pki, VHUB)
-            hub = open_vhub(process, simulation, address, options, roles.pki, own, add_players)
+            hub = open_vhub(process, simulation, address, options, own, add_players)
             process.add(opened.enter_context(hub))
         if supervisor is not None:
             process.add(supervisor)

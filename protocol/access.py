@@ -66,11 +66,10 @@ class Grant:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """All grants on one plane. With `uses_passwords` sessions authenticate by user and password."""
+    """All grants on one plane."""
 
     plane: Plane
     grants: tuple[Grant, ...]
-    uses_passwords: bool = False
 
 
 def access_to(plane: Plane, deployment: Deployment) -> Access:
@@ -80,7 +79,7 @@ def access_to(plane: Plane, deployment: Deployment) -> Access:
     for process in joint_processes(deployment).values() if plane is Plane.SIMULATION else ():
         members = [identity.of_role(role, deployment) for role in process.roles]
         grants.append(_union(process.name, [grant(who, plane) for who in members if _role(who) in roles]))
-    return Access(plane, tuple(grants), plane is Plane.RADIO and deployment.access.radio == "password")
+    return Access(plane, tuple(grants))
 
 
 def grant(who: str, plane: Plane) -> Grant:
@@ -168,8 +167,7 @@ def access_control(access: Access) -> dict[str, Any]:
             if keys and keys != [""]:
                 named.append(f"{its.identity} {what}")
                 rules.append(_rule(named[-1], flow, messages, keys))
-        proof = {"usernames": [its.name]} if access.uses_passwords else {"cert_common_names": [its.identity]}
-        subjects.append({"id": its.identity, "link_protocols": ["tls"], **proof})
+        subjects.append({"id": its.identity, "link_protocols": ["tls"], "cert_common_names": [its.identity]})
         policies.append({"subjects": [its.identity], "rules": named})
     return {
         "enabled": True,

@@ -141,7 +141,7 @@ class Heartbeat(Message, frozen=True):
     display, `failed` the form that has raised.
 
     The vHub sends one without a report before late deliveries, to name the clients that these waited for. A node does
-    when a form takes long at its tick: `slow` says which one, and where."""
+    when its tick takes long: `slow` says where."""
 
     sender: Name
     tick: Counter

@@ -11,15 +11,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from msgspec import Struct
-
 from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
-from foosim.client.packets import Outgoing
-from foosim.client.player import Acting, Sample
+from foosim.client.player import Commands, Packet, Sample
+from foosim.client.playing import Acting
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
@@ -30,6 +29,7 @@ from foosim.rehearsal.stepping.world import SteppedWorld
 from foosim.vhub.network.memory import Joining
 from foosim.world.assembly.initial_state import first_frame
 from foosim.world.assembly.world import build_scene, world_status
+from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.scene import Scene
@@ -110,7 +110,7 @@ class Agent:
                     continue
             newest[pair] = packet
 
-    def numbered(self, packets: Sequence[Outgoing], now_ns: int) -> list[Sent]:
+    def numbered(self, packets: Sequence[Packet], now_ns: int) -> list[Sent]:
         """Return packets as they are sent, with the client's numbers."""
         first = self.sequence + 1
         self.sequence += len(packets)
@@ -193,6 +193,8 @@ class Simulation:
         self._world: SteppedWorld | None = None
         self._carrier: Carrier
         self._residents: dict[str, Resident] = {}
+        self._events: list[Disrupt] = []
+        """What happens to the network from the next frame on."""
         self.reset(start, seed)
 
     # --- beginning ---------------------------------------------------------------------------------------------------
@@ -232,6 +234,7 @@ class Simulation:
             joining.append(Joining(name, period, hears, offset, arrivals))
         carrier = EmulatedNetwork if self._has_network else Bypass
         self._carrier = carrier(deployment, frame.tick, joining)
+        self._events = []
         self._open()
 
     # --- what there is -----------------------------------------------------------------------------------------------
@@ -287,14 +290,14 @@ class Simulation:
 
     # --- stepping ----------------------------------------------------------------------------------------------------
 
-    def step(self, commands: Mapping[str, Struct] | None = None, ticks: int = 1) -> dict[Pair, Sample]:
+    def step(self, commands: Commands | None = None, ticks: int = 1) -> dict[Pair, Sample]:
         """Send commands, by robot, at the present frame, and compute some ticks; return the readings then.
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
-        takes no such command, BadValue for a command that is not finite, ComponentError and
+        takes no such command, BadValue for names and numbers that are none of a command, ComponentError and
         PlayerError for a form and a player that fail.
         """
-        by_agent: dict[str, list[Outgoing]] = {name: [] for name in self.agents}
+        by_agent: dict[str, list[Packet]] = {name: [] for name in self.agents}
         if self._encoder is None:
             self._encoder = CommandEncoder(self.declared)
         for robot, command in sorted((commands or {}).items()):
@@ -302,11 +305,29 @@ class Simulation:
             if owner is None:
                 theirs = [robot for agent in self.agents.values() for robot in agent.robots]
                 raise UnknownName("no robot of an agent", robot, theirs)
-            by_agent[owner].append(Outgoing(robot, *self._encoder.encode(robot, command)))
+            by_agent[owner] += [Packet(robot, *one) for one in self._encoder.encode(robot, command)]
         self.advance(by_agent, ticks)
         return self.readings
 
-    def advance(self, packets: Mapping[str, Sequence[Outgoing]], ticks: int) -> None:
+    def partition(self, *groups: str | Sequence[str]) -> None:
+        """Cut the network between groups of endpoints, names or selectors, from the next frame on until `heal`:
+        `partition("red.*", ["camera", "player-blue"])`.
+
+        Raises BadEvent for groups that are none, BadValue without a network.
+        """
+        self._disrupt({"partition": [[group] if isinstance(group, str) else [*group] for group in groups]})
+
+    def heal(self) -> None:
+        """End all partitions and clogs, and take back changed settings, from the next frame on. Raises BadValue."""
+        self._disrupt({"heal": "all"})
+
+    def _disrupt(self, event: dict[str, Any]) -> None:
+        if not self._has_network:
+            raise BadValue("this simulation has no network: network=True gives it one")
+        effective_ns = (self.tick + 1) * self.deployment.tick_ns
+        self._events.append(Disrupt(event_text(self.deployment, event, effective_ns)))
+
+    def advance(self, packets: Mapping[str, Sequence[Packet]], ticks: int) -> None:
         """Send packets of agents, by name, at the present frame, and compute some ticks."""
         if ticks < 1:
             raise BadValue("ticks of a step are 1 or more", ticks)
@@ -320,7 +341,8 @@ class Simulation:
     def _open(self) -> None:
         """Let robots send and clients hear what reaches them at the frame; residents that are due act in `_close`."""
         world = self._stepped
-        self._due = self._carrier.open(world.frame, world.sense())
+        self._due = self._carrier.open(world.frame, world.sense(), self._events)
+        self._events = []
         for name, agent in self.agents.items():
             arrived = self._carrier.take(name)
             if arrived:

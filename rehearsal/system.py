@@ -17,7 +17,7 @@ from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, report_failure
 from foosim.client.loading import load_player
-from foosim.client.player import PlayerLoop
+from foosim.client.playing import PlayerLoop
 from foosim.common import limits
 from foosim.node.engines_pool import Solver
 from foosim.protocol import channels

@@ -1,4 +1,4 @@
-"""What another network changes, drawn per link: what is delivered, how late, and how old the newest is. SVG.
+"""What another network changes, drawn per link: what is delivered, how late, and how old the newest is.
 
 Two bars for each link and figure, captured above, judged again below.
 """
@@ -6,19 +6,16 @@ Two bars for each link and figure, captured above, judged again below.
 from __future__ import annotations
 
 from collections.abc import Callable
-from html import escape
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from foosim.replay.what_if import LinkChange, Side, WhatIf
 
-ROW: Final = 30
-NAME: Final = 230
-PANEL: Final = 190
-GAP: Final = 70
-TOP: Final = 64
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 LINKS_MAX: Final = 200
-BEFORE: Final = "#9aa5b1"
-AFTER: Final = "#d9480f"
+BAR: Final = 0.4
+"""The height of a bar; a link has the height 1."""
 
 _FIGURES: Final[tuple[tuple[str, Callable[[LinkChange, Side], float]], ...]] = (
     ("delivered, %", lambda link, side: 100.0 * side.delivered / link.offered if link.offered else 0.0),
@@ -27,39 +24,26 @@ _FIGURES: Final[tuple[tuple[str, Callable[[LinkChange, Side], float]], ...]] = (
 )
 
 
-def picture(found: WhatIf, title: str) -> str:
-    """Return a self-contained SVG document."""
+def draw(figure: Figure, found: WhatIf, title: str) -> None:
+    """Draw the first 200 links."""
     links = found.links[:LINKS_MAX]
-    width, height = NAME + len(_FIGURES) * (PANEL + GAP), TOP + ROW * len(links) + 20
     head = f"{title}: {found.packets} packets, {found.changed} changed"
     if len(found.links) > LINKS_MAX:
         head += f" (the first {LINKS_MAX} of {len(found.links)} links)"
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" font-family="sans-serif"'
-        f' font-size="11"><rect width="100%" height="100%" fill="white"/>',
-        _text(10, 20, head, size=14),
-        f'<rect x="10" y="30" width="10" height="10" fill="{BEFORE}"/>{_text(25, 39, "captured")}',
-        f'<rect x="95" y="30" width="10" height="10" fill="{AFTER}"/>{_text(110, 39, "over the other network")}',
-    ]
-    for number, (name, figure) in enumerate(_FIGURES):
-        x = NAME + number * (PANEL + GAP)
-        most = max((figure(link, side) for link in links for side in (link.before, link.after)), default=0.0)
-        parts.append(_text(x, TOP - 6, name))
-        for row, link in enumerate(links):
-            parts += _bars(x, TOP + row * ROW, figure(link, link.before), figure(link, link.after), most)
-    for row, link in enumerate(links):
-        parts.append(_text(10, TOP + row * ROW + 16, f"{link.source} \N{RIGHTWARDS ARROW} {link.destination}"))
-    return "\n".join([*parts, "</svg>", ""])
-
-
-def _bars(x: int, y: int, before: float, after: float, most: float) -> list[str]:
-    parts = []
-    for shift, value, colour in ((2, before, BEFORE), (14, after, AFTER)):
-        length = PANEL * value / most if most else 0.0
-        parts.append(f'<rect x="{x}" y="{y + shift}" width="{length:.1f}" height="10" fill="{colour}"/>')
-        parts.append(_text(x + length + 4, y + shift + 9, f"{value:.4g}"))
-    return parts
-
-
-def _text(x: float, y: float, text: str, size: int = 11) -> str:
-    return f'<text x="{x:.1f}" y="{y}" font-size="{size}">{escape(text)}</text>'
+    figure.set_size_inches(12.0, 1.5 + 0.3 * len(links))
+    figure.suptitle(head)
+    panels = figure.subplots(1, len(_FIGURES), sharey=True)
+    for panel, (name, figure_of) in zip(panels, _FIGURES, strict=True):
+        sides = (
+            ("captured", "0.6", -BAR / 2, [figure_of(link, link.before) for link in links]),
+            ("over the other network", "C1", BAR / 2, [figure_of(link, link.after) for link in links]),
+        )
+        for label, colour, shift, values in sides:
+            bars = panel.barh([row + shift for row in range(len(links))], values, BAR, color=colour, label=label)
+            panel.bar_label(bars, fmt="{:.4g}", padding=2, fontsize=7)
+        panel.set_title(name, fontsize="medium")
+        panel.margins(x=0.15)
+    names = [f"{link.source} \N{RIGHTWARDS ARROW} {link.destination}" for link in links]
+    panels[0].set_yticks(range(len(links)), names)
+    panels[0].set_ylim(len(links) - 0.5, -0.5)  # the first link is the highest
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

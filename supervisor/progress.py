@@ -183,7 +183,7 @@ class ProgressMonitor:
         heartbeat_ns = state.wait_ns(deadlines.heartbeat_ns)
         silent = state.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return {name: f"no heartbeat for {heartbeat_ns / 1e9:g} s{self._slow_form(name)}" for name in silent}
+            return {name: f"no heartbeat for {heartbeat_ns / 1e9:g} s{self._said_of(name, tick)}" for name in silent}
         if state.is_resuming:
             return {}  # no process is waited for yet
         if state.is_vhub_away:
@@ -202,15 +202,11 @@ class ProgressMonitor:
             lost_ns = max(lost_ns, deadlines.close_ns)
         if overdue_ns > lost_ns:
             why = f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s"
-            return {name: why + self._slow_form(name) for name in names}
+            return {name: why + self._said_of(name, tick) for name in names}
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             state.log("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
-
-    def _slow_form(self, name: str) -> str:
-        """Return what a node has said of a slow form at the present tick or later, as a part of a reason."""
-        return self._said_of(name, self._state.frame.tick)
 
     def _said_of(self, name: str, tick: int) -> str:
         """Return what a node has said of what takes long at a tick or later, as a part of a reason."""

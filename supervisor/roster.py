@@ -43,7 +43,7 @@ class Process:
     heard_ns: int = 0
     heartbeat: Heartbeat | None = None
     slow: Heartbeat | None = None
-    """The last one that names a slow form."""
+    """The last one that names what takes long at a tick."""
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0

@@ -13,6 +13,8 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
+from foosim.world.assembly import sources
+from foosim.world.forms import registry
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 HEAD: Final = """
@@ -74,8 +76,19 @@ class Own:
 def folder_on_path(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder, which is on the path now; a module of one name is another one in each test."""
     monkeypatch.syspath_prepend(str(folder))
-    loader._applied.cache_clear()
+    forget_modules()
     return folder
+
+
+def forget_modules() -> None:
+    """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
+    loader._kept.clear()
+    for kept in (
+        *(sources._spec, sources._source, sources._imports, sources._folder, sources.distributions),
+        *(loader._applied, registry._entry_points),
+    ):
+        kept.cache_clear()
+    invalidate_caches()
 
 
 def written(folder: Path, *lines: str, name: str = "own_form") -> Path:

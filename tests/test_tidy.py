@@ -25,7 +25,7 @@ FILES_OF_A_FOLDER_MAX = 16
 # The packages from the top to the bottom: each may import what stands below it. Those in one line do not import each
 # other.
 ORDER: list[set[str]] = [
-    {"cli"},
+    {"cli", "door"},
     {"replay", "console"},
     {"process"},
     {"analysis", "launcher", "rehearsal"},
@@ -72,8 +72,10 @@ SHELLS = {
     "console/server/serving.py",
     "node/physics/mesh_trial.py",
     "node/main.py",
-    "node/slow_forms.py",
+    "node/slow_watch.py",
     "deployment/assets.py",
+    "door/_capture.py",
+    "door/_rehearse.py",
     "deployment/text/files.py",
     "runtime/transport/certificate_files.py",
     "runtime/transport/certificate_folder.py",
@@ -102,6 +104,7 @@ SHELLS = {
     "analysis/export.py",
     "rehearsal/interrupts.py",
     "analysis/new_file.py",
+    "analysis/picture.py",
     "replay/main.py",
     "cli/capture/play.py",
     "replay/address_file.py",
@@ -114,12 +117,8 @@ SHELLS = {
     "rehearsal/env/episodes.py",
     "rehearsal/env/parallel.py",
     "rehearsal/env/single.py",
-    "rehearsal/learning/main.py",
-    "rehearsal/learning/shots.py",
-    "rehearsal/learning/training.py",
     "rehearsal/simulation.py",
     "players/learning/exercises.py",
-    "players/learning/learned.py",
     "cli/rehearse.py",
     "cli/capture/command.py",
     "cli/capture/report.py",
@@ -165,7 +164,6 @@ SHELLS = {
     "capture/start_frame.py",
     "capture/contents.py",
     "capture/cut.py",
-    "capture/damage.py",
     "vhub/recording/file.py",
     "capture/info.py",
     "vhub/recording/unfinished.py",
@@ -231,11 +229,11 @@ def _imports_of(path: Path) -> Iterator[tuple[int, str]]:
 def modules() -> list[str]:
     """The dotted names of all modules and packages under foosim."""
     dotted = (".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)) for path in python_files(*PACKAGES))
-    return [name.removesuffix(".__init__") for name in dotted]
+    return [name.replace("foosim.door", "foosim").removesuffix(".__init__") for name in dotted]
 
 
 SOURCES = python_files(*PACKAGES)
-ALL_FILES = python_files(*PACKAGES, "tests", "bench")
+ALL_FILES = python_files(*PACKAGES, "tests", "bench", "examples")
 
 
 def edges() -> dict[str, set[str]]:
@@ -544,8 +542,10 @@ def are_floats(values: list[ast.expr]) -> bool:
 def test_every_package_folder_is_in_the_wheel() -> None:
     folders = sorted({path.parent.relative_to(ROOT) for path in SOURCES})
     setuptools = PYPROJECT["tool"]["setuptools"]
-    assert setuptools["packages"] == [".".join(("foosim", *folder.parts)) for folder in folders]
-    assert setuptools["package-dir"] == {f"foosim.{package}": package for package in PACKAGES}
+    named = sorted(".".join(("foosim", *folder.parts)).removesuffix(".door") for folder in folders)
+    assert setuptools["packages"] == named
+    dirs = {f"foosim.{package}".removesuffix(".door"): package for package in PACKAGES}
+    assert list(setuptools["package-dir"].items()) == sorted(dirs.items())
     assert [folder for folder in folders if not (ROOT / folder / "__init__.py").is_file()] == []
     assert [package for package in PACKAGES if not (ROOT / package / "py.typed").is_file()] == []
 

@@ -1,5 +1,6 @@
 """The wheel that pip builds from the sdist: it holds every module; what is compiled in it computes the same bits."""
 
+import hashlib
 import json
 import os
 import re
@@ -9,27 +10,35 @@ import sys
 import tomllib
 import venv
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from foosim.analysis.diff import diff_captures
+from foosim.rehearsal.run import rehearse
 from tests.world.test_guide import PACKAGE, USES, examples
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = tuple(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"].values())
-INTERPRETED = Path(sys.executable).parent
-HAS_COMPILER = any(map(shutil.which, ("cc", "gcc", "clang")))
+COMPILERS = ("cc", "gcc", "clang")
+HAS_COMPILER = any(map(shutil.which, COMPILERS))
 AIR = "radios: {air: {preset: wifi_5_indoor}}, robots: {'*': [air]}, places: {'*': [0 m, 0 m, 1 m]}"
 RUNS = {
-    "table": ("table.yaml", "--for", "500ms"),
-    "table, shared air": (
-        "table.yaml",
-        *("--for", "500ms", "--engine", "pure"),
-        *("--set", f"network={{{AIR}}}"),
-    ),
-    "warehouse": ("warehouse.yaml", "--for", "1s"),
-    "yard": ("yard.yaml", "--for", "1s"),
+    "table": ("table.yaml", 250, []),
+    "table, shared air": ("table.yaml", 250, ["engine=pure", f"network={{{AIR}}}"]),
+    "warehouse": ("warehouse.yaml", 50, []),
+    "yard": ("yard.yaml", 100, []),
 }
+"""Deployment, ticks and settings."""
+REHEARSALS = """
+import json, sys
+from pathlib import Path
+from foosim.rehearsal.run import rehearse
+for name, (file, ticks, sets) in json.loads(sys.argv[2]).items():
+    path = Path(sys.argv[1], file)
+    rehearse(path.read_text(), file, ticks, None, sets, capture=Path(f"{name}.mcap"), folder=path.parent)
+"""
 pytestmark = pytest.mark.timeout(900)  # the compiler alone takes a minute of a core that others use as well
 
 
@@ -84,14 +93,40 @@ def test_what_make_compiled_copies_has_nothing_of_npm(tmp_path: Path) -> None:
     assert (copied / "src" / "main.js").is_file() and not (copied / "node_modules").exists()
 
 
+def build_key(source: Path) -> str:
+    """Return what a wheel depends on: the files that it is built from, and what builds it."""
+    tools = [sys.version, *(f"{name} {version(name)}" for name in ("build", "mypy", "setuptools"))]
+    tools += [run(tool, "--version", cwd=source) for tool in map(shutil.which, COMPILERS) if tool]
+    digest = hashlib.sha256(repr(tools).encode())
+    for path in sorted(path for path in source.rglob("*") if path.is_file()):
+        digest.update(f"\0{path.relative_to(source)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    folder = tmp_path_factory.mktemp("wheel")
-    copy_source(folder / "source")
-    # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
-    build = sys.executable, "-m", "build", "--no-isolation", "--outdir", folder
-    run(*build, cwd=folder / "source", FOOSIM_COMPILE="quick" if HAS_COMPILER else "never")
-    (wheel,) = folder.glob("*.whl")
+def wheel(tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> Path:
+    """The wheel, which pytest's cache keeps: mypyc and the compiler take a minute, for the same wheel as before."""
+    folder, cache = tmp_path_factory.mktemp("wheel"), pytestconfig.cache
+    assert cache is not None
+    source, kept = folder / "source", cache.mkdir("wheel")
+    copy_source(source)
+    key = build_key(source)
+    if not list(kept.glob(f"{key}/*.whl")):
+        # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
+        build = sys.executable, "-m", "build", "--no-isolation", "--outdir", folder
+        run(*build, cwd=source, FOOSIM_COMPILE="quick" if HAS_COMPILER else "never")
+        for earlier in kept.iterdir():
+            shutil.rmtree(earlier)
+        (made,) = folder.glob("*.whl")
+        (kept / key).mkdir()
+        shutil.copy(made, kept / key)
+    (found,) = kept.glob(f"{key}/*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    folder = tmp_path_factory.mktemp("installed")
     environment = folder / "environment"
     venv.create(environment, symlinks=True)
     python = environment / "bin" / "python"
@@ -105,14 +140,14 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
 
 def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     files = [path.relative_to(ROOT) for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
-    modules = [".".join(("foosim", *file.with_suffix("").parts)).removesuffix(".__init__") for file in files]
+    modules = [".".join(("foosim", *file.with_suffix("").parts)) for file in files]
+    modules = [name.replace("foosim.door", "foosim").removesuffix(".__init__") for name in modules]
     program = "from importlib import import_module as get; import sys\n"
     program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
     run(installed.commands / "python", "-I", "-W", "error", "-c", program, *modules, cwd=tmp_path)
-    assert len(list(installed.packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
+    assert len(list(installed.packages.glob("foosim/**/py.typed"))) == len(PACKAGES)
     learning = installed.packages / "foosim" / "players" / "learning"
     assert (learning / "table.yaml").read_text() == (ROOT / "deploy" / "table.yaml").read_text()
-    assert (learning / "defend_shot.json").is_file()
     scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert "foosim" in scripts
     assert not [script for script in scripts if not (installed.commands / script).is_file()]
@@ -165,16 +200,26 @@ def test_the_guides_examples_run_from_an_empty_folder(
     assert result["ticks"] > 0 and not result["failed"] and shows in result
 
 
+@pytest.fixture(scope="module")
+def compiled_runs(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Captures of the runs, by one process of the wheel."""
+    folder = tmp_path_factory.mktemp("compiled")
+    run(installed.commands / "python", "-c", REHEARSALS, ROOT / "deploy", json.dumps(RUNS), cwd=folder)
+    return folder
+
+
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")
 @pytest.mark.parametrize("name", RUNS)
-def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: Path, name: str) -> None:
+def test_compiled_and_interpreted_are_one_world(
+    installed: Installed, compiled_runs: Path, tmp_path: Path, name: str
+) -> None:
     """Equal frames, fates and rows, to the last bit."""
     assert list(installed.packages.glob("foosim/world/rays/spans.*.so"))
-    file, *options = RUNS[name]
-    for commands in (installed.commands, INTERPRETED):
-        capture = tmp_path / f"{commands.parent.name}.mcap"
-        run(commands / "foosim", "rehearse", ROOT / "deploy" / file, *options, "--capture", capture, cwd=tmp_path)
-    run(INTERPRETED / "foosim", "capture", "diff", *sorted(tmp_path.glob("*.mcap")), cwd=tmp_path)
+    (file, ticks, sets), capture = RUNS[name], tmp_path / "interpreted.mcap"
+    deployment = ROOT / "deploy" / file
+    rehearse(deployment.read_text(), file, ticks, None, sets, capture=capture, folder=deployment.parent)
+    found = diff_captures(compiled_runs / f"{name}.mcap", capture)
+    assert found.equal, found
 
 
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from foosim.client.player import Commands, Samples
+from foosim.client.player import Commands, Player, Samples
 from foosim.deployment.schema import Deployment
 from foosim.world.actuators.rod_position import Command
 
@@ -26,7 +26,7 @@ def waved(tick: int) -> dict[str, Command]:
     return {"blue.goal": Command(-slide, spin), "red.goal": Command(slide, -spin), "red.midfield": Command(slide, spin)}
 
 
-class Waver:
+class Waver(Player):
     """Commands three rods at each of its turns."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

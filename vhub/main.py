@@ -48,7 +48,6 @@ from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.transport.certificates import (
     Credentials,
     check_host,
-    passwords_file,
 )
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
@@ -397,14 +396,14 @@ class HubShell:
 def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki: Path | None = None) -> int:
     """Run the vHub until its run ends; return the exit code. Raises Refused when it cannot connect.
 
-    `pki` is the folder with its certificate and, where clients have passwords, with these.
+    `pki` is the folder with its certificate.
     """
     address = check_listen(listen, insecure, secured=pki is not None)
     stop = Stop()
     process = Process(VHUB, options.progress)
     with ExitStack() as opened:
         simulation, credentials = opened.enter_context(client_session(connect, VHUB, pki, stop))
-        process.add(opened.enter_context(open_vhub(process, simulation, address, options, pki, credentials)))
+        process.add(opened.enter_context(open_vhub(process, simulation, address, options, credentials)))
         stop.then(process.stop)
         return process.run()
 
@@ -415,7 +414,6 @@ def open_vhub(
     simulation: Session,
     address: Address,
     options: HubOptions,
-    pki: Path | None,
     credentials: Credentials | None,
     on_radio: Callable[[Session], None] = lambda session: None,
 ) -> Iterator[HubShell]:
@@ -426,7 +424,7 @@ def open_vhub(
     with ExitStack() as opened:
 
         def open_radio(deployment: Deployment) -> Session:
-            session = opened.enter_context(_radio_session(address, credentials, deployment, pki))
+            session = opened.enter_context(_radio_session(address, credentials, deployment))
             check_host(credentials, session.locator)
             on_radio(session)
             return session
@@ -434,17 +432,10 @@ def open_vhub(
         yield HubShell(process, simulation, open_radio, options, credentials)
 
 
-def _radio_session(
-    address: Address, credentials: Credentials | None, deployment: Deployment, pki: Path | None
-) -> Session:
+def _radio_session(address: Address, credentials: Credentials | None, deployment: Deployment) -> Session:
     """Listen as the router of the radio plane, which lets in the clients of a deployment."""
-    if credentials is None or pki is None:
-        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX)
-    access = access_to(Plane.RADIO, deployment)
-    if not access.uses_passwords:
-        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, Security(credentials, access))
-    with passwords_file(pki, [grant.name for grant in access.grants]) as path:
-        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, Security(credentials, access, str(path)))
+    security = None if credentials is None else Security(credentials, access_to(Plane.RADIO, deployment))
+    return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, security)
 
 
 InsecureOption = Annotated[bool, typer.Option("--insecure", help="Listen for other machines without certificates.")]

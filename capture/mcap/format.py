@@ -89,11 +89,7 @@ Content = Message | records.Metadata | records.Attachment
 
 
 class Damaged(CaptureError):
-    """A record that is not what was written, `what` being why."""
-
-    def __init__(self, text: str, what: str) -> None:
-        super().__init__(text)
-        self.what = what
+    """Bytes that are not what was written."""
 
 
 class ByteSource(Protocol):
@@ -121,8 +117,6 @@ class McapFile:
         """Whether the first chunk repeats the state of another file, and is skipped."""
         self.at = 0
         """The offset of the present record, or of the damaged one."""
-        self._is_whole = True
-        """Whether nothing was left out as damaged."""
         self._crc: int | None = 0
         """Of all bytes so far, in the summary of those of the summary; None where some were passed by."""
         self._known = IN_DATA
@@ -146,15 +140,6 @@ class McapFile:
             raise CaptureError(f"{self._name}: no MCAP file, it does not start as one")
         self.at = len(MAGIC)
         self._crc = crc32(MAGIC)
-        yield from self._contents()
-
-    def contents_behind(self, at: int) -> Iterator[Content]:
-        """Yield what stands behind damage, from the record at a byte on: what is of bytes before is not compared."""
-        self.at, self._crc, self._span, self._is_whole = at, None, None, False
-        self._stream.seek(at)
-        yield from self._contents()
-
-    def _contents(self) -> Iterator[Content]:
         while not self._ended:
             record = self._next_record()
             if record is None:
@@ -175,7 +160,7 @@ class McapFile:
         return self._described.is_checked
 
     def _damaged(self, what: str) -> Damaged:
-        return Damaged(f"{self._name}: byte {self.at}: a damaged record, {what}", what)
+        return Damaged(f"{self._name}: byte {self.at}: a damaged record, {what}")
 
     def _sum(self, head: bytes, content: bytes) -> None:
         if self._crc is not None:
@@ -204,7 +189,7 @@ class McapFile:
         try:
             compare(f"{self._name}: bytes 0 to {self.at}", computed, told)
         except ValueError as error:
-            raise Damaged(f"{error}: one is damaged that no other checksum is of", f"all before it: {error}") from None
+            raise Damaged(f"{error}: one is damaged that no other checksum is of") from None
 
     def _check_span(self, span: Span) -> None:
         """Compare the times of a chunk with those of its indexes. Raises Damaged."""
@@ -305,10 +290,9 @@ class McapFile:
             self._end(self._stream.read(len(MAGIC) + 1))
 
     def _check_described(self, told: Mapping[str, str]) -> None:
-        if self._is_whole and self._crc is None:
+        if self._crc is None:
             raise ValueError(f"metadata {CHECKS!r} stand behind a chunk")
-        if self._crc is not None:
-            self._described.check(told, self._crc)
+        self._described.check(told, self._crc)
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))

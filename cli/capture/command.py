@@ -9,9 +9,9 @@ from typing import Annotated, Any, Final
 import msgspec
 import typer
 
-from foosim.capture.damage import Damage, damage_of
 from foosim.capture.info import CaptureInfo, capture_info
 from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import Damaged
 from foosim.capture.parts import FAILED_RUN, NEXT, whole_path
 from foosim.capture.reader import read_about
 from foosim.cli.capture.export import cut, diff, export
@@ -24,7 +24,7 @@ from foosim.common.errors import BadValue, Failed
 from foosim.replay.verify import Verified, verify_capture
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.runtime.journal import JournalError
-from foosim.vhub.recording.recovery import recover_capture
+from foosim.vhub.recording.recovery import check_finished, recover_capture
 
 app = new_app()
 
@@ -177,7 +177,8 @@ def recover(
 
     The new file has everything up to the last whole chunk, or up to the first damage, and the ticks that the journal
     adds. CAPTURE is not changed. `foosim up` recovers the captures that earlier runs of the same user left
-    unfinished. For a finished but damaged capture the damage and the undamaged ticks are printed.
+    unfinished. A finished capture is read to its end: the first damage is printed, and the command that cuts out what
+    precedes it.
 
     Exit codes: 0 everything that was recorded is in the new capture, or CAPTURE is finished, 1 CAPTURE is damaged or
     cannot be recovered, 2 CAPTURE is no capture, or is cut off before its first row, 3 ticks that were in no journal
@@ -185,17 +186,11 @@ def recover(
     """
     try:
         found = recover_capture(capture, journals, out)
-        damage = damage_of(capture) if found is None else None
+        if found is None:
+            check_finished(capture)
     except (CaptureError, JournalError) as error:
-        damage = _damage_of(capture)
-        if damage is None:
-            raise (Failed if _is_capture(capture) else BadCapture)(str(error)) from None
-    if damage is not None:
-        if json:
-            content = {"finished_before": True, "whole": False, **msgspec.to_builtins(damage), "problem": str(damage)}
-            print_json(content)
-            raise typer.Exit(FAILED)
-        raise Failed(str(damage))
+        is_capture = isinstance(error, Damaged) or _is_capture(capture)
+        raise (Failed if is_capture else BadCapture)(str(error)) from None
     if json:
         content = {
             "finished_before": found is None,
@@ -210,14 +205,6 @@ def recover(
     else:
         typer.echo(f"capture {capture} is finished already" if found is None else str(found))
     raise typer.Exit(DONE if found is None or found.is_whole else WITH_LOSS)
-
-
-def _damage_of(capture: Path) -> Damage | None:
-    """Return what is damaged in a capture that cannot be read; None where it has no end, or is none."""
-    try:
-        return damage_of(capture)
-    except CaptureError:
-        return None
 
 
 def _is_capture(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The command `foosim capture what-if`: a shell over `whatif.what_if` and `whatif_picture.picture`."""
+"""The command `foosim capture what-if`: a shell over `what_if.what_if` and `what_if_chart.draw`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from foosim.analysis.new_file import check_name, new_file
+from foosim.analysis.picture import HELP, check_picture, new_picture
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.cli.capture.options import Capture, reading
 from foosim.common.errors import BadValue
@@ -19,7 +19,7 @@ from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_files, read_source_file
 from foosim.replay import what_if as calculation
 from foosim.replay.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf
-from foosim.replay.what_if_chart import picture
+from foosim.replay.what_if_chart import draw
 from foosim.runtime.command import JsonOption, print_json
 from foosim.vhub.network.custom_models import check_link_models, differing_models
 
@@ -40,7 +40,7 @@ def what_if(
     ] = None,
     packets: Annotated[bool, typer.Option("--packets", help="List each packet that changed.")] = False,
     drawing: Annotated[
-        Path | None, typer.Option("--picture", help="Draw the changes per link into NAME.svg.", show_default=False)
+        Path | None, typer.Option("--picture", help=HELP.format("the changes per link"), show_default=False)
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -51,7 +51,7 @@ def what_if(
     fate is the captured one.
     """
     if drawing is not None:
-        check_name("--picture", drawing, "the picture", (".svg",))
+        check_picture(drawing)
     with reading():
         opened = open_capture(capture)
         deployment = _deployment(opened, network, settings or [])
@@ -61,8 +61,8 @@ def what_if(
     for line in found.caveats:
         typer.echo(f"warning: {capture}: {line}", err=True)
     if drawing is not None:
-        with new_file(drawing) as part:
-            part.write_text(picture(found, capture.name), encoding="utf-8")
+        with new_picture(drawing) as figure:
+            draw(figure, found, capture.name)
     if json:
         content = asdict(found)
         print_json(content if packets else {**content, "changes": []})

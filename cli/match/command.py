@@ -13,7 +13,8 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from foosim.analysis.new_file import check_absent, check_name, new_file
+from foosim.analysis.new_file import check_absent
+from foosim.analysis.picture import HELP, check_picture, new_picture
 from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
 from foosim.cli.run_command import with_options
 from foosim.client.loading import look_in
@@ -23,7 +24,7 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.rehearsal.match.chart import picture
+from foosim.rehearsal.match.chart import draw
 from foosim.rehearsal.match.entrants import entrant, seats
 from foosim.rehearsal.match.figures import figures
 from foosim.rehearsal.match.game import Fixture, Game, Link, Played, play, sets_of
@@ -65,9 +66,7 @@ class MatchOptions:
     worse_for: Annotated[
         str, typer.Option("--worse-for", help="Whose links have --delay and --loss: a, b or both.")
     ] = "a"
-    drawing: Annotated[
-        Path | None, typer.Option("--picture", help="Draw points against delay and loss into NAME.svg.")
-    ] = None
+    drawing: Annotated[Path | None, typer.Option("--picture", help=HELP.format("points against delay and loss"))] = None
     captures: Annotated[
         Path | None, typer.Option("--captures", metavar="FOLDER", help="Write a capture of each game here.")
     ] = None
@@ -104,7 +103,7 @@ def _checked(options: MatchOptions) -> Match:
     if drawing is not None:
         if options.delay is None and options.loss is None:
             raise BadValue("--picture: there is nothing to draw without --delay or --loss", str(drawing))
-        check_name("--picture", drawing, "the picture", (".svg",))
+        check_picture(drawing)
     if options.worse_for not in SIDES:
         raise UnknownName("--worse-for: not a side", options.worse_for, SIDES)
     look_in(str(options.deployment.parent.absolute()))
@@ -147,8 +146,8 @@ def _play(match: Match, jobs: int, drawing: Path | None, json: bool) -> int:
     cells = [(link, figures(list(games), match.tick_ns)) for link, games in groupby(played, key=lambda one: one.link)]
     if drawing is not None and code == DONE:
         drawn = [(link, found) for link, found in cells if link is not None]
-        with new_file(drawing) as part:
-            part.write_text(picture(drawn, match.labels, drawn_title(match)), encoding="utf-8")
+        with new_picture(drawing) as figure:
+            draw(figure, drawn, match.labels, drawn_title(match))
     if json:
         print_json(as_json(match, played, cells))
     elif cells:

@@ -35,7 +35,7 @@ from foosim.launcher.hosts.port_check import REMEDIES, listen, why_not_reached
 from foosim.launcher.hosts.prepare import check_hosts
 from foosim.launcher.hosts.ssh import Remote, remotes
 from foosim.launcher.new_capture import place_of
-from foosim.launcher.pki.hosts import identities_on, passwords_of
+from foosim.launcher.pki.hosts import identities_on
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
@@ -52,10 +52,9 @@ from foosim.runtime.transport.certificate_folder import (
     CA_FILE,
     CA_KEY_FILE,
     KEY_SUFFIX,
-    PASSWORD_SUFFIX,
     CertificateError,
 )
-from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials, read_password
+from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials
 
 State = Literal["fine", "warning", "problem"]
 
@@ -65,8 +64,6 @@ CLOCK_WARN_NS: Final = 50_000_000
 TIME_ERROR: Final = 5
 """Result of `adjtimex` for a clock that is not synchronized."""
 PYTHON_TESTED: Final = (3, 11)
-IMPORT_S: Final = 20.0
-"""Time limit for importing the players' modules: half of a host's limit for all its answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +208,7 @@ def _arithmetic(case: Case) -> Iterator[_Said]:
 
 
 def _certificates(case: Case) -> Iterator[_Said]:
-    """The certificate or password of each process here: present, of this root, with its key, valid, for this host."""
+    """The certificate of each process here: present, of this root, with its key, valid, for this host."""
     folder = case.pki
     if folder is None and case.ca:
         remedy = f"set hosts.{case.host}.pki to their folder, then {case.provide()}"
@@ -233,15 +230,10 @@ def _certificates(case: Case) -> Iterator[_Said]:
         remedy = "remove it there" if case.is_there else "keep it where certificates are issued"
         yield CA_KEY_FILE, "problem" if case.is_there else "warning", "is beside the certificates", remedy
     declared = [identity.process(name) for name in joint_processes(case.deployment, ("deployed",))]
-    here = [
-        who
-        for who in identities_on(case.deployment, case.host)
-        if who in declared or identity.parse_identity(who)[0] != "process"
-    ]
-    passwords = passwords_of(case.deployment, here)
-    for who in dict.fromkeys([*here, *passwords]):
-        yield _password(folder, who, case) if who in passwords else _certificate(folder, who, case)
-    for path in sorted((*folder.glob(f"*{KEY_SUFFIX}"), *folder.glob(f"*{PASSWORD_SUFFIX}"))):
+    for who in identities_on(case.deployment, case.host):
+        if who in declared or identity.parse_identity(who)[0] != "process":
+            yield _certificate(folder, who, case)
+    for path in sorted(folder.glob(f"*{KEY_SUFFIX}")):
         if path.stat().st_mode & 0o077:
             yield path.name, "problem", "can be read by others", f"chmod 600 {path}"
 
@@ -249,17 +241,6 @@ def _certificates(case: Case) -> Iterator[_Said]:
 def fingerprint(certificate: x509.Certificate) -> str:
     """Return the fingerprint of a certificate, in hex."""
     return certificate.fingerprint(hashes.SHA256()).hex()
-
-
-def _password(folder: Path, who: str, case: Case) -> _Said:
-    """Check a client's password, and that it has no certificate beside it."""
-    try:
-        read_password(folder / f"{who}{PASSWORD_SUFFIX}")
-    except CertificateError as error:
-        return who, "problem", error.what, case.provide()
-    if certificate_path(folder, who).exists():
-        return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
-    return who, "fine", "has a password", ""
 
 
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
@@ -384,7 +365,7 @@ def _players(case: Case) -> Iterator[_Said]:
     """Whether the classes of the players that are to run on this machine can be imported here."""
     deployment, elsewhere = case.deployment, places(case.deployment)
     here = [name for name in sorted(deployment.players) if elsewhere.get(name) == case.host]
-    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here, IMPORT_S)}
+    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here)}
     for name in here:
         found, path = wrong.get(name), deployment.players[name].class_
         if found is None:

@@ -1,13 +1,12 @@
 """Makes certificates: a root, and one for each process, client and operator under it.
 
 Elliptic curve P-256. The root lasts ten years and may issue no further authority; what it issues lasts 90 days, names
-one identity, and serves both sides of a connection, since every process connects and two listen. Keys and passwords are
-never overwritten, and can be read by their owner only.
+one identity, and serves both sides of a connection, since every process connects and two listen. Keys are never
+overwritten, and can be read by their owner only.
 """
 
 from __future__ import annotations
 
-import base64
 import os
 import socket
 from collections.abc import Callable, Sequence
@@ -35,7 +34,7 @@ from foosim.runtime.transport.certificate_files import (
     read_certificate,
     read_key,
 )
-from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, PASSWORD_SUFFIX, CertificateError
+from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, CertificateError
 from foosim.runtime.transport.certificates import certificate_path, identities_in, key_path
 
 ROOT_NAME: Final = "foosim"
@@ -53,7 +52,7 @@ HOST_LENGTH_MAX: Final = 253
 
 
 class FileExists(Refused):
-    """A certificate, key or password that is there already and is not overwritten."""
+    """A certificate or key that is there already and is not overwritten."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,22 +74,19 @@ class Shown:
 def provide(
     folder: Path,
     identities: Sequence[str],
-    passwords: Sequence[str] = (),
     hosts: Sequence[str] = (),
     days: int = LEAF_DAYS,
     within_days: int = RENEW_DAYS,
 ) -> list[Path]:
-    """Issue the missing files for these identities, and return their names: the root, certificates, passwords.
+    """Issue the missing files for these identities, and return their names: the root, certificates.
 
-    `passwords`: those of the identities who have a password instead. `hosts`: names and addresses by which others reach
-    supervisor and vHub. A certificate that ends within so many days, lacks such a host or has another root is issued
-    anew. Raises CertificateError, BadValue.
+    `hosts`: names and addresses by which others reach supervisor and vHub. A certificate that ends within so many days,
+    lacks such a host or has another root is issued anew. Raises CertificateError, BadValue.
     """
     made: list[Path] = [] if (folder / CA_FILE).exists() else [init(folder)]
     ca, there = read_ca(folder, wall_clock.now_utc()), identities_in(folder)
-    made += issue_passwords(folder, passwords)
     for reached, who_has in ((hosts, LISTENERS), ((), set(identities) - LISTENERS)):
-        wanted = [who for who in identities if who in who_has and who not in passwords]
+        wanted = [who for who in identities if who in who_has]
         made += issue(folder, [who for who in wanted if who not in there], reached, days)
         due = [who for who in wanted if who in there and _is_due(folder, who, ca, reached, within_days)]
         made += renew(folder, due, reached)
@@ -151,27 +147,6 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
         _write(certificate_path(folder, identity), certificate.public_bytes(serialization.Encoding.PEM))
         made.append(certificate_path(folder, identity))
     return made
-
-
-def issue_password(folder: Path, identity: str) -> str:
-    """Give a client a random password, and return it. Raises BadValue, FileExists."""
-    role, _ = parse_identity(identity)
-    if role != "client":
-        raise BadValue("only clients have passwords (client.NAME)", identity)
-    password = base64.urlsafe_b64encode(os.urandom(24)).decode()
-    path = folder / f"{identity}{PASSWORD_SUFFIX}"
-    _refuse_existing(path)
-    _write(path, password.encode() + b"\n")
-    return password
-
-
-def issue_passwords(folder: Path, identities: Sequence[str]) -> list[Path]:
-    """Give each client that has none a random password, and return where these are."""
-    paths = {identity: folder / f"{identity}{PASSWORD_SUFFIX}" for identity in identities}
-    made = [identity for identity, path in paths.items() if not path.exists()]
-    for identity in made:
-        issue_password(folder, identity)
-    return [paths[identity] for identity in made]
 
 
 def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) -> list[Path]:

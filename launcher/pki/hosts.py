@@ -1,7 +1,7 @@
 """The files of a certificates' folder that the processes of a host need, and their transfer through ssh.
 
-The root, and for each process that the deployment places there its own certificate and key, or its password; the vHub
-needs the passwords of all clients, to compare them. Nothing else is ever sent.
+The root, and for each process that the deployment places there its own certificate and key. Nothing else is
+ever sent.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from foosim.deployment.schema import Deployment, places
 from foosim.launcher.hosts.ssh import SSH_FAILED, Remote
 from foosim.protocol import identity
 from foosim.protocol.channels import VHUB
-from foosim.runtime.transport.certificate_folder import CA_FILE, PASSWORD_SUFFIX, CertificateError
-from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials, read_password
+from foosim.runtime.transport.certificate_folder import CA_FILE, CertificateError
+from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials
 
 SEND_S: Final = 60.0
 
@@ -35,25 +35,15 @@ def identities_on(deployment: Deployment, host: str | None) -> list[str]:
     return [who for who in identity.identities_of(deployment) if known.get(who) == host]
 
 
-def passwords_of(deployment: Deployment, identities: Sequence[str]) -> list[str]:
-    """Return the clients whose passwords these identities need: their own, and all clients' for the vHub."""
-    if deployment.access.radio != "password":
-        return []
-    clients = [who for who in identity.identities_of(deployment) if who.startswith("client.")]
-    return clients if VHUB in identities else [who for who in clients if who in identities]
-
-
 def files_for(deployment: Deployment, host: str) -> list[str]:
     """Return the names of the files that a host needs, keys before their certificates. Raises Failed for none."""
     identities = identities_on(deployment, host)
     if not identities:
         raise Failed(f"nothing is placed on host {host}")
-    passwords = passwords_of(deployment, identities)
     names = [CA_FILE]
     for who in identities:
-        if who not in passwords:
-            names += [key_path(Path(), who).name, certificate_path(Path(), who).name]
-    return [*names, *(f"{who}{PASSWORD_SUFFIX}" for who in passwords)]
+        names += [key_path(Path(), who).name, certificate_path(Path(), who).name]
+    return names
 
 
 def send_files(remote: Remote, folder: Path, names: Sequence[str]) -> list[str]:
@@ -82,8 +72,6 @@ def _checked(folder: Path, name: str) -> str:
         from foosim.runtime.transport.certificate_files import read_ca
 
         read_ca(folder, wall_clock.now_utc())
-    elif path.suffix == PASSWORD_SUFFIX:
-        read_password(path)
     else:
         load_credentials(folder, path.stem)
     try:

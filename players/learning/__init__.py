@@ -1,1 +1,1 @@
-"""What learns, and what it learns: rewards, exercises, and the player that acts by a learned policy."""
+"""Environments of the football table for what learns: their rewards, and their arguments by id."""

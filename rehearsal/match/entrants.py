@@ -29,8 +29,7 @@ class Entrant(NamedTuple):
 def entrant(place: str, name: str) -> Entrant:
     """Return the entrant of a short name, or of `module:Class`; `place` is the argument's name, for errors.
 
-    Raises UnknownName, and BadValue for a class that cannot be loaded or is no player. Its module is imported in
-    another process.
+    Raises UnknownName, and BadValue for a class that cannot be loaded or is no player.
     """
     if name in OF_THE_TABLE:
         return Entrant(name, OF_THE_TABLE[name])

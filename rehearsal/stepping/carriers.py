@@ -15,6 +15,7 @@ from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, received
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT, HubState
 from foosim.vhub.state.members import Member
+from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
 
@@ -22,8 +23,9 @@ from foosim.world.robot_packets import Delivered, RobotPacket
 class Carrier(Protocol):
     """Carries packets. At each frame it is opened, then closed."""
 
-    def open(self, frame: Frame, packets: Sequence[RobotPacket]) -> list[str]:
-        """Take what the robots send at a frame, in (robot, index) order; return the clients that are due, by name."""
+    def open(self, frame: Frame, packets: Sequence[RobotPacket], events: Sequence[Disrupt]) -> list[str]:
+        """Take what the robots send at a frame, in (robot, index) order, and what happens to the network from it on;
+        return the clients that are due, by name."""
 
     def take(self, client: str) -> list[Received]:
         """Remove and return what has reached a client, in order of arrival."""
@@ -41,13 +43,13 @@ class EmulatedNetwork:
         self._released: dict[str, list[Flight]] = {}
         self._delivered: list[Delivered] = []
 
-    def open(self, frame: Frame, packets: Sequence[RobotPacket]) -> list[str]:
+    def open(self, frame: Frame, packets: Sequence[RobotPacket], events: Sequence[Disrupt]) -> list[str]:
         """Close the world's phase of the tick."""
         state, tick = self.state, frame.tick
         if self._joining and state.hears_clients:
             for name in [name for name, one in self._joining.items() if one.suits(tick)]:
                 state.join(self._joining.pop(name), tick)
-        for name, flights in state.close_world(frame, packets, []).items():
+        for name, flights in state.close_world(frame, packets, [], events).items():
             self._released.setdefault(name, []).extend(flights)
         return state.due_members(tick)
 
@@ -85,8 +87,9 @@ class Bypass:
         self._robots = frozenset(deployment.robots)
         self._turns = {one.name: frozenset((s, c) for s, c in one.arrivals) for one in joining if one.arrivals}
 
-    def open(self, frame: Frame, packets: Sequence[RobotPacket]) -> list[str]:
+    def open(self, frame: Frame, packets: Sequence[RobotPacket], events: Sequence[Disrupt]) -> list[str]:
         """Hand readings to those who subscribe to them."""
+        assert not events, "there is no network to which something could happen"
         tick = frame.tick
         if self._joining:
             for name in [name for name, one in self._joining.items() if one.suits(tick)]:

@@ -13,7 +13,7 @@ from functools import lru_cache, partial
 from typing import Final, TypeAlias
 
 from foosim.client.core import ClientCore
-from foosim.client.packets import Outgoing
+from foosim.client.player import Packet
 from foosim.common.errors import Refused
 from foosim.common.names import CHANNEL_ECHO
 from foosim.common.units import Pace
@@ -180,7 +180,7 @@ class Prober:
                 self._back[packet.payload] = core.go.tick
             robot = self._robots[self._sent % len(self._robots)]
             self._sent += 1
-            core.done([Outgoing(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
+            core.done([Packet(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
 
 
 class WatchedNode(NodeCore):

@@ -11,12 +11,11 @@ CA_FILE: Final = "ca.pem"
 CA_KEY_FILE: Final = "ca.key"
 CERTIFICATE_SUFFIX: Final = ".pem"
 KEY_SUFFIX: Final = ".key"
-PASSWORD_SUFFIX: Final = ".password"
 FILE_BYTES_MAX: Final = 65_536
 
 
 class CertificateError(Refused):
-    """A certificate, key or password is missing or would be rejected; the text has the reason."""
+    """A certificate or key is missing or would be rejected; the text has the reason."""
 
 
 def read_bounded(path: Path) -> bytes:

@@ -2,7 +2,6 @@
 
     ca.pem                   the root that everybody trusts
     IDENTITY.pem .key        a certificate and its key; the certificate's common name is the identity
-    client.NAME.password     instead of these, where clients of the radio plane have passwords
 
 A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is
 checked before anything is opened. A process of a run without certificates, which most are, does not load what reads
@@ -13,10 +12,7 @@ from __future__ import annotations
 
 import logging
 import os
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
@@ -29,9 +25,7 @@ from foosim.runtime.transport.certificate_folder import (
     CA_FILE,
     CERTIFICATE_SUFFIX,
     KEY_SUFFIX,
-    PASSWORD_SUFFIX,
     CertificateError,
-    read_bounded,
 )
 
 OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
@@ -48,14 +42,12 @@ class NotAuthorised(Refused):
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """What a process shows and whom it trusts. Either it has a certificate with its key, or a user and a password."""
+    """What a process shows and whom it trusts."""
 
     identity: str
     ca: Path
-    certificate: Path | None = None
-    key: Path | None = None
-    user: str = ""
-    password: str = field(default="", repr=False)
+    certificate: Path
+    key: Path
     until: datetime | None = None
     """When the certificate ends."""
 
@@ -70,28 +62,15 @@ class Credentials:
         return f"{self.certificate} ends on {self.until:%Y-%m-%d %H:%M} UTC, and its connections with it: renew it"
 
 
-def load_credentials(folder: Path | None, identity: str, password: str = "") -> Credentials | None:
-    """Return what the folder has for an identity, checked; None without a folder. Raises CertificateError.
-
-    `password`: use this one, and of the folder only the root.
-    """
+def load_credentials(folder: Path | None, identity: str) -> Credentials | None:
+    """Return what the folder has for an identity, checked; None without a folder. Raises CertificateError."""
     if folder is None:
-        if password:
-            raise CertificateError("a password needs the root certificate, too: it is sent to the right vHub only")
         return None
     from foosim.runtime.transport import certificate_files as files
 
     now = wall_clock.now_utc()
     ca = files.read_ca(folder, now)
     certificate, key = certificate_path(folder, identity), key_path(folder, identity)
-    role, name = parse_identity(identity)
-    own_password = folder / f"{identity}{PASSWORD_SUFFIX}"
-    if role == "client" and not password and own_password.exists():
-        if certificate.exists():
-            raise CertificateError(f"{folder} has a certificate and a password of {identity}: remove what is not used")
-        password = read_password(own_password)
-    if password:
-        return Credentials(identity, folder / CA_FILE, user=name, password=password)
     if not certificate.exists():
         known = ", ".join(identities_in(folder)) or "none"
         raise CertificateError(f"{folder} has no certificate of {identity}; it has: {known}")
@@ -152,38 +131,9 @@ def warn_of_end(credentials: Credentials | None, log: logging.Logger) -> None:
         log.warning(warning)
 
 
-@contextmanager
-def passwords_file(folder: Path, clients: Sequence[str]) -> Iterator[Path]:
-    """Give a file with the users and passwords of these clients, as a router reads it; a client without one is left
-    out. It is gone afterwards. Raises CertificateError.
-    """
-    paths = {name: folder / f"client.{name}{PASSWORD_SUFFIX}" for name in clients}
-    lines = [f"{name}:{read_password(path)}\n" for name, path in paths.items() if path.exists()]
-    with tempfile.NamedTemporaryFile("w", encoding="ascii") as file:  # only its owner can read it
-        file.writelines(lines)
-        file.flush()
-        yield Path(file.name)
-
-
-def read_password(path: Path) -> str:
-    """Return the one line of a password file. Raises CertificateError."""
-    try:
-        password = read_bounded(path).decode("ascii").strip()
-    except UnicodeDecodeError:
-        raise CertificateError(f"{path}: not a line of ASCII") from None
-    check_password(str(path), password)
-    return password
-
-
-def check_password(where: str, password: str) -> None:
-    """Raise CertificateError for a password that cannot be one."""
-    if not password or not password.isascii() or not password.isprintable() or set(" :") & set(password):
-        raise CertificateError(f"{where}: a password is printable ASCII without blanks and colons, and not empty")
-
-
 def check_host(credentials: Credentials | None, locator: str) -> None:
     """Raise CertificateError when those who connect to where we listen would not find its host in our certificate."""
-    if credentials is None or credentials.certificate is None:
+    if credentials is None:
         return
     from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
 

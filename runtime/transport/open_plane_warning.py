@@ -23,4 +23,4 @@ class Exposure:
         if not self._is_open or now_ns < self._next_ns:
             return ""
         self._next_ns = now_ns + EVERY_NS
-        return f"insecure: any process that reaches {self._address} can take part, without a certificate or a password"
+        return f"insecure: any process that reaches {self._address} can take part, without a certificate"

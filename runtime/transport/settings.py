@@ -23,11 +23,10 @@ QUERY_S: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Security:
-    """The identity, and the grants of a router. `passwords_file`: users and passwords, a line each."""
+    """The identity, and the grants of a router."""
 
     credentials: Credentials
     access: Access | None = None
-    passwords_file: str = ""
 
 
 def router_settings(address: Address, message_bytes_max: int, security: Security | None) -> dict[str, Any]:
@@ -44,7 +43,7 @@ def router_settings(address: Address, message_bytes_max: int, security: Security
     if security is None:
         return settings
     assert security.access is not None, "a router with certificates has access rules"
-    return settings | _certificate_settings(security) | _access_settings(security.access, security.passwords_file)
+    return settings | _certificate_settings(security) | _access_settings(security.access)
 
 
 def client_settings(
@@ -59,13 +58,7 @@ def client_settings(
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2.0},
         "adminspace/enabled": False,
     }
-    if security is None:
-        return settings
-    credentials = security.credentials
-    if credentials.password:
-        proof = {"user": credentials.user, "password": credentials.password}
-        settings |= {f"transport/auth/usrpwd/{key}": value for key, value in proof.items()}
-    return settings | _certificate_settings(security)
+    return settings if security is None else settings | _certificate_settings(security)
 
 
 def holds(found: Any, said: Any) -> bool:
@@ -108,24 +101,20 @@ def _common_settings(mode: str, message_bytes_max: int, protocol: str) -> dict[s
 def _certificate_settings(security: Security) -> dict[str, Any]:
     """Return root and certificate: both sides need `enable_mtls`, or no client certificate is sent."""
     mine = security.credentials
+    side = "connect" if security.access is None else "listen"
     settings: dict[str, Any] = {
         "root_ca_certificate": str(mine.ca),
-        "enable_mtls": mine.certificate is not None and not (security.access and security.access.uses_passwords),
+        "enable_mtls": True,
         "verify_name_on_connect": True,
         "close_link_on_expiration": True,
+        f"{side}_certificate": str(mine.certificate),
+        f"{side}_private_key": str(mine.key),
     }
-    if mine.certificate is not None:
-        side = "connect" if security.access is None else "listen"
-        settings |= {f"{side}_certificate": str(mine.certificate), f"{side}_private_key": str(mine.key)}
     return {f"transport/link/tls/{key}": value for key, value in settings.items()}
 
 
-def _access_settings(access: Access, passwords_file: str) -> dict[str, Any]:
-    assert bool(passwords_file) == access.uses_passwords
-    settings: dict[str, Any] = {"access_control": access_control(access), "low_pass_filter": _size_limits(access.plane)}
-    if access.uses_passwords:
-        settings["transport/auth/usrpwd/dictionary_file"] = passwords_file
-    return settings
+def _access_settings(access: Access) -> dict[str, Any]:
+    return {"access_control": access_control(access), "low_pass_filter": _size_limits(access.plane)}
 
 
 def _size_limits(plane: Plane) -> list[dict[str, Any]]:

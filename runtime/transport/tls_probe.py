@@ -29,7 +29,7 @@ def probe(address: Address, credentials: Credentials | None, is_last: bool) -> N
         if credentials is not None and is_last:
             raise NotAuthorised(
                 f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and refuses this "
-                + ("user and password" if credentials.password else "certificate")
+                "certificate"
             )
 
 
@@ -40,10 +40,9 @@ def _shake(link: socket.socket, address: Address, credentials: Credentials | Non
         context.check_hostname = False
         context.verify_mode = ssl.CERT_NONE
         with context.wrap_socket(link):
-            raise NotAuthorised(f"{address} requires a certificate or a password: --pki DIR has its folder")
+            raise NotAuthorised(f"{address} requires a certificate: --pki DIR has its folder")
     context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=str(credentials.ca))
-    if credentials.certificate is not None:
-        context.load_cert_chain(credentials.certificate, credentials.key)
+    context.load_cert_chain(credentials.certificate, credentials.key)
     try:
         with context.wrap_socket(link, server_hostname=address.host.strip("[]")) as secured:
             secured.settimeout(ALERT_S)
@@ -56,8 +55,7 @@ def _shake(link: socket.socket, address: Address, credentials: Credentials | Non
     except ssl.SSLError as error:
         if "ALERT" in (error.reason or ""):
             raise NotAuthorised(
-                f"{address}: not authorised: it does not accept {credentials.certificate or 'who has no certificate'}"
-                f" ({_alert(error)})"
+                f"{address}: not authorised: it does not accept {credentials.certificate} ({_alert(error)})"
             ) from None
         raise
 

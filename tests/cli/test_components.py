@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,9 +14,11 @@ from foosim.cli.components import chosen
 from foosim.common.errors import DeploymentError, UnknownName
 from foosim.deployment.loader import apply_sets
 from foosim.world.forms.registry import FORMS, names
+from tests.conftest import Typed
+from tests.own_forms import folder_on_path
 
+Telling = Callable[..., tuple[str, str]]
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-COMMAND: Final = "from foosim.cli import main; main()"
 BOUNDED: Final = '''
 from typing import Annotated
 
@@ -56,28 +56,27 @@ class Bounded:
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Path:
-    """A folder with an installed package that prints when it is imported."""
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder on the path with an installed package that prints when it is imported."""
     (tmp_path / "bounded.py").write_text(BOUNDED)
     about = tmp_path / "bounded-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: bounded\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text("[foosim.world]\nbounded = bounded\n")
-    return tmp_path
+    folder_on_path(tmp_path, monkeypatch)
 
 
-def told(*words: str, folder: Path | None = None) -> tuple[str, str]:
-    """Return what the command writes to standard output and to standard error."""
-    path = {} if folder is None else {"PYTHONPATH": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", COMMAND, *words],
-        env={**os.environ, **path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout, done.stderr
+@pytest.fixture
+def told(typed: Typed) -> Telling:
+    """Return a function that returns what the command writes to standard output and to standard error."""
+    command = typed()
+
+    def tell(*words: str) -> tuple[str, str]:
+        done = command(*words)
+        assert done.code == 0, done.err
+        return done.out, done.err
+
+    return tell
 
 
 TOLD: Final = {
@@ -118,12 +117,12 @@ TOLD: Final = {
 
 
 @pytest.mark.parametrize("about", TOLD)
-def test_a_form_is_told_of_with_what_it_brings(about: tuple[str, str]) -> None:
+def test_a_form_is_told_of_with_what_it_brings(told: Telling, about: tuple[str, str]) -> None:
     lines = [line.strip() for line in told("components", *about)[0].splitlines()]
     assert [line for line in TOLD[about] if line not in lines] == []
 
 
-def test_all_are_told_of_in_json() -> None:
+def test_all_are_told_of_in_json(told: Telling) -> None:
     found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
     assert [(one["form"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
     by_name = {(one["form"], one["name"]): one for one in found}
@@ -137,8 +136,9 @@ def test_all_are_told_of_in_json() -> None:
     assert by_name["kit", "table"]["entities"] == {"ball": "ball"} and by_name["kit", "table"]["addable"] == ["ball"]
 
 
-def test_bounds_are_told_of_as_they_are(site: Path) -> None:
-    out, _ = told("components", "sensor", "bounded", folder=site)
+@pytest.mark.usefixtures("site")
+def test_bounds_are_told_of_as_they_are(told: Telling) -> None:
+    out, _ = told("components", "sensor", "bounded")
     assert [line.strip() for line in out.splitlines() if "rate" not in line and "offset" not in line][3:-1] == [
         "modifiers: a list: of modifiers, see components modifier (default [])",
         "least: number, more than 0, at most 2 (required)",
@@ -149,10 +149,15 @@ def test_bounds_are_told_of_as_they_are(site: Path) -> None:
     ]
 
 
-def test_what_modules_print_is_not_in_the_output(site: Path) -> None:
-    out, err = told("components", "--json", folder=site)
+@pytest.mark.usefixtures("site")
+def test_what_modules_print_is_not_in_the_list(told: Telling) -> None:
+    out, err = told("components", "--json")
     assert "bounded" in [one["name"] for one in json.loads(out)["components"]] and err == "said at import\n"
-    out, err = told("schema", folder=site)
+
+
+@pytest.mark.usefixtures("site")
+def test_what_modules_print_is_not_in_the_schema(told: Telling) -> None:
+    out, err = told("schema")
     Draft202012Validator.check_schema(json.loads(out))
     assert "bounded" in out and err == "said at import\n"
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Final
 
@@ -15,16 +13,17 @@ import pytest
 from foosim.deployment.assets import read_robot
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.world.bodies.urdf_text import snippet
+from tests.conftest import Command, Typed
 
 ROOT: Final = Path(__file__).parents[2]
 ARM: Final = ROOT / "deploy" / "models" / "arm.urdf"
 PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
-COMMAND: Final = "from foosim.cli import main; main()"
 
 
-def inspected(*arguments: str | Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", COMMAND, "urdf", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+@pytest.fixture
+def inspected(typed: Typed) -> Command:
+    """Runs the command, in an empty folder."""
+    return typed("urdf")
 
 
 def block(language: str) -> str:
@@ -33,15 +32,14 @@ def block(language: str) -> str:
     return text
 
 
-def test_the_page_shows_what_the_command_prints(tmp_path: Path) -> None:
+def test_the_page_shows_what_the_command_prints(tmp_path: Path, inspected: Command) -> None:
     (tmp_path / "turret.urdf").write_text(block("xml"))
-    done = inspected("turret.urdf", folder=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, block("text"), "")
+    assert inspected("turret.urdf") == (0, block("text"), "")
 
 
-def test_json_has_the_tree_in_si_units() -> None:
+def test_json_has_the_tree_in_si_units(inspected: Command) -> None:
     done = inspected(ARM, "--assets", ROOT / "deploy", "--json")
-    about = json.loads(done.stdout)
+    about = json.loads(done.out)
     assert about["file"] == "models/arm.urdf" and about["mass"] == pytest.approx(14.9) and about["free_base"] is None
     assert len(about["links"]) == 9 and len(about["moving"]) == 7
     elbow = about["links"][4]
@@ -71,22 +69,24 @@ def test_json_has_the_tree_in_si_units() -> None:
         ),
     ],
 )
-def test_what_is_no_robot_is_bad_input(tmp_path: Path, name: str, content: bytes | None, what: str) -> None:
+def test_what_is_no_robot_is_bad_input(
+    tmp_path: Path, inspected: Command, name: str, content: bytes | None, what: str
+) -> None:
     if name == "folder":
         (tmp_path / name).mkdir()
     elif content is not None:
         (tmp_path / name).write_bytes(content)
-    done = inspected(name, folder=tmp_path)
-    assert done.returncode == 2 and done.stdout == ""
-    assert what in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    done = inspected(name)
+    assert done.code == 2 and done.out == ""
+    assert what in done.err and len(done.err.splitlines()) == 1, done.err
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_without_permission_is_bad_input(tmp_path: Path) -> None:
+def test_a_file_without_permission_is_bad_input(tmp_path: Path, inspected: Command) -> None:
     (tmp_path / "a.urdf").write_bytes(ARM.read_bytes())
     (tmp_path / "a.urdf").chmod(0)
-    done = inspected("a.urdf", folder=tmp_path)
-    assert done.returncode == 2 and "a.urdf: Permission denied" in done.stderr
+    done = inspected("a.urdf")
+    assert done.code == 2 and "a.urdf: Permission denied" in done.err
 
 
 def test_what_has_wheels_is_not_proposed_to_be_fixed(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""The guide to one's own robot, as a reader follows it: its files in an empty folder, its commands in their order."""
+"""The guide to one's own robot, as a reader follows it: its files in an empty folder, its commands in their order.
+
+What starts processes is a process itself; the others are called here.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,16 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from runpy import run_path
 from typing import Final
 
 import pytest
+
+from foosim.cli import main
 
 ROOT: Final = Path(__file__).parents[2]
 PAGE: Final = (ROOT / "docs" / "how-to" / "robot_from_urdf.md").read_text()
@@ -27,23 +36,37 @@ def files() -> dict[str, str]:
 
 def commands() -> list[list[str]]:
     """The lines that are typed, in their order."""
-    blocks = re.findall(r"^```sh\n(.*?)^```$|^    ((?:foosim-|python )[^\n]*)$", PAGE, re.MULTILINE | re.DOTALL)
+    blocks = re.findall(r"^```sh\n(.*?)^```$|^    ((?:foosim |python )[^\n]*)$", PAGE, re.MULTILINE | re.DOTALL)
     lines = [line for sh, one in blocks for line in (sh or one).splitlines()]
     return [shlex.split(line) for line in lines if not line.startswith("export ")]
 
 
-def run(words: list[str], folder: Path) -> tuple[int, str]:
+def run(words: list[str], folder: Path) -> tuple[object, str]:
+    """Run a command in this process; return its exit code and all that it printed."""
+    if words[:2] == ["foosim", "up"]:
+        return run_here(words, folder)
+    with StringIO() as printed, pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", words)
+        with redirect_stdout(printed), redirect_stderr(printed):
+            if words[0] == "python":
+                run_path(words[1])
+                return 0, printed.getvalue()
+            with pytest.raises(SystemExit) as ended:
+                main()
+        return ended.value.code, printed.getvalue()
+
+
+def run_here(words: list[str], folder: Path) -> tuple[int, str]:
     """Run a command as it is installed here; return its exit code and all that it printed."""
-    program = sys.executable if words[0] == "python" else str(Path(sys.executable).parent / words[0])
+    command = [str(Path(sys.executable).parent / words[0]), *words[1:]]
     environment = {**os.environ, "PYTHONPATH": "", "XDG_STATE_HOME": str(folder / "state")}
-    done = subprocess.run(
-        [program, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def printed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
     """What each command printed."""
     folder = tmp_path_factory.mktemp("robot")
     for name, text in files().items():
@@ -55,7 +78,8 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         assert code == (DIFFERS if words[:2] == ["foosim", "capture", "diff"] else 0), f"{line}:\n{text}"
         found[line] = text
     assert {"live.mcap", "turret.mcap", "two.mcap", "commands.csv", "turret.html"} <= {p.name for p in folder.iterdir()}
-    return found
+    yield found
+    del sys.modules["lookout"]
 
 
 def test_the_guide_goes_from_the_file_to_the_capture(printed: dict[str, str]) -> None:

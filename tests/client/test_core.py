@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from foosim.client.core import AGAIN_NS, NEVER_NS, ClientCore
 from foosim.client.errors import PacketError
-from foosim.client.packets import Outgoing
+from foosim.client.player import Packet
 from foosim.common import limits
 from foosim.common.errors import UnknownName
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -53,7 +53,7 @@ DEPLOYMENT = load_deployment(TEXT, NAME)
 LAYOUT = build_layout(DEPLOYMENT, [])
 NUMBERS = np.array(initial_numbers(DEPLOYMENT, LAYOUT))
 HEARD = [("red.goal", "encoder")]
-ECHO = Outgoing("red.goal", "echo", b"one")
+ECHO = Packet("red.goal", "echo", b"one")
 
 
 class Air:
@@ -246,7 +246,7 @@ def test_the_run_waits_for_the_answer_at_each_tick_of_the_period() -> None:
         assert [packet.payload for packet in core.go.packets] == [
             b"%16d" % at for at in (tick - 1, tick) if at in (0, 5)
         ]
-        core.done([Outgoing("red.goal", "echo", b"%d" % tick)])
+        core.done([Packet("red.goal", "echo", b"%d" % tick)])
         air.carry(core)
         assert air.closed() == tick
     delivered = [(d.tick, p.sequence, p.payload) for d in air.deliveries for p in d.packets]
@@ -284,8 +284,8 @@ def test_an_answer_that_cannot_be_sent_leaves_its_tick_waiting() -> None:
     core = in_run("hand", 1)
     taken(core, Go(1, 0, 0, []))
     with pytest.raises(UnknownName, match=r"unknown destination .*'red\.gaol', nearest is 'red\.goal'"):
-        core.done([Outgoing("red.gaol", "echo", b"")])
-    big = Outgoing("red.goal", "echo", bytes(limits.PAYLOAD_BYTES_MAX))
+        core.done([Packet("red.gaol", "echo", b"")])
+    big = Packet("red.goal", "echo", bytes(limits.PAYLOAD_BYTES_MAX))
     with pytest.raises(PacketError, match="bytes in one answer, at most 1048576 are allowed"):
         core.done([big] * 40)
     assert core.go is not None and core.statistics().sent == 0
@@ -345,7 +345,7 @@ def test_what_is_not_taken_in_time_is_counted() -> None:
 
 def test_many_packets_go_in_as_many_messages_as_they_need() -> None:
     core = in_run()
-    core.send([Outgoing("red.goal", "echo", bytes(limits.PAYLOAD_BYTES_MAX))] * 70)
+    core.send([Packet("red.goal", "echo", bytes(limits.PAYLOAD_BYTES_MAX))] * 70)
     messages = [decode_any(Join | Up | Done, message.payload) for message in published(core)]
     assert len(messages) == 3
     assert [p.sequence for m in messages if isinstance(m, Up) for p in m.packets] == list(range(1, 71))
@@ -413,12 +413,12 @@ def test_a_subscription_to_nothing_is_refused(robot: str, channel: str, text: st
 @pytest.mark.parametrize(
     ("packet", "text"),
     [
-        (Outgoing("red.goal", "", b""), "channel '': not 1 to 32 characters"),
-        (Outgoing("red.goal", "c" * 33, b""), "not 1 to 32 characters"),
-        (Outgoing("red.goal", "echo", bytes(32769)), "32769 bytes in one packet, at most 32768 are allowed"),
+        (Packet("red.goal", "", b""), "channel '': not 1 to 32 characters"),
+        (Packet("red.goal", "c" * 33, b""), "not 1 to 32 characters"),
+        (Packet("red.goal", "echo", bytes(32769)), "32769 bytes in one packet, at most 32768 are allowed"),
     ],
 )
-def test_a_packet_that_the_wire_does_not_take_is_refused(packet: Outgoing, text: str) -> None:
+def test_a_packet_that_the_wire_does_not_take_is_refused(packet: Packet, text: str) -> None:
     core = in_run()
     with pytest.raises(PacketError, match=text):
         core.send([ECHO, packet])

@@ -19,10 +19,9 @@ SOURCE = """
 import json
 import sys
 
-class Base:
-    def __init__(self, deployment, parameters):
-        pass
+from foosim import Player
 
+class Base(Player):
     def act(self, tick, samples):
         print("at", tick)
         return {} if tick < 50 else self.fails()
@@ -39,7 +38,7 @@ class InLibrary(Base):
     def fails(self):
         return json.loads("{")
 
-class Unmade:
+class Unmade(Player):
     def __init__(self, deployment, parameters):
         raise SystemExit("no \\n" * 2)
 

@@ -1,11 +1,11 @@
-"""Finding a player's class: what is said of a path that leads to none, and what a module of one's own cannot hurt."""
+"""Finding the class of a player: what is said of a path that leads to none, and of modules that fail at import."""
 
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
-from typing import Final
 
 import pytest
 from typer.testing import CliRunner
@@ -17,14 +17,11 @@ from foosim.client.loading import load_player
 from foosim.common.errors import DeploymentError
 from foosim.players.football import Team
 
-CHILDREN: Final = Path(f"/proc/self/task/{os.getpid()}/children")
-"""The processes that this one has, as Linux lists them: others of its tests may have some."""
-
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWN = """
-class Acts:
-    def __init__(self, deployment, parameters):
-        pass
+from foosim import Player
+
+class Acts(Player):
     def act(self, tick, samples):
         return {}
 
@@ -39,6 +36,9 @@ class Bare:
     def act(self, tick, samples):
         return {}
 
+class Nothing(Player):
+    pass
+
 class Hears(Acts):
     def act(self, tick):
         return {}
@@ -51,9 +51,7 @@ MODULES = {
     "own_typo": "class Acts:\n    def act(self tick)\n",
     "own_importer": "import own_missing\n",
     "own_leaver": "import sys\nprint('own words')\nsys.exit(0)\n",
-    # pytest's fault handler would dump a stack that looks like a failure.
-    "own_crash": "import faulthandler, os\nfaulthandler.disable()\nos.kill(os.getpid(), 11)\n",
-    "own_exit": "import os\nos._exit(3)\n",
+    "own_crash": "import os\nos.kill(os.getpid(), 11)\n",
     "own_hang": "import threading\nthreading.Lock().acquire()\nthreading.Event().wait()\n",
 }
 
@@ -84,14 +82,15 @@ CASES = [
     ("own_typo:Acts",
      "importing own_typo failed: SyntaxError: invalid syntax (FOLDER/own_typo.py:2: def act(self tick))"),
     ("own_leaver:Acts", "importing own_leaver failed: SystemExit: 0 (FOLDER/own_leaver.py:3: sys.exit(0))"),
-    ("own_player:Atcs", "there is no class Atcs in own_player (there are: Acts, Bare, Hears, Takes),"
+    ("own_player:Atcs", "there is no class Atcs in own_player (there are: Acts, Bare, Hears, Nothing, Takes),"
      " nearest is 'own_player:Acts'"),
-    ("own_player:Sits", "Sits is no class with a method act(tick, samples)"),
-    ("own_player:number", "number is no class with a method act(tick, samples)"),
+    ("own_player:Sits", "Sits is no Player (FOLDER/own_player.py:8: class Sits:);"
+     " write: from foosim import Player, class Sits(Player):"),
+    ("own_player:number", "number is no class, 3"),
     ("own_player:Takes", "Takes cannot be made with (deployment, parameters): its constructor takes (deployment)"),
-    ("own_player:Bare", "Bare cannot be made with (deployment, parameters): its constructor takes ()"),
+    ("own_player:Bare", "Bare is no Player (FOLDER/own_player.py:15: class Bare:);"
+     " write: from foosim import Player, class Bare(Player):"),
     ("own_player:Hears", "Hears.act cannot be called with (tick, samples): it takes (self, tick)"),
-    ("foosim.client.player:Player", "Player is abstract: none can be made of it"),
 ]  # fmt: skip
 
 
@@ -106,37 +105,39 @@ def test_a_class_that_cannot_be_loaded_says_why(modules: Path, path: str, text: 
 def test_a_class_is_found_by_its_path() -> None:
     assert load_player("foosim.players.football:Team") is Team
     assert load_player("own_player:Acts").__name__ == "Acts"
+    assert load_player("own_player:Nothing")(None, {}).act(0, {}) == {}, "all hooks of a player are empty"
 
 
 # --- before a run begins ---------------------------------------------------------------------------------------------
 
 
-def test_whatever_a_module_does_when_it_is_imported_stays_in_the_process_that_tries_it(
-    modules: Path, capfd: pytest.CaptureFixture[str]
+@pytest.mark.usefixtures("modules")
+def test_all_that_cannot_play_is_found_and_what_modules_print_goes_to_standard_error(
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
-    before = CHILDREN.read_text()
-    paths = ("own_crash:A", "own_exit:A", "own_leaver:A", "own_player:Acts", "own_player:Atcs", "own_player:Sits")
+    paths = ("own_leaver:A", "own_player:Acts", "own_player:Atcs", "own_player:Sits")
     faults = class_faults((*paths, "foosim.players.football:Team", "foosim.players.football:Teem"), 60.0)
     assert {path: fault.problem.partition(" (")[0] for path, fault in faults.items()} == {
-        "own_crash:A": "importing it ends the interpreter with SIGSEGV",
-        "own_exit:A": "importing it ends the interpreter, code 3",
         "own_leaver:A": "importing own_leaver failed: SystemExit: 0",
         "own_player:Atcs": "there is no class Atcs in own_player",
-        "own_player:Sits": "Sits is no class with a method act(tick, samples)",
+        "own_player:Sits": "Sits is no Player",
         "foosim.players.football:Teem": "there is no class Teem in foosim.players.football",
     }
-    assert [name for name in MODULES if name in sys.modules] == [], "nothing of it is imported here"
     printed = capfd.readouterr()
     assert (printed.out, "own words" in printed.err) == ("", True)
-    assert CHILDREN.read_text() == before, "no process is left"
 
 
-@pytest.mark.usefixtures("modules")
-def test_a_module_that_hangs_is_given_up_and_shows_where(capfd: pytest.CaptureFixture[str]) -> None:
-    ((path, fault),) = class_faults(["own_hang:Acts", "own_player:Acts"], 1.0, " (deadlines.start)").items()
-    where = "where it hangs is on standard error"
-    assert (path, fault.problem) == ("own_hang:Acts", f"importing it has not ended for 1 s (deadlines.start); {where}")
-    assert 'own_hang.py", line 3 in <module>' in capfd.readouterr().err
+@pytest.mark.parametrize(
+    ("module", "code", "place"),
+    [("own_hang", 1, 'own_hang.py", line 3 in <module>'), ("own_crash", -11, 'own_crash.py", line 2 in <module>')],
+)
+def test_a_module_that_hangs_or_crashes_ends_the_process_and_its_stack_is_shown(
+    modules: Path, module: str, code: int, place: str
+) -> None:
+    program = f"from foosim.client.class_check import class_faults; class_faults(['{module}:A'], 0.2)"
+    environment = {**os.environ, "PYTHONPATH": str(modules)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, place in done.stderr) == (code, "", True), done.stderr
 
 
 def test_a_rehearsal_refuses_all_that_cannot_play_before_it_begins(modules: Path) -> None:
@@ -148,7 +149,7 @@ def test_a_rehearsal_refuses_all_that_cannot_play_before_it_begins(modules: Path
     red, blue = ran.exception.problems
     assert red == (
         "--set:1:26: players.player-red.class: there is no class Atcs in own_player"
-        " (there are: Acts, Bare, Hears, Takes), 'own_player:Atcs', nearest is 'own_player:Acts'"
+        " (there are: Acts, Bare, Hears, Nothing, Takes), 'own_player:Atcs', nearest is 'own_player:Acts'"
     )
     assert blue.startswith(
         "--set:2:27: players.player-blue.class: importing own_importer failed: ModuleNotFoundError: "

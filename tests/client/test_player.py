@@ -11,8 +11,8 @@ import pytest
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.packets import Outgoing
-from foosim.client.player import Commands, PlayerLoop, Samples, Turn
+from foosim.client.player import Commands, Packet, Player, Samples, Turn
+from foosim.client.playing import PlayerLoop
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
@@ -31,7 +31,7 @@ SOURCE_LINES = [line.strip() for line in Path(__file__).read_text().splitlines()
 RAISES = SOURCE_LINES.index("raise self.commands") + 1
 
 
-class Scripted:
+class Scripted(Player):
     """A player that does what its test says, and keeps what it was given."""
 
     made: ClassVar[list[Scripted]] = []
@@ -158,14 +158,16 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
          " red.midfield), 'red.gaol', nearest is 'red.goal'"),
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
-        ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a command"),
+        ({"red.goal": (0.0,)}, "red.goal/position takes slide (m), spin (rad): 1 number given (ACT)"),
+        ({"red.goal": {"slide": 0.0, "spni": 0.0}},
+         "red.goal/position takes slide (m), spin (rad): no such name, 'spni', nearest is 'spin' (ACT)"),
         ({"red.goal": Command(0.0, "up")},  # type: ignore[arg-type]
-         "command of red.goal: rod_position.spin is not a number, 'up' (ACT)"),
+         "red.goal/position takes slide (m), spin (rad): spin is not a number, 'up' (ACT)"),
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
-        (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),
-        ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to Commands"),
-        ({"camera": Command(0.0, 0.0)}, "command of camera: no robot that takes a Command (there are: blue.attack,"
+        (None, "act gave a value of type NoneType, not a mapping from robots to commands"),
+        ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to commands"),
+        ({"camera": Command(0.0, 0.0)}, "no robot that takes a Command (there are: blue.attack,"
          " blue.defence, blue.goal, blue.midfield, red.attack, red.defence, red.goal, red.midfield), 'camera' (ACT)"),
     ],
 )  # fmt: skip
@@ -184,22 +186,22 @@ def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
 
 def test_whoever_says_too_much_at_once_is_named() -> None:
     loop = begun()
-    much = Outgoing("", "talk", bytes(32 * 1024))
+    much = Packet("", "talk", bytes(32 * 1024))
     Scripted.made[-1].commands = Turn({}, [much] * 40)
     with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 5: \d+ bytes in one answer, at most 1048576"):
         go(loop, 1)
     free = begun("players.player-red.lockstep=false")
-    Scripted.made[-1].commands = Turn({}, [Outgoing("", "talk", b"")] * 65_537)
+    Scripted.made[-1].commands = Turn({}, [Packet("", "talk", b"")] * 65_537)
     with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 0: 65537 packets at once, at most 65536"):
         free.step(10_000_000)
 
 
 def test_a_player_that_cannot_be_made_says_why() -> None:
-    class Fails:
+    class Fails(Player):
         def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
             raise parameters["error"]
 
-    class Refuses:
+    class Refuses(Player):
         def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
             raise BadValue("parameter team is not one of red, blue", "green")
 

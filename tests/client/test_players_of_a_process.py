@@ -18,7 +18,7 @@ import typer
 from foosim.client import main as client_main
 from foosim.client.errors import PlayerError
 from foosim.client.main import PlayerShell, run_players
-from foosim.client.player import Commands, Samples
+from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
@@ -48,7 +48,7 @@ RED, BLUE = "player-red", "player-blue"
 LATER_NS: Final = 2**62
 
 
-class Counts:
+class Counts(Player):
     """A player that counts its turns, and fails when it is told to."""
 
     fails = False

@@ -8,7 +8,7 @@ from typing import Final
 import pytest
 
 from foosim.client.core import AWAY_AGAIN_NS, ClientCore
-from foosim.client.packets import Outgoing
+from foosim.client.player import Packet
 from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
@@ -60,8 +60,8 @@ class Storm(Air):
                 self.carry(client)
 
 
-def packets_of(tick: int) -> list[Outgoing]:
-    return [Outgoing("red.goal", "echo", b"%d" % tick), Outgoing("blue.goal", "echo", b"%d" % tick)]
+def packets_of(tick: int) -> list[Packet]:
+    return [Packet("red.goal", "echo", b"%d" % tick), Packet("blue.goal", "echo", b"%d" % tick)]
 
 
 PLANS: Final[tuple[tuple[tuple[int, bool, bool], ...], ...]] = (

@@ -12,8 +12,8 @@ import pytest
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.packets import Outgoing
-from foosim.client.player import PlayerLoop, Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
+from foosim.client.playing import PlayerLoop
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -28,7 +28,7 @@ NAME = "player-red"
 HEARS = "players.player-red.hears={'player-*': [beacon], 'blue.*': [encoder], camera: [echo]}"
 
 
-class Speaks:
+class Speaks(Player):
     """Returns what its test says; keeps what it hears."""
 
     turn: ClassVar[Any] = Turn({})
@@ -83,7 +83,7 @@ def test_it_hears_what_its_selectors_match_beside_its_robots() -> None:
 
 def test_packets_leave_before_commands_in_their_order() -> None:
     loop, _ = begun()
-    packets = [Outgoing("", "beacon", b"2"), Outgoing("player-blue", "word", b"1"), Outgoing("red.goal", "echo", b"")]
+    packets = [Packet("", "beacon", b"2"), Packet("player-blue", "word", b"1"), Packet("red.goal", "echo", b"")]
     sent = go(loop, Turn({"red.goal": Command(0.0, 0.0)}, packets))
     assert sent[:3] == [("", "beacon", b"2"), ("player-blue", "word", b"1"), ("red.goal", "echo", b"")]
     assert sent[3][:2] == ("red.goal", "position")
@@ -92,11 +92,11 @@ def test_packets_leave_before_commands_in_their_order() -> None:
 @pytest.mark.parametrize(
     ("turn", "text"),
     [
-        (Turn({}, [Outgoing("player-bleu", "beacon", b"")]), "unknown destination (there are: blue.attack,"),
-        (Turn({}, [Outgoing("blue.goal", "position", bytes(16))]), "not one of its robots (there are: camera,"),
-        (Turn({}, [Outgoing("", "", b"")]), "channel '': not 1 to 32 characters"),
-        (Turn({}, [Outgoing("", "beacon", "text")]), "a payload is a str, not bytes"),  # type: ignore[arg-type]
-        (Turn({}, b"x"), "a turn's packets are a bytes, not a sequence of Outgoing"),  # type: ignore[arg-type]
+        (Turn({}, [Packet("player-bleu", "beacon", b"")]), "unknown destination (there are: blue.attack,"),
+        (Turn({}, [Packet("blue.goal", "position", bytes(16))]), "not one of its robots (there are: camera,"),
+        (Turn({}, [Packet("", "", b"")]), "channel '': not 1 to 32 characters"),
+        (Turn({}, [Packet("", "beacon", "text")]), "a payload is a str, not bytes"),  # type: ignore[arg-type]
+        (Turn({}, b"x"), "a turn's packets are a bytes, not a sequence of Packet"),  # type: ignore[arg-type]
         (Turn(None), "act gave a value of type NoneType, not a mapping"),  # type: ignore[arg-type]
     ],
 )
@@ -107,7 +107,7 @@ def test_a_turn_that_must_not_be_ends_the_player(turn: Turn, text: str) -> None:
     assert str(error.value).startswith(f"{NAME} failed at tick 5: {text}")
 
 
-class Counts:
+class Counts(Player):
     """Broadcasts the number of its turn; keeps what it has heard from the other."""
 
     heard: ClassVar[dict[str, list[tuple[int, bytes]]]] = {}
@@ -120,7 +120,7 @@ class Counts:
     def act(self, tick: int, samples: Samples) -> Turn:
         self.turns += 1
         Counts.heard[self.name] += [(tick, sample.value) for sample in samples.values() if type(sample.value) is bytes]
-        return Turn({}, [Outgoing("", "count", b"%d" % self.turns)])
+        return Turn({}, [Packet("", "count", b"%d" % self.turns)])
 
 
 def test_players_hear_each_other_in_a_run_a_link_s_delay_later(monkeypatch: pytest.MonkeyPatch) -> None:

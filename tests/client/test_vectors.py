@@ -10,13 +10,11 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.client.player import Sample
 from foosim.client.vectors import CommandVector, ReadingVector, chosen
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.protocol.messages import Received
 from foosim.rehearsal.simulation import read_for_stepping
-from foosim.world.sensors.ball import BallPosition
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -39,14 +37,11 @@ def test_readings_are_in_the_order_of_their_names_with_units() -> None:
     assert vector.columns[0][4:] == (-inf, inf) and vector.columns[-1].low == -1.0
 
 
-def test_samples_and_payloads_give_the_same_vector() -> None:
+def test_payloads_are_joined_with_their_ages() -> None:
     vector = ReadingVector(DEPLOYMENT, [ENCODER, BALL], ages=True)
-    sample = Sample(*BALL, 3, 1_000_000, 2_000_000, BallPosition(0.1, -0.2, 0.3))
-    found = vector.of_samples({BALL: sample}, 5_000_000)
-    assert found.tolist() == [0.1, -0.2, 0.3, 0.0, 0.0, 0.004, -1.0]
     payload = struct.pack("<3d", 0.1, -0.2, 0.3)
     packet = Received("camera", 3, 0, "ball", 1_000_000, 2_000_000, payload)
-    assert vector.join({BALL: packet}, 5_000_000).tolist() == found.tolist()
+    assert vector.join({BALL: packet}, 5_000_000).tolist() == [0.1, -0.2, 0.3, 0.0, 0.0, 0.004, -1.0]
     plain = ReadingVector(DEPLOYMENT, [BALL]).join({BALL: packet}, 0)
     plain[0] = 7.0
     assert plain.tolist() == [7.0, -0.2, 0.3], "it is the caller's own"

@@ -1,6 +1,8 @@
-"""Each of foosim's forms in a world of its own: the laws, its settings at their limits and beyond.
+"""Each of foosim's forms in a world of its own: its settings beyond their limits.
 
-`make forms` has the long part: thousands of ticks by several seeds, and runs with settings at their limits.
+`make forms` has the long part: the laws, thousands of ticks by several seeds, and runs with settings at their limits.
+`make test` has the laws of all forms together, in the mixed worlds of tests/laws, and of those alone that these cannot
+have.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import FORMS, own_module
 from tests.forms.limits import Edge, edges
-from tests.forms.worlds import VARIANTS, WORLDS, World
+from tests.forms.worlds import VARIANTS, WORLDS, World, changed_slots
 
 Key = tuple[str, ...]
 TICKS: Final = 100
@@ -32,6 +34,11 @@ OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque")]
 """What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has these."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
+ALONE: Final = {("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")}
+"""What no mixed world has: each has one engine and one scene."""
+EACH_ALONE: Final = pytest.mark.parametrize(
+    "key", [pytest.param(key, marks=() if key in ALONE else pytest.mark.campaign) for key in ALL], ids="-".join
+)
 
 
 @cache
@@ -58,21 +65,15 @@ def changed(text: str) -> set[str]:
     """Return which slots of a world change."""
     frames = Frames()
     rehearse(text, NAME, TICKS, 1, settings=Settings(on_commit=frames))
-    first, last = frames.frames[0], frames.frames[-1]
-    return {
-        f"{entity.name} {slot}"
-        for entity in first.layout.entities
-        for slot, at in entity.offsets.items()
-        if first.numbers[at : at + entity.counts[slot]] != last.numbers[at : at + entity.counts[slot]]
-    }
+    return changed_slots(frames.frames[0], frames.frames[-1])
 
 
-@EACH
+@EACH_ALONE
 def test_it_obeys_the_laws(key: Key) -> None:
     assert broken(ALL[key].text()) == []
 
 
-@EACH
+@EACH_ALONE
 def test_its_world_moves(key: Key) -> None:
     """A world in which nothing happens would prove nothing: robots go where they are told, sensors measure."""
     moved = changed(ALL[key].text())
@@ -83,18 +84,27 @@ def test_its_world_moves(key: Key) -> None:
 
 @EACH
 def test_settings_beyond_their_limits_are_refused_at_their_place(key: Key) -> None:
-    world = ALL[key]
-    for edge in edges(registry.find(*key[:2]), world):
-        if not edge.is_within:
-            problem = problem_of(key, edge)
-            place = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, (*world.place, *edge.place))))
-            assert f" {place}: " in problem or f" {place.rpartition('.')[0]}: " in problem, (edge.label, problem)
+    """Those of different settings together, where each is told of; the others one by one."""
+    waiting = [edge for edge in edges(registry.find(*key[:2]), ALL[key]) if not edge.is_within]
+    while waiting:
+        together = list({edge.place: edge for edge in reversed(waiting)}.values())
+        told = problem_of(key, *together).splitlines()
+        for edge in together:
+            waiting.remove(edge)
+            place = place_of(key, edge)
+            if not any(f" {place}: " in line and str(edge.value) in line for line in told):
+                problem = problem_of(key, edge)
+                assert f" {place}: " in problem or f" {place.rpartition('.')[0]}: " in problem, (edge.label, problem)
 
 
-def problem_of(key: Key, edge: Edge) -> str:
-    """Return why a deployment with the setting is refused; nothing where it is not."""
+def place_of(key: Key, edge: Edge) -> str:
+    return re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, (*ALL[key].place, *edge.place))))
+
+
+def problem_of(key: Key, *changed: Edge) -> str:
+    """Return why a deployment with these settings is refused; nothing where it is not."""
     try:
-        load_deployment(ALL[key].text((edge.place, edge.value)), NAME)
+        load_deployment(ALL[key].text(*[(edge.place, edge.value) for edge in changed]), NAME)
     except DeploymentError as error:
         return str(error)
     return ""

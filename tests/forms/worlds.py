@@ -12,13 +12,15 @@ from typing import Any, Final, NamedTuple
 import yaml
 from msgspec import Struct
 
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Player, Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import write_yaml
 from foosim.world.components.fitted import actuators_of
 from foosim.world.forms import registry
+from foosim.world.forms.forms import SAMPLES
 from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
@@ -26,11 +28,12 @@ Place = tuple[str | int, ...]
 RODS: Final = ("red.goal", "red.attack", "blue.goal", "blue.attack")
 ROVERS: Final = ("rover-1", "rover-2", "rover-3")
 SCENE: Final = ("field", "floor", "walls", "goal", "ramps")
+MOTIONS: Final = ("position", "joint_positions", "wheel_travel")
 CHARGER: Final = {"tag": "vehicle", "radius": "1 m", "power": "2 W"}
 LINK: Final = {"id": "all", "from": "*", "to": "*", "delay": "2 ms", "loss": "10 %", "order": "fifo"}
 
 
-class Driver:
+class Driver(Player):
     """Gives each of its robots another command in each of its turns, drawn within a range and its actuator's limits."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -225,6 +228,31 @@ def _driven(kind: str, bounds: Sequence[float]) -> World:
         data["robots"][rod]["actuators"] = {"motors": {"kind": kind}}
     place: Place = ("robots", RODS[0], "actuators", "motors")
     return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")}, place)
+
+
+def changed_slots(first: Frame, last: Frame) -> set[str]:
+    """Return the slots that differ between two frames, each after its entity."""
+    return {
+        f"{entity.name} {slot}"
+        for entity in first.layout.entities
+        for slot, at in entity.offsets.items()
+        if first.numbers[at : at + entity.counts[slot]] != last.numbers[at : at + entity.counts[slot]]
+    }
+
+
+def still(deployment: Deployment, frames: Sequence[Frame]) -> set[str]:
+    """Return the robots and objects that do not move from a first frame to a last, and sensors that do not measure."""
+    changed = changed_slots(frames[0], frames[-1])
+    moving = {
+        entity.name: {f"{entity.name} {slot}" for slot in MOTIONS if slot in entity.offsets}
+        for entity in frames[0].layout.entities
+    }
+    measuring = {
+        f"{robot} {channel}": {f"{robot} {channel}.{SAMPLES}"}
+        for robot, about in deployment.robots.items()
+        for channel in about.sensors
+    }
+    return {name for name, slots in {**moving, **measuring}.items() if slots and not slots & changed}
 
 
 class World(NamedTuple):

@@ -1,7 +1,7 @@
 """Planted bugs that the swarm meets too rarely: a test of the cores finds each of them, directly.
 
-As a plugin of pytest, `-p tests.gate.direct`, this module plants the bug that FOOSIM_PLANTED_BUG names. To add one:
-as in `tests.gate.mutants`, with the id of the test that fails with the bug in place of a seed.
+`python -m tests.gate.direct` runs these tests, each in a fork of a process that has collected all of them, with its
+bug planted. To add one: as in `tests.gate.mutants`, with the id of the test that fails with the bug in place of a seed.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+import msgspec
+import pytest
 from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
@@ -28,8 +30,14 @@ from foosim.vhub.state import hub_state
 from tests.gate.planting import Planting
 
 ROOT: Final = Path(__file__).parents[2]
-PLANTED: Final = "FOOSIM_PLANTED_BUG"
-"""The variable of the environment with the name of the bug."""
+OPTIONS: Final = ("-q", "-n", "0", "-p", "no:cacheprovider")
+
+
+class Failed(NamedTuple):
+    """How a test ended with a bug planted."""
+
+    exit_code: int
+    output: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,20 +49,34 @@ class DirectMutant:
     test: str
     plant: Callable[[Planting], None]
 
-    def run(self) -> subprocess.CompletedProcess[str]:
-        """Run the test with the bug planted, in a process of its own."""
-        command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "-p", __name__, self.test]
-        environment = {**os.environ, PLANTED: self.name}
-        environment.pop("PYTEST_ADDOPTS", None)
-        return subprocess.run(
-            command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
-        )
+
+def run_all(folder: Path) -> dict[str, Failed]:
+    """Run the test of each bug with the bug planted; the folder takes their output."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    command = [sys.executable, "-m", __name__, str(folder)]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    codes = msgspec.json.decode(done.stdout.splitlines()[-1], type=dict[str, int])
+    return {name: Failed(code, (folder / name).read_text()) for name, code in codes.items()}
 
 
-def pytest_configure(config: Any) -> None:
-    """Plant the bug that the environment names."""
-    name = os.environ[PLANTED]
-    next(mutant for mutant in DIRECT if mutant.name == name).plant(Planting())
+def _run_forked(mutant: DirectMutant, output: Path) -> int:
+    """Run a mutant's test in a fork, which ends with the exit code of pytest."""
+    child = os.fork()
+    if child == 0:
+        with output.open("w") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+            mutant.plant(Planting())
+            os._exit(pytest.main([*OPTIONS, mutant.test]))
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def main() -> None:
+    """Print the exit codes by name, in the last line; the tests' output goes into the folder that is named."""
+    assert pytest.main([*OPTIONS, "--collect-only", *(mutant.test for mutant in DIRECT)]) == pytest.ExitCode.OK
+    codes = {mutant.name: _run_forked(mutant, Path(sys.argv[1], mutant.name)) for mutant in DIRECT}
+    print(f"\n{msgspec.json.encode(codes).decode()}")
 
 
 def _epochs_fall(planting: Planting) -> None:
@@ -191,3 +213,6 @@ DIRECT: Final = (
         _heard_again,
     ),
 )
+
+if __name__ == "__main__":
+    main()

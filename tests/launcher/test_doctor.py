@@ -130,17 +130,6 @@ def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, fol
     assert found(case, "vhub").state == "fine"
 
 
-def test_clients_with_passwords_need_one(folder: Path) -> None:
-    text = read_deployment_text(TABLE) + "\naccess: {radio: password}\n"
-    case = Case(load_deployment(text, "table.yaml"), "127.0.0.1", pki=folder)
-    finding = found(case, "client.player-red")
-    assert finding.state == "problem" and finding.remedy.startswith("foosim pki init")
-    certificates.issue_password(folder, "client.player-red")
-    assert "a password and a certificate" in found(case, "client.player-red").text
-    (folder / "client.player-red.pem").unlink()
-    assert found(case, "client.player-red").state == "fine"
-
-
 def test_ports_that_are_taken_or_elsewhere_are_found(deployment: Deployment) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

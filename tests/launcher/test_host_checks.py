@@ -28,10 +28,9 @@ def with_certificates(*sets: str) -> Deployment:
 def test_what_is_sent_to_a_host_is_its_own_and_no_more() -> None:
     assert files_for(with_certificates(), "left") == ["ca.pem", "node.blue.key", "node.blue.pem"]
     assert files_for(with_certificates(), "radio") == ["ca.pem", "vhub.key", "vhub.pem"]
-    passwords = with_certificates("access={radio: password}", "players.player-red.host=left")
-    assert files_for(passwords, "left") == ["ca.pem", "node.blue.key", "node.blue.pem", "client.player-red.password"]
-    compared = ["client.player-blue.password", "client.player-red.password"]
-    assert files_for(passwords, "radio") == ["ca.pem", "vhub.key", "vhub.pem", *compared]
+    assert files_for(with_certificates("players.player-red.host=left"), "left") == [
+        *("ca.pem", "node.blue.key", "node.blue.pem", "client.player-red.key", "client.player-red.pem")
+    ]
     with pytest.raises(Failed, match="nothing is placed on host radio"):
         files_for(with_certificates("vhub.host=left"), "radio")
 

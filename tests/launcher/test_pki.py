@@ -26,7 +26,6 @@ from foosim.runtime.transport.certificates import (
     check_host,
     load_credentials,
     operator_credentials,
-    passwords_file,
     viewer_credentials,
 )
 
@@ -249,21 +248,16 @@ def test_a_viewer_is_the_only_one_or_named_or_the_operator(folder: Path, monkeyp
     assert found is not None and found.identity == "viewer.wall"
 
 
-def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
-    made = pki.issue_password(folder, "client.hand")
-    assert len(made) >= 24
+def test_a_client_gets_a_certificate_by_its_name(folder: Path) -> None:
+    code, output = run("client", folder, "hand", "--days", "7")
+    assert (code, output) == (0, f"{folder / 'client.hand.pem'}\n")
     found = load_credentials(folder, "client.hand")
-    assert found is not None and (found.user, found.password) == ("hand", made) and made not in repr(found)
-    (folder / "client.other.password").write_text("s3cret\n")
-    with passwords_file(folder, ["hand", "other", "third"]) as path:
-        assert path.read_text() == f"hand:{made}\nother:s3cret\n"
-        assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    assert not path.exists()
-    pki.issue(folder, ["client.hand"])
-    with pytest.raises(CertificateError, match=r"a certificate and a password of client\.hand: remove"):
-        load_credentials(folder, "client.hand")
-    with pytest.raises(CertificateError, match="needs the root certificate"):
-        load_credentials(None, "client.hand", "s3cret")
+    assert found is not None and found.until is not None and found.until - wall_clock.now_utc() < timedelta(days=7)
+    assert stat.S_IMODE((folder / "client.hand.key").stat().st_mode) == 0o600
+    before = (folder / "client.hand.pem").read_bytes()
+    code, output = run("client", folder, "other", "hand")
+    assert code == 3 and f"exists already, and is not overwritten: {folder / 'client.hand.pem'}" in output
+    assert (folder / "client.hand.pem").read_bytes() == before and not (folder / "client.other.pem").exists()
 
 
 @pytest.mark.parametrize(
@@ -273,6 +267,10 @@ def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
         (["init", "FOLDER", "TABLE", "--days", "9999"], 2, "days of a certificate are from 1 to 825"),
         (["init", "FOLDER", "TABLE", "--send"], 2, "--send: the deployment places nothing on a host, 'table'"),
         (["init", "FOLDER", "NOWHERE"], 2, "there is no such file"),
+        (["client", "FOLDER", "Hand"], 2, "not a name for a client, 'Hand'"),
+        (["client", "FOLDER", "../hand"], 2, "not a name for a client, '../hand'"),
+        (["client", "FOLDER", "hand", "--days", "0"], 2, "days of a certificate are from 1 to 825"),
+        (["client", "NOWHERE", "hand"], 3, "has no ca.pem; foosim pki init"),
         (["show", "NOWHERE"], 3, "cannot be read, No such file"),
     ],
 )
@@ -283,32 +281,18 @@ def test_what_cannot_be_done_is_said(folder: Path, arguments: list[str], code: i
 
 
 @pytest.mark.parametrize("who", ["robot.red", "node.Red"])
-def test_only_identities_get_certificates_and_only_clients_passwords(folder: Path, who: str) -> None:
+def test_only_identities_get_certificates(folder: Path, who: str) -> None:
     with pytest.raises(BadValue, match=r"not an identity \(supervisor, vhub, node.NAME,"):
         pki.issue(folder, [who])
-    with pytest.raises(BadValue, match="only clients have passwords"):
-        pki.issue_password(folder, "node.red")
-    (folder / "client.hand.password").write_text("a b\n")
-    with pytest.raises(CertificateError, match="a password is printable ASCII"):
-        load_credentials(folder, "client.hand")
     with pytest.raises(CertificateError, match=r"has no ca.pem; foosim pki init .* FILE makes one"):
         pki.issue(folder.parent / "nowhere", ["node.red"])
 
 
-def test_where_clients_have_passwords_a_deployment_gets_these(folder: Path, tmp_path: Path) -> None:
-    file = tmp_path / "passwords.yaml"
-    file.write_text(f"{TABLE.read_text()}\naccess: {{radio: password, operators: [ann]}}\n")
-    assert run("init", folder, file)[0] == 0
-    assert certificates.identities_in(folder) == ["node.blue", "node.red", "operator.ann", "supervisor", "vhub"]
-    before = (folder / "client.player-red.password").read_text()
-    assert run("init", folder, file) == (0, ""), "everybody has something"
-    assert (folder / "client.player-red.password").read_text() == before != ""
-
-
 def test_without_the_roots_key_nothing_is_issued(folder: Path) -> None:
     os.remove(folder / "ca.key")
-    code, output = run("init", folder, TABLE)
-    assert code == 3 and "certificates are issued where the root's key is kept" in output
+    for words in (("init", folder, TABLE), ("client", folder, "hand")):
+        code, output = run(*words)
+        assert code == 3 and "certificates are issued where the root's key is kept" in output
 
 
 def test_a_whole_deployment_is_issued_in_one_command(folder: Path) -> None:

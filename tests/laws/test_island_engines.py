@@ -31,6 +31,8 @@ PLACES_M: Final = (0.0, 0.5, 8.0, 12.0)
 JOINTS: Final = 7
 AXES: Final[tuple[Vector, ...]] = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 REACH_M: Final = 1.2
+SEEN_TICKS: Final = 600
+HEAPED_TICKS: Final = 240
 
 
 def draw(purpose: int, tick: int, low: float = 0.0, high: float = 1.0) -> float:
@@ -199,12 +201,13 @@ def check(outcome: Outcome, contacts: float, handovers: int) -> None:
     print(f"seed {SEED}: {outcome}")
     assert outcome.contacts >= contacts and outcome.handovers >= handovers and outcome.rebuilt > 0
     assert outcome.largest >= 3, "arms and boxes share islands"
-    assert outcome.arms_met >= 100, "arms hit each other"
+    assert outcome.arms_met >= 50, "arms hit each other"
     assert outcome.differing == []
 
 
 def test_islands_have_the_same_bits_whatever_engine_solves_them() -> None:
-    check(compared(1_200), contacts=50, handovers=100)
+    """As long as any of the mutations below takes at most."""
+    check(compared(SEEN_TICKS), contacts=50, handovers=100)
 
 
 @pytest.mark.campaign
@@ -288,7 +291,7 @@ class HoldsAnothers(Comparison):
     ids=["no parking", "one solve", "order", "another's body"],
 )
 def test_a_rule_that_is_broken_is_seen(kind: type[Comparison]) -> None:
-    outcome = compared(600, kind, until_it_differs=True)
+    outcome = compared(SEEN_TICKS, kind, until_it_differs=True)
     assert outcome.differing, outcome
 
 
@@ -344,12 +347,12 @@ def table(name: str) -> Body:
     return Body(name, "table", (0.0, 0.0, 0.0), (link,), speed_limit=10.0)
 
 
-def heaped(kind: type[CompositionEngine], ticks: int) -> list[int]:
-    """Return at which ticks a heap differs between an engine that is kept and a new one at each tick."""
+def heaped(kind: type[CompositionEngine]) -> int | None:
+    """Return the first tick at which a heap differs between an engine that is kept and a new one at each tick."""
     bodies = [box(f"box{number}", (0.15, 0.1, 0.05), 0.5) for number in range(5)]
     made = Solids([*bodies, *[table(f"table{number}") for number in range(5)]], substeps=2)
-    kept, differing = make_of(kind, made, made.bodies), []
-    for tick in range(ticks):
+    kept, differing = make_of(kind, made, made.bodies), None
+    for tick in range(HEAPED_TICKS):
         if tick % 60 == 0:
             for number, body in enumerate(made.bodies):
                 x, y = draw(10 + number, tick, -0.3, 0.3), draw(30 + number, tick, -0.3, 0.3)
@@ -360,7 +363,8 @@ def heaped(kind: type[CompositionEngine], ticks: int) -> list[int]:
         made.solve(new, made.entities, by_new)
         new.close()
         if by_kept != by_new:
-            differing.append(tick)
+            differing = tick
+            break
         made.numbers = by_kept
     kept.close()
     made.close()
@@ -368,11 +372,11 @@ def heaped(kind: type[CompositionEngine], ticks: int) -> list[int]:
 
 
 def test_a_heap_has_the_same_bits_whatever_was_solved_before() -> None:
-    assert heaped(CompositionEngine, 240) == []
+    assert heaped(CompositionEngine) is None
 
 
 def test_pairs_that_bullet_ends_by_itself_are_remembered() -> None:
-    assert heaped(OnlyParked, 240) != []
+    assert heaped(OnlyParked) is not None
 
 
 @pytest.mark.parametrize(("kind", "count"), [(CompositionEngine, 1), (Untied, 8)], ids=["tied", "untied"])

@@ -1,6 +1,7 @@
-"""A world of nearly all forms: a football table beside rovers in a hall, with all sensors and modifiers.
+"""A world of many forms together: a football table beside rovers in a hall, with all sensors and modifiers.
 
 Whoever computes which robot on however many nodes, with moves and objects made anew, it is the same to the last bit.
+Rigid bodies and robots from files are in the yard of `test_yard`; tests/forms has what neither of both can have.
 """
 
 from __future__ import annotations
@@ -13,17 +14,19 @@ from typing import Any, Final
 import yaml
 
 from foosim.cli.rehearse import elsewhere
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.component_check import broken_laws
+from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
-from foosim.world.forms import registry
-from foosim.world.forms.registry import FORMS, own_module
-from tests.forms.worlds import driver
+from tests.forms.test_forms import ALONE, own
+from tests.forms.worlds import driver, still
+from tests.laws.test_yard import yard
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-TICKS: Final = 200
+TICKS: Final = 120
 NAME: Final = "mixed.yaml"
 MODIFIERS: Final[dict[str, Any]] = {
     "pose": [
@@ -47,21 +50,38 @@ OF_ROD: Final[dict[str, Any]] = {
 }
 """Sensors of the rod of each goal, at rates that are not whole ticks."""
 DRIVES: Final = {
+    "blue.defence": ("joint_velocity", (0.5, 20.0)),
     "red.defence": ("rod_voltage", (20.0, 40.0)),
     "blue.midfield": ("rod_velocity", (1.0, 100.0)),
     "blue.attack": ("rod_force", (40.0, 0.5)),
 }
 """Rods with other drives than that to positions, and the bounds of their commands."""
-UNUSED: Final = {
-    ("engine", "pure"),
-    ("scene", "hall"),
-    ("scene", "football_table"),
-    ("scene", "boxes"),
-    ("scene", "empty"),
-    *(("model", name) for name in ("box", "capsule", "cylinder", "hull", "quadrotor", "sphere", "urdf")),
-    *(("actuator", name) for name in ("force", "joint_position", "joint_torque", "joint_velocity", "rotor_speeds")),
+DRIVEN: Final = {
+    "rover-1": ("wheel_speeds", (1.2, 1.2)),
+    "rover-2": ("wheel_speeds", (1.2, 1.2)),
+    "tug": ("v_w", (0.8, 2.0)),
+    "omni": ("x_y_w", (0.7, 0.7, 2.0)),
+    "craft": ("waypoint", (3.0, 3.0, 0.0, 3.0)),
 }
-"""Scenes are those of the kits; one engine computes."""
+OF_COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
+    "rover-1": [
+        {"kind": "gaussian_noise", "std": "10 mm/s"},
+        {"kind": "bias_walk", "initial": "10 mm/s"},
+        {"kind": "delay", "time": "30 ms"},
+    ],
+    "rover-2": [
+        {"kind": "clip", "low": "-1 m/s", "high": "500 mm/s"},
+        {"kind": "drop_out", "probability": "30 %"},
+        {"kind": "quantise", "step": "50 mm/s"},
+    ],
+}
+CELL: Final = {
+    "kind": "battery",
+    "capacity": "5 J",
+    "idle": "1 W",
+    "drag": "5 N",
+    "chargers": [{"tag": "vehicle", "radius": "1 m", "power": "2 W"}],
+}
 WALK: Final = [{"x": "-5 m", "y": "-2 m"}, {"x": "-5 m", "y": "2 m", "yaw": "180 deg"}]
 
 
@@ -89,6 +109,9 @@ def mixed() -> str:
         for player in data["players"].values():
             player["robots"].pop(rod, None)
     data["players"] |= {
+        f"{robot}-driver": driver([robot], kind, bounds, "50 Hz")["driver"] for robot, (kind, bounds) in DRIVEN.items()
+    }
+    data["players"] |= {
         rod.replace(".", "-"): driver([rod], kind, bounds, "50 Hz")["driver"] for rod, (kind, bounds) in DRIVES.items()
     }
     data["robots"] |= {
@@ -100,7 +123,12 @@ def mixed() -> str:
         "craft": {"model": "rotorcraft", "at": {"x": "-3 m", "y": "-3 m"}},
         "walker": {"model": "mover", "shape": "sphere", "radius": "30 cm", "path": WALK, "speed": "1 m/s"},
     }
-    data["robots"]["tug"]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}}
+    for robot in ("tug", "omni", "craft"):
+        data["robots"][robot]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}}
+    data["robots"]["omni"]["rules"] = {"own": CELL}
+    for rover, modifiers in OF_COMMANDS.items():
+        data["robots"][rover]["actuators"] = {"drive": {"kind": "wheel_speeds", "modifiers": modifiers}}
+    data["scene"] = {"kind": "empty"}
     data["rules"] = {"corner": {"kind": "zone", "length": "9 m", "width": "9 m", "tag": "guest"}}
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
     for player in data["players"].values():
@@ -109,11 +137,17 @@ def mixed() -> str:
     return written(data)
 
 
-def test_every_form_is_in_it() -> None:
-    used = {(form.form, form.name) for form in forms_of(load_deployment(mixed(), NAME))}
-    found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    known = {(form.form, form.name) for form in found if form.module == own_module(form.form, form.name)}
-    assert known - used == UNUSED
+def test_every_form_is_in_a_mixed_world_or_has_its_laws_tested_alone() -> None:
+    text, files = pin_assets(yard(), "yard.yaml", DEPLOY)
+    worlds = (load_deployment(mixed(), NAME), load_deployment(text, "yard.yaml").with_assets(files))
+    used = {(form.form, form.name) for world in worlds for form in forms_of(world)}
+    assert set(own()) - used == ALONE
+
+
+def test_all_of_it_moves_and_measures() -> None:
+    frames = Frames()
+    assert not rehearse(mixed(), NAME, TICKS, 1, settings=Settings(on_commit=frames)).json["failed"]
+    assert still(load_deployment(mixed(), NAME), frames.frames) == set()
 
 
 def test_nodes_moves_and_new_objects_change_nothing() -> None:
@@ -129,6 +163,7 @@ def test_a_kit_changes_nothing_of_another() -> None:
     data = yaml.safe_load(mixed())
     for name in ("rover-1", "rover-2", "charger"):
         del data["robots"][name]
+        data["players"].pop(f"{name}-driver", None)
     del data["hall"]
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
     frames: list[list[list[float | str]]] = []

@@ -26,8 +26,11 @@ from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
-LONG_TICKS: Final = 1_300
-"""In real time long enough for a node to be lost by its silence, and to come back."""
+IMPATIENT: Final = (
+    "engine=pure",
+    "deadlines={heartbeat: 200 ms, tick_named: 100 ms, tick_lost: 200 ms, lockstep_realtime: 400 ms}",
+)
+"""In real time a node is lost by its silence, and back, within TICKS."""
 MS: Final = 1_000_000
 NODES: Final = ("n1", "n2", "n3")
 PURE: Final = ("engine=pure",)
@@ -131,8 +134,8 @@ def test_the_last_node_is_lost_and_the_world_waits_for_one() -> None:
 
 def test_a_zombie_writes_nothing_and_comes_back_by_the_handshake() -> None:
     """Stopped for longer than its deadline, the node is lost by its silence; then it goes on with what it has."""
-    run = disturbed([(100, pause("n2", 1_500))], pace=Pace("realtime"), ticks=LONG_TICKS)
-    assert run.digests == undisturbed(ticks=LONG_TICKS).digests
+    run = disturbed([(100, pause("n2", 300))], sets=IMPATIENT, pace=Pace("realtime"))
+    assert run.digests == undisturbed().digests
     assert told(run) == [("node", "n2"), ("join", "n2")]
     assert "overdue" in run.json["recoveries"][0]["reason"] or "heartbeat" in run.json["recoveries"][0]["reason"]
 
@@ -142,11 +145,11 @@ def test_a_newcomer_that_is_silent_while_it_builds_is_let_in_when_it_is_ready() 
 
     def start_slowly(system: System) -> None:
         system.start("n2")
-        system.pause("n2", 1_500 * MS)
+        system.pause("n2", 300 * MS)
 
-    run = disturbed([(40, kill("n2")), (80, start_slowly)], pace=Pace("realtime"), ticks=LONG_TICKS)
+    run = disturbed([(40, kill("n2")), (80, start_slowly)], sets=IMPATIENT, pace=Pace("realtime"))
     assert told(run) == [("node", "n2"), ("join", "n2")]
-    assert run.json["nodes"]["n2"]["owned"] and run.digests == undisturbed(ticks=LONG_TICKS).digests
+    assert run.json["nodes"]["n2"]["owned"] and run.digests == undisturbed().digests
 
 
 def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
@@ -165,10 +168,10 @@ def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
                 bus.cut_off("n2", traced.now_ns + 1, input_=False)
                 bus.put(SUPERVISOR, channels.EPOCH, last.name, last.payload, traced.now_ns)
 
-    faults = [(100, systems.append), (100, pause("n2", 1_500))]
-    run = disturbed(faults, ticks=LONG_TICKS, pace=Pace("realtime"), observer=see, observes=("publish",))
+    faults = [(100, systems.append), (100, pause("n2", 300))]
+    run = disturbed(faults, sets=IMPATIENT, pace=Pace("realtime"), observer=see, observes=("publish",))
     assert told(run) == [("node", "n2"), ("join", "n2")] and len(readies) > 1
-    assert run.digests == undisturbed(ticks=LONG_TICKS).digests
+    assert run.digests == undisturbed().digests
 
 
 def test_a_short_pause_costs_nobody_its_membership() -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.capture.reader import open_capture
-from foosim.client.player import Samples
+from foosim.client.player import Player, Samples
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.run import Rehearsed, rehearse
@@ -42,7 +42,7 @@ NARROW: Final = (
 """Six rovers with little room, three of which look at nothing and run into everything."""
 
 
-class Blind:
+class Blind(Player):
     """Drives at random."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:

@@ -10,8 +10,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.capture.reader import open_capture
-from foosim.client.packets import Outgoing
-from foosim.client.player import Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common import limits
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets
@@ -115,7 +114,7 @@ def test_sensors_at_uneven_rates_measure_at_their_ticks_and_are_the_same_world_o
 # --- who acts at arrival ---------------------------------------------------------------------------------------------
 
 
-class Talker:
+class Talker(Player):
     """Plays, and says something to the other player each time it is asked; it remembers how often that was."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
@@ -125,7 +124,7 @@ class Talker:
 
     def act(self, tick: int, samples: Samples) -> Turn:
         self._calls += 1
-        said = Outgoing(self._other, "news", f"{self._calls}".encode()), Outgoing("", "gossip", b"all")
+        said = Packet(self._other, "news", f"{self._calls}".encode()), Packet("", "gossip", b"all")
         return Turn(self._team.act(tick, samples), said)
 
 

@@ -10,6 +10,7 @@ from collections import Counter
 from itertools import groupby
 from math import sqrt
 
+import numpy as np
 import pytest
 
 from foosim.common.keyed_random import Slot
@@ -131,11 +132,9 @@ def test_the_expert_form_of_two_states(proof: Proof) -> None:
 
 
 def stationary(steps: list[list[float]]) -> list[float]:
-    """The stationary distribution of a chain, by iteration."""
-    at = [1.0 / len(steps)] * len(steps)
-    for _ in range(100_000):
-        at = [sum(at[i] * steps[i][j] for i in range(len(steps))) for j in range(len(steps))]
-    return at
+    """The stationary distribution of a chain: it is left as it is by a step, and its sum is 1."""
+    stay = np.vstack([np.transpose(steps) - np.eye(len(steps)), np.ones(len(steps))])
+    return [*map(float, np.linalg.lstsq(stay, [0.0] * len(steps) + [1.0], rcond=None)[0])]
 
 
 def test_the_expert_form_of_four_states(proof: Proof) -> None:

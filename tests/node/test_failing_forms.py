@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module, invalidate_caches
@@ -26,6 +24,8 @@ from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
+from tests.conftest import Typed
+from tests.own_forms import folder_on_path
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICK: Final = 25
@@ -358,37 +358,34 @@ def test_a_run_without_such_a_form_has_none(world: World) -> None:
     assert rehearse(world.text, TABLE.name, 5, 1).json["failed_form"] is None
 
 
-COMMANDS: Final = {
-    "validate": "from foosim.cli import main; main()",
-    "check-component": "from foosim.cli import main; main()",
-    "rehearse": "from foosim.cli import main; main()",
-}
+COMMANDS: Final = ("check", "components check", "rehearse")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("tick", [0, TICK])
-def test_no_command_is_done_where_a_form_leaves(tmp_path: Path, command: str, tick: int) -> None:
+def test_no_command_is_done_where_a_form_leaves(
+    tmp_path: Path, typed: Typed, monkeypatch: pytest.MonkeyPatch, command: str, tick: int
+) -> None:
     """`sys.exit(0)` in a sensor: at the trial of a deployment, and in a run."""
-    if (command, tick) == ("validate", TICK):
+    if (command, tick) == ("check", TICK):
         return  # it computes one tick
     source = f"{FORMS}\nacts['sensor'] = lambda view: sys.exit(0)\n".replace("view.tick >= 25", f"view.tick >= {tick}")
-    (tmp_path / "misdeeds.py").write_text(source)
-    sets = ["engine=pure", "players={}", f"robots.red.goal.sensors.own={{{KIND.format('Own')}}}"]
+    (tmp_path / "leavers.py").write_text(source.replace("misdeed", "leaver"))
+    sets = [
+        "engine=pure",
+        "players={}",
+        f"robots.red.goal.sensors.own={{{KIND.format('Own')}}}".replace("misdeeds", "leavers"),
+    ]
     options = [word for one in sets for word in ("--set", one)]
     words = {
-        "validate": ["validate", str(TABLE)],
-        "check-component": ["check-component", "misdeed", "--in", str(TABLE), "--ticks", "40"],
+        "check": [str(TABLE)],
+        "components check": ["leaver", "--in", str(TABLE), "--ticks", "40"],
         "rehearse": [str(TABLE), "--for", "80ms"],
     }[command]
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", COMMANDS[command], *words, *options],
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == (1 if tick else 2), done.stdout + done.stderr
-    assert f"{OWN} failed at tick {tick or 1}: SystemExit: 0 (misdeeds.py:" in done.stdout + done.stderr
+    folder_on_path(tmp_path, monkeypatch)
+    done = typed(*command.split())(*words, *options)
+    assert done.code == (1 if tick else 2), done
+    assert f"{OWN} failed at tick {tick or 1}: SystemExit: 0 (leavers.py:" in done.out + done.err
 
 
 def test_a_deployment_with_a_text_in_a_number_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -58,6 +59,18 @@ def test_without_meshes_there_is_no_trial() -> None:
     check_models(plain, "t", TABLE.read_text(), ["/absent"])
 
 
+def test_what_passed_is_tried_again_only_with_another_file_or_setting(tmp_path: Path) -> None:
+    tries = tmp_path / "tries"
+    command = ["sh", "-c", f"echo >> {tries}; echo done"]
+    exact = "robots.camera.sensors.exact={kind: ball_state, rate: 50 Hz}"
+    other = apply_sets(TEXT, "t", ["nodes={n: {robots: ['*']}}", exact])
+    heavier = apply_sets(TEXT, "t", ["table.ball.mass=30 g"])
+    files = {**FILES, "z.obj": SHARD + b"v 9 9 8\n"}
+    for text, contents, count in ((TEXT, FILES, 1), (other, FILES, 1), (heavier, FILES, 2), (TEXT, files, 3)):
+        check_models(load_deployment(text, "t").with_assets(contents), "t", text, command)
+        assert len(tries.read_text()) == count
+
+
 @pytest.mark.parametrize(
     ("statements", "reason"),
     [
@@ -78,6 +91,24 @@ def test_a_trial_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(mesh_trial, "WALL_S", 0.1)
     with pytest.raises(AssetError, match=r"^t: its shapes failed its trial .* or 0\.1 s$"):
         check_models(deployment(), "t", TEXT, [sys.executable, "-c", "import time; time.sleep(1000)"])
+
+
+def test_a_process_tries_a_world_once_whoever_computes_it_and_again_what_failed(tmp_path: Path) -> None:
+    """Another file is another world."""
+    count, word = tmp_path / "count", tmp_path / "word"
+    command = ["sh", "-c", f"echo >> {count}; cat {word}"]
+
+    def tries(sets: str = "tick=2 ms", files: dict[str, bytes] = FILES) -> int:
+        text = apply_sets(TEXT, "t", [sets])
+        with suppress(AssetError):
+            check_models(load_deployment(text, "t").with_assets(files), "t", text, command)
+        return len(count.read_text())
+
+    word.write_text("no")
+    assert [tries(), tries()] == [1, 2]
+    word.write_text(mesh_trial.DONE)
+    assert [tries(), tries(), tries("nodes={all: {robots: ['*']}}"), tries("players={}")] == [3, 3, 3, 3]
+    assert [tries("substeps=2"), tries(files={**FILES, "a.obj": FILES["z.obj"]})] == [4, 5]
 
 
 # --- hulls -----------------------------------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from foosim.players.yard_reports import (
 from foosim.players.yard_scout import Scout
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings
+from foosim.world.actuators.joint_position import JointPositions
 from foosim.world.frame import Frame
 from tests.forms.worlds import DEPLOY
 
@@ -165,19 +166,21 @@ def test_the_newest_report_counts_whoever_passes_it_on() -> None:
 
 def test_the_arm_stays_away_from_a_side_where_a_scout_is_or_may_be() -> None:
     arm = Arm(load_deployment(text(), YARD.name), {"arm": "arm", "scouts": ["scout-east", "scout-west"]})
-    assert arm.act(0, {}).commands["arm"].positions == UPRIGHT, "it has heard nobody"  # type: ignore[attr-defined]
+    assert arm.act(0, {}).commands["arm"] == JointPositions(UPRIGHT), "it has heard nobody"
 
     def side(east: tuple[float, float], west: tuple[float, float], tick: int) -> float:
         at = tick / 100
         told = [Report(2, at, *east, 0), Report(3, at, *west, 0)]
-        return arm.act(tick, heard(("watch", WATCH, encode_watch(told)))).commands["arm"].positions[0]  # type: ignore[attr-defined,no-any-return]
+        command = arm.act(tick, heard(("watch", WATCH, encode_watch(told)))).commands["arm"]
+        assert isinstance(command, JointPositions)
+        return command.positions[0]
 
     far = (0.6 + NEAR_M + 0.5, 0.0)
     assert side((0.6, 1.0), far, 10) < 0.0
     assert side((0.6, -1.0), far, 20) > 0.0
     assert side((0.6, 1.0), (0.6, -1.0), 30) == 0.0
     assert side((0.6, 1.0), far, 40) < 0.0
-    assert arm.act(400, {}).commands["arm"].positions == UPRIGHT, "silence"  # type: ignore[attr-defined]
+    assert arm.act(400, {}).commands["arm"] == JointPositions(UPRIGHT), "silence"
 
 
 @pytest.mark.parametrize(

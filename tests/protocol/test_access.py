@@ -29,7 +29,6 @@ def deployment(
     nodes: list[str],
     clients: list[str],
     operators: list[str],
-    radio: str = "certificate",
     viewers: list[str] | None = None,
 ) -> Deployment:
     """The table with other names."""
@@ -38,7 +37,7 @@ def deployment(
     content["nodes"] = {name: {"robots": robots if name == nodes[0] else []} for name in nodes}
     content["players"] = {}
     content["clients"] = {name: {} for name in clients}
-    content["access"] = {"operators": operators, "radio": radio, "viewers": viewers or []}
+    content["access"] = {"operators": operators, "viewers": viewers or []}
     return load_deployment(yaml.safe_dump(content), "test")
 
 
@@ -129,14 +128,6 @@ def test_writers_are_told_that_readers_listen_as_those_declare_it() -> None:
             replay = Allowed(access_control(access_to(Plane.REPLAY, made)), identity)
             assert replay("egress", "declare_subscriber", zenoh.KeyExpr("foosim/replay/request/*"))
         assert not passes("egress", "declare_subscriber", zenoh.KeyExpr("foosim/radio/down/other"))
-
-
-def test_clients_with_passwords_are_known_by_their_user_names() -> None:
-    made = deployment(["red"], ["hand"], ["admin"], "password")
-    radio = access_control(access_to(Plane.RADIO, made))
-    assert [subject["usernames"] for subject in radio["subjects"]] == [["hand"]]
-    simulation = access_control(access_to(Plane.SIMULATION, made))
-    assert all("usernames" not in subject for subject in simulation["subjects"]), "the simulation plane has none"
 
 
 @pytest.mark.parametrize(

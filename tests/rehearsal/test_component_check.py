@@ -24,6 +24,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.components.view import View
 from foosim.world.moving.asked import MotionsAsked
+from tests.conftest import Command, Typed
 from tests.kinematic_yard import yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -346,13 +347,15 @@ def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path)
 COMMAND: Final = "from foosim.cli import main; main()"
 
 
+@pytest.fixture
+def command(typed: Typed, planted: Path) -> Command:
+    """Runs `foosim`."""
+    return typed()
+
+
 def checking(*sets: str, ticks: int = 60) -> list[str]:
     words = [word for setting in (*SETS, *sets) for word in ("--set", setting)]
     return [
-        sys.executable,
-        "-P",
-        "-c",
-        COMMAND,
         "check-component",
         "own",
         "--in",
@@ -388,14 +391,14 @@ def test_readings_that_were_not_finite_or_none_are_noted(planted: Path) -> None:
     ]
 
 
-def test_the_end_says_how_many_sensors_were_compared(planted: Path) -> None:
+def test_the_end_says_how_many_sensors_were_compared(planted: Path, command: Command) -> None:
     """One at 1 Hz measures once in a second, and not at tick 0 where it has an offset."""
     (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
     rare = OF_ROD.replace("100 Hz", "1 Hz, offset: 500 ms")
-    done = subprocess.run(checking(rare), capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = command(*checking(rare))
+    assert (done.code, done.err) == (0, "")
     there = sum(len(robot.sensors) for robot in load_deployment(TABLE.read_text(), TABLE.name).robots.values())
-    *_, last = done.stdout.splitlines()
+    *_, last = done.out.splitlines()
     assert last == f"sensor own: {there} of {there + 1} sensors measured, and were compared alone and with others"
 
 
@@ -427,7 +430,10 @@ def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) ->
     (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
     ours, theirs = pty.openpty()
     with subprocess.Popen(
-        checking(OF_ROD, ticks=1_000_000), stdout=subprocess.PIPE, stderr=theirs, text=True
+        [sys.executable, "-P", "-c", COMMAND, *checking(OF_ROD, ticks=1_000_000)],
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
     ) as process:
         os.close(theirs)
         with os.fdopen(ours, "rb", buffering=0) as terminal:
@@ -443,7 +449,7 @@ def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) ->
     assert shown.decode().splitlines() == [first, f"sensor own: interrupted, {first}"]
 
 
-def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path) -> None:
+def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path, command: Command) -> None:
     """Meshes are relative to the folder of the deployment."""
     (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
     folder = planted / "elsewhere"
@@ -452,6 +458,5 @@ def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path) ->
     thing = "scenery={thing: {shape: mesh, file: thing.obj, x: 3 m, z: 1 m, radio: wood}}"
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "engine=bullet", thing])
     (folder / "table.yaml").write_text(text)
-    command = ["check-component", "own", "--in", str(folder / "table.yaml"), "--ticks", "20"]
-    done = subprocess.run([sys.executable, "-P", "-c", COMMAND, *command], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = command("check-component", "own", "--in", folder / "table.yaml", "--ticks", "20")
+    assert done.code == 0, done

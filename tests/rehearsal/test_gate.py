@@ -9,7 +9,7 @@ import pytest
 
 from foosim.node.core import NodeCore
 from foosim.rehearsal.swarm.campaign import fly
-from tests.gate.direct import DIRECT, DirectMutant
+from tests.gate.direct import DIRECT, DirectMutant, Failed, run_all
 from tests.gate.mutants import MUTANTS
 from tests.gate.planting import Mutant
 from tests.gate.search import find
@@ -32,11 +32,18 @@ def test_without_the_bug_its_seed_holds_all_laws(seed: int) -> None:
     assert fly(TABLE.read_text(), TABLE.name, seed).broken == ""
 
 
+@pytest.fixture(scope="module")
+def direct(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Failed]:
+    return run_all(tmp_path_factory.mktemp("direct"))
+
+
 @pytest.mark.parametrize("mutant", DIRECT, ids=lambda mutant: mutant.name)
-def test_a_planted_bug_that_the_swarm_seldom_meets_fails_its_own_test(mutant: DirectMutant) -> None:
-    run = mutant.run()
-    assert run.returncode == pytest.ExitCode.TESTS_FAILED, f"{mutant.rule}:\n{run.stdout}"
-    assert "AssertionError" in run.stdout or "assert " in run.stdout, f"the bug itself is broken:\n{run.stdout}"
+def test_a_planted_bug_that_the_swarm_seldom_meets_fails_its_own_test(
+    direct: dict[str, Failed], mutant: DirectMutant
+) -> None:
+    code, output = direct[mutant.name]
+    assert code == pytest.ExitCode.TESTS_FAILED, f"{mutant.rule}:\n{output}"
+    assert "AssertionError" in output or "assert " in output, f"the bug itself is broken:\n{output}"
 
 
 def test_the_gate_is_wide() -> None:

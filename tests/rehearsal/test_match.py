@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.players import OF_THE_TABLE
-from foosim.rehearsal.match.chart import picture
+from foosim.rehearsal.match.chart import draw
 from foosim.rehearsal.match.figures import chance, figures, mean, rate, share, t_quantile
 from foosim.rehearsal.match.game import Fixture, Game, Link, Played, play, points_of, sets_of
 
@@ -113,8 +113,8 @@ def test_a_game_ends_when_the_rules_say_so() -> None:
 
 def test_a_player_that_fails_ends_its_game_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "tripping.py").write_text(
-        "class Tripping:\n"
-        "    def __init__(self, deployment, parameters): pass\n"
+        "from foosim import Player\n"
+        "class Tripping(Player):\n"
         "    def act(self, tick, samples): raise RuntimeError('fell over')\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
@@ -131,9 +131,13 @@ def test_the_picture_has_a_mark_and_an_interval_for_each_row() -> None:
             link = Link(delay_ms * 1_000_000, loss)
             games = [Played(seed, False, (3 - delay_ms // 20, seed), 0, 30_000, "", link=link) for seed in (1, 2)]
             cells.append((link, figures(games, 2_000_000)))
-    drawn = ElementTree.fromstring(picture(cells, ("team & co (A)", "team (B)"), "team & co against team"))
-    space = "{http://www.w3.org/2000/svg}"
-    assert len(drawn.findall(f"{space}circle")) == 3 * len(cells)
-    texts = [one.text for one in drawn.findall(f"{space}text")]
-    assert "loss 0 %" in texts and "loss 10 %" in texts and "team & co against team" in texts
-    assert {"0", "20", "50"} <= {*texts}
+    figure = Figure()
+    draw(figure, cells, ("team & co (A)", "team (B)"), "team & co against team")
+    left, right = figure.axes
+    assert left.get_legend_handles_labels()[1] == ["loss 0 %", "loss 10 %"]
+    assert [len(axes.containers) for axes in (left, right)] == [2, 4], "a line for each loss, of both on the right"
+    line, _, (bars,) = left.containers[0]
+    assert line.get_xdata().tolist() == [0.0, 20.0, 50.0]
+    assert line.get_ydata().tolist() == [found.difference.value for link, found in cells if not link.loss]
+    ends = [(segment[0][1], segment[1][1]) for segment in bars.get_segments()]
+    assert ends == [pytest.approx((one.difference.low, one.difference.high)) for link, one in cells if not link.loss]

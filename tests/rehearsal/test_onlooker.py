@@ -22,7 +22,7 @@ from foosim.capture.reader import open_capture
 from foosim.cli import rehearse as rehearse_command
 from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app
-from foosim.client.player import Commands, Samples
+from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import Refused
 from foosim.common.units import Pace
 from foosim.deployment.schema import Deployment
@@ -87,7 +87,7 @@ def test_a_player_is_overdue_by_the_time_of_one_turn_in_which_this_process_ran()
     assert hangs(0.2) == "player-red has not joined for 60 s (deadlines.start)"
 
 
-class Hangs:
+class Hangs(Player):
     """A player that does not return from one tick."""
 
     how: ClassVar[Any]

@@ -13,6 +13,7 @@ from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
+from foosim.deployment.event_requests import BadEvent
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.players.learning.table_rewards import with_ball
 from foosim.protocol.messages import Received
@@ -53,6 +54,24 @@ def test_over_the_emulated_network_it_has_the_digests_of_a_rehearsal(name: str, 
         assert digests_of(simulation, ticks) == run_of(DEPLOY / name, ticks, *sets).digests
 
 
+def test_a_partition_that_is_called_for_is_that_of_the_deployment() -> None:
+    """From the next frame on, by what the players do when the camera is silent, and when it is heard again."""
+    cut, healed = 20, 40
+    events = f"[{{at: {2 * cut} ms, partition: [[camera], ['player-*']]}}, {{at: {2 * healed} ms, heal: all}}]"
+    with Simulation(TABLE, agents=[], network=True, sets=[WAIT]) as simulation:
+        found = digests_of(simulation, cut - 1)
+        simulation.partition("camera", ["player-*"])
+        found += digests_of(simulation, healed - cut)
+        simulation.heal()
+        found += digests_of(simulation, TICKS + 1 - healed)
+        with pytest.raises(BadEvent, match="red\\.gaol"):
+            simulation.partition("red.gaol", "camera")
+    assert found == run_of(TABLE, TICKS, WAIT, f"network.events={events}").digests
+    assert found != run_of(TABLE, TICKS, WAIT).digests
+    with Simulation(TABLE, sets=[WAIT]) as simulation, pytest.raises(BadValue, match="no network"):
+        simulation.heal()
+
+
 def test_commands_of_an_agent_are_those_of_a_player_who_sends_the_same() -> None:
     """By the network of the deployment: the packets of the agent draw what those of the player draw."""
     sets = [PLAYERS, WAIT, "network.links.0.loss=20 %"]
@@ -85,7 +104,7 @@ def test_without_a_network_it_has_the_digests_of_a_node_that_gets_the_same_comma
                 for robot, command in sorted(commands.items()):
                     number += 1
                     now_ns = tick * deployment.tick_ns
-                    what = encoder.encode(robot, command)
+                    (what,) = encoder.encode(robot, command)
                     delivered.append(Delivered(now_ns, "waver", number, 0, robot, *what))
                 simulation.step(commands)
                 assert simulation.frame.digest == replica.step([], delivered).digest, tick

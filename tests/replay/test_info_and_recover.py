@@ -15,6 +15,7 @@ from foosim.capture import contents as capture_contents
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch
+from foosim.common.units import parse_ns
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
@@ -114,7 +115,7 @@ def chunk_starts(path: Path) -> list[int]:
 
 
 @pytest.mark.parametrize("within", [80, 5, 0, 12, 30])
-def test_a_finished_capture_with_a_damaged_chunk_says_what_is_damaged_and_what_is_whole(
+def test_a_finished_capture_with_a_damaged_chunk_says_where_and_how_to_cut_out_what_precedes_it(
     run: Path, tmp_path: Path, within: int
 ) -> None:
     """A wrong bit in the rows of a chunk, in its length, its kind, its times, its checksum."""
@@ -125,20 +126,14 @@ def test_a_finished_capture_with_a_damaged_chunk_says_what_is_damaged_and_what_i
     done = replay("recover", bad)
     assert done.code == 1 and bad.read_bytes() == before, done
     lines = done.err.splitlines()
-    assert lines[0] == f"capture {bad} is finished and damaged; it is left as it is"
-    places = [int(found[1]) for found in re.finditer(r"byte (\d+), \d+ bytes: ", done.err)]
-    assert places and all(start <= place < after for place in places), done.err
-    told = re.fullmatch(r"  ticks 0 to (\d+) and (\d+) to 300 are whole, (\d+) between them are lost", lines[-2])
-    if within == 12:  # its rows are whole
-        assert lines[-2] == "  ticks 0 to 300 are whole, 0 between them are lost"
-    else:
-        assert told is not None and 0 < int(told[3]) == int(told[2]) - int(told[1]) - 1 < 60
-    content = msgspec.json.decode(replay("recover", bad, "--json").out)
-    assert content["finished_before"] and not content["whole"] and content["broken"][0]["byte"] == places[0]
-    words = shlex.split(lines[-1].partition("foosim capture ")[2])
-    assert replay(*words[:-1], part).code == 0
-    cut = open_capture(part)
-    assert cut.ticks.tolist() == list(range(content["until_ns"] // 2_000_000 + 1)) and len(cut.ticks) > 30
+    told = re.fullmatch(f"capture {bad} is finished and damaged; it is left as it is: {bad}: byte (\\d+): .+", lines[0])
+    assert told is not None and start <= int(told[1]) < after, done.err
+    words = shlex.split(lines[-1].partition("  what is before the damage: foosim capture ")[2])
+    until_ns = parse_ns(words[3])
+    assert words[:3] == ["cut", str(bad), "--to"] and replay(*words[:-1], part).code == 0
+    cut, whole = open_capture(part), open_capture(run)
+    assert cut.ticks.tolist() == list(range(until_ns // 2_000_000 + 1)) and len(cut.ticks) > 30
+    assert (cut.digests == whole.digests[: len(cut.ticks)]).all()
 
 
 @pytest.mark.parametrize("text", [b"loss: 0.5 %", b"fingerprint", b"/packets", b"before_crc32", b"foosim.end"])
@@ -149,7 +144,8 @@ def test_a_finished_capture_with_a_damaged_description_or_end_says_where(
     before = spoiled(run, bad, run.read_bytes().index(text) + len(text) - 1, 2)
     done = replay("recover", bad)
     assert done.code == 1 and bad.read_bytes() == before
-    assert "\n  ticks 0 to 300 are whole, 0 between them are lost" in done.err and f"{bad}: byte " in done.err, done.err
+    where = "a damaged summary, metadata 'foosim.enf'" if text == b"foosim.end" else "byte"
+    assert f"{bad}: {where}" in done.err, done.err
 
 
 def test_what_cannot_be_recovered_fails_and_stays_as_it_is(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:

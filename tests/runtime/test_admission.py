@@ -9,7 +9,7 @@ from foosim.runtime.transport.admission import ADMISSION_NS, Admission
 from foosim.runtime.transport.certificates import Credentials, NotAuthorised
 from foosim.runtime.transport.open_plane_warning import EVERY_NS, Exposure
 
-WHO = Credentials("node.green", Path("ca.pem"))
+WHO = Credentials("node.green", Path("ca.pem"), Path("node.green.pem"), Path("node.green.key"))
 
 
 def test_silence_is_a_refusal_only_for_who_shows_a_certificate() -> None:

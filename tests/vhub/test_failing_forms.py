@@ -17,6 +17,7 @@ from foosim.rehearsal.run import rehearse
 FORMS: Final = """
 import sys
 from msgspec import Struct
+from foosim import Player
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import model, sensor
 from foosim.world.forms.settings import RobotSettings, SensorSettings
@@ -46,10 +47,7 @@ class Beam:
         return Reading(1.0)
 
 
-class Looker:
-    def __init__(self, deployment, parameters):
-        pass
-
+class Looker(Player):
     def act(self, tick, samples):
         return {}
 

@@ -31,9 +31,17 @@ LONG: Final = (
 """Nobody is given up for being slow; a test of one of these deadlines sets that one."""
 NO_CAPTURE_TO_CLOSE: Final = ("--set", "deadlines.close=1 s")
 """For a run whose vHub is gone at its end: the supervisor waits as long as this for it to close its capture."""
+ONE: Final = ("--processes", "one")
+"""For a run whose processes are not the point: each one that starts costs most of a second of processor time."""
 LIMIT_S: Final = 900.0
 LOOK_S: Final = 0.3
 SLOW: Final = "0.1x"
+
+
+def in_process(process: str, *roles: str) -> list[str]:
+    """The arguments of `up` that put roles into a process; "null" is one of their own each."""
+    return [word for role in roles for word in ("--set", f"{role}.process={process}")]
+
 
 T = TypeVar("T")
 

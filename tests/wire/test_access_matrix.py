@@ -6,6 +6,8 @@ last granted message has come, what was not granted and has not come by then was
 """
 
 import shutil
+import socket
+import ssl
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
@@ -25,8 +27,7 @@ from foosim.launcher.pki import certificates
 from foosim.protocol.access import access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
 from foosim.runtime.transport import session as wire
-from foosim.runtime.transport.certificates import NotAuthorised, load_credentials, passwords_file
-from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.certificates import NotAuthorised, load_credentials
 from foosim.runtime.transport.session import ConnectError, Session
 from foosim.runtime.transport.settings import Security, client_settings, router_settings
 from tests.granted import may_be_present, may_hear, may_put, may_watch
@@ -325,42 +326,32 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
         late = replace(ours, certificate=tmp_path / "late" / "node.red.pem", key=tmp_path / "late" / "node.red.key")
         with pytest.raises(NotAuthorised, match=r"it does not accept .*node.red.pem \(certificate expired\)"):
             Session.client(router.locator, LONG_S, security=Security(late))
-        nameless = replace(ours, certificate=None, key=None, user="red", password="guess")
-        with pytest.raises(NotAuthorised, match=r"it does not accept who has no certificate \("):
-            Session.client(router.locator, LONG_S, security=Security(nameless))
-        with pytest.raises(NotAuthorised, match="requires a certificate or a password"):
+        nameless = ssl.create_default_context(cafile=str(ours.ca))
+        with pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"):
+            shake(router.locator, nameless)
+        with pytest.raises(NotAuthorised, match="requires a certificate"):
             Session.client(router.locator.replace("tls/", "tcp/"), LONG_S)
         Session.client(router.locator, LONG_S, security=Security(ours)).close()
 
 
-def test_passwords_let_clients_in_by_name(folder: Path, tmp_path: Path) -> None:
-    content = yaml.safe_load(read_deployment_text(TABLE))
-    content |= {"players": {}, "clients": {"hand": {}, "other": {}}, "access": {"radio": "password"}}
-    deployment = load_deployment(yaml.safe_dump(content), "test")
-    secret = certificates.issue_password(tmp_path, "client.hand")
-    server, ours = load_credentials(folder, "vhub"), load_credentials(folder, "client.hand", secret)
-    with_certificate = load_credentials(folder, "client.hand")
-    assert server is not None and ours is not None and with_certificate is not None
-    access = access_to(Plane.RADIO, deployment)
-    with passwords_file(tmp_path, ["hand", "other"]) as path:
-        router = Session.router("127.0.0.1", security=Security(server, access, str(path)))
-    assert not path.exists()
-    with router:
-        inbox = Inbox(100)
-        router.subscribe("foosim/radio/up/*", "up", inbox)
-        wrong = replace(ours, password="guess")
-        for theirs in (wrong, replace(ours, user="other"), with_certificate):
-            with pytest.raises(NotAuthorised, match="not authorised, or not reachable"):
-                Session.client(router.locator, 1.0, security=Security(theirs))
-        with Session.client(router.locator, LONG_S, security=Security(ours)) as client:
-            spoof, own = client.publisher("foosim/radio/up/other"), client.publisher("foosim/radio/up/hand")
+def test_clients_without_a_certificate_are_refused_by_the_radio_plane(folder: Path, deployment: Deployment) -> None:
+    server, ours = load_credentials(folder, "vhub"), load_credentials(folder, "client.hand")
+    assert server is not None and ours is not None
+    context = ssl.create_default_context(cafile=str(ours.ca))
+    with Session.router("127.0.0.1", security=Security(server, access_to(Plane.RADIO, deployment))) as router:
+        with pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"):
+            shake(router.locator, context)
+        Session.client(router.locator, LONG_S, security=Security(ours)).close()
 
-            def heard() -> list[tuple[str, str, bytes]]:
-                spoof.put(b"spoof")
-                own.put(b"own")
-                return inbox.take(0.05)
 
-            assert set(wait_for("a packet", heard)) == {("up", "hand", b"own")}
+def shake(locator: str, context: ssl.SSLContext) -> None:
+    """Perform a TLS handshake with a router, and read its alert if it has one."""
+    host, _, port = locator.partition("/")[2].rpartition(":")
+    with (
+        socket.create_connection((host, int(port)), LONG_S) as link,
+        context.wrap_socket(link, server_hostname=host) as secured,
+    ):
+        secured.recv(1)
 
 
 def test_a_plain_router_is_not_taken_for_a_safe_one(folder: Path) -> None:

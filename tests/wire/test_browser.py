@@ -17,9 +17,10 @@ from foosim.cli.view import open_sources
 from foosim.rehearsal.run import rehearse
 from tests.replay.conftest import TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
+from tests.wire.conftest import in_process
 from tests.wire.served import served
 from tests.wire.test_console import addresses_of
-from tests.wire.test_run import last_json
+from tests.wire.test_run import NODES, last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -253,7 +254,7 @@ def end_the_run(page: Page) -> str:
 def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House) -> None:
     page, player = browser, {**PLAYER, "process": "main"}
     players = f"players={json.dumps({LINK[1]: player})}"
-    alone = ("--set", "supervisor.process=null")  # so that it can be killed without the vHub
+    alone = *in_process("null", "supervisor"), *in_process("main", *NODES)  # it is killed without the vHub
     up = house.up("--console", "--json", "--engine", "pure", "--set", players, *alone, players=True)
     addresses = addresses_of(house)
     with looking(page, addresses["view"]):

@@ -10,6 +10,7 @@ from foosim.client import connect, control
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
 from foosim.world.sensors.encoder import RodPosition
+from tests.wire.conftest import ONE
 
 if TYPE_CHECKING:
     from foosim.client.client import Client
@@ -23,7 +24,9 @@ PATIENCE_S = 900.0
 
 
 def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
-    up = house.up("--set", CLIENTS, "--set", PERFECT, "--set", "engine=pure", "--pace", "fast", "--for", "1s", "--json")
+    up = house.up(
+        "--set", CLIENTS, "--set", PERFECT, "--set", "engine=pure", "--pace", "fast", "--for", "1s", "--json", *ONE
+    )
     radio = house.info().radio
     with connect(radio, "hand", "table", timeout_s=PATIENCE_S) as client:
         client.subscribe("red.goal", "encoder")
@@ -41,7 +44,7 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
                 goal.actuators["position"].set(slide=float("nan"), spin=0.0)
             goal.actuators["position"].set(slide=-0.1, spin=0.0)
             goal.actuators["position"].set(slide=0.1, spin=0.5)
-            attack.actuators["position"].set(slide=-0.05, spin=0.0)
+            client.command({"blue.attack": {"slide": -0.05, "spin": 0.0}})
             if len(seen) == TICKS:
                 break
         assert seen == list(range(0, 5 * TICKS, 5))
@@ -67,12 +70,12 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
 
 
 def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_told_why(house: House) -> None:
-    up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure")
+    up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure", *ONE)
     info = house.info()
     assert_strangers_are_refused(info)
     with (
-        connect(info.radio, "ear", timeout_s=PATIENCE_S) as client,
-        connect(info.radio, "hand", timeout_s=PATIENCE_S) as other,
+        connect("run:newest", "ear", timeout_s=PATIENCE_S) as client,
+        connect(f"run:{info.run}", "hand", timeout_s=PATIENCE_S) as other,
     ):
         with pytest.raises(ConnectionRefused, match="a client hand is already here"):
             connect(info.radio, "hand", timeout_s=PATIENCE_S)
@@ -136,7 +139,7 @@ def assert_wrong_names_are_told(client: Client) -> None:
 
 def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:
     """The launcher is killed, and all with it: nobody starts it again."""
-    up = house.up("--set", CLIENTS, "--set", "deadlines.vhub_back=1 s")
+    up = house.up("--set", CLIENTS, "--set", "engine=pure", "--set", "deadlines.vhub_back=1 s", *ONE)
     with connect(house.info().radio, "hand", timeout_s=PATIENCE_S) as client:
         ticks = client.lockstep(100)
         assert next(ticks) == 0

@@ -16,6 +16,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from tests.console.memory import Browser
+from tests.wire.conftest import in_process
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
@@ -117,7 +118,8 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     rows = [f"{at},ball,0.1,0,0" for at in range(2001)]
     table.write_text("\n".join(["time,entity,x,y,z", *rows]))
     beside = ("--second", "walk.csv", "--offset", "2 s")
-    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", each=True)
+    alone = *in_process("null", "supervisor"), *in_process("main", "nodes.red", "nodes.blue")
+    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", *alone)
     house.ticking()
     path = house.live().path / "console.json"
     addresses = addresses_of(house)

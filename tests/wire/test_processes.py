@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,6 +15,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from tests.apart import apart
 from tests.replay.test_verify import messages_of
+from tests.wire.conftest import ONE, in_process
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
@@ -21,9 +23,12 @@ if TYPE_CHECKING:
 
 TICKS: Final = 150
 PLAYERS: Final = ("players.player-red", "players.player-blue")
-SHAPES: Final[dict[str, tuple[str, ...] | list[str]]] = {
-    "one": ["--processes", "one"],
-    "vhub and a node, players and a node": ("vhub", "nodes.red"),
+SHAPES: Final = {
+    "one": ONE,
+    "vhub and a node, players and a node": (
+        *in_process("main", "vhub", "nodes.red"),
+        *in_process("other", *PLAYERS, "nodes.blue"),
+    ),
 }
 
 
@@ -34,22 +39,17 @@ def table(house: House) -> None:
     house.table.write_text(apart())
 
 
-def shape(roles: tuple[str, ...] | list[str], process: str = "main") -> list[str]:
-    """The arguments of `up` for a process with these roles, or those given."""
-    if isinstance(roles, list):
-        return roles
-    return [word for role in roles for word in ("--set", f"{role}.process={process}")]
-
-
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_run_has_the_same_bytes_in_every_shape(house: House, name: str) -> None:
-    arguments = shape(SHAPES[name])
-    if name.endswith("players and a node"):
-        arguments += shape((*PLAYERS, "nodes.blue"), "other")
-    every = ["--set", "capture.frames_every=1 tick"]
-    code, out, err = house.end(
-        house.up("--pace", "fast", "--for", "300 ms", "--json", *every, *arguments, players=True)
-    )
+def test_a_run_with_certificates_has_the_same_bytes_in_every_shape(house: House, name: str) -> None:
+    """The supervisor's needs none for its nodes and players; another one's has the grants of all its roles."""
+    folder = house.folder / "certs"
+    who = ["supervisor", "vhub", "operator.admin"]
+    if name != "one":
+        who += ["process.main", "node.blue", "client.player-red", "client.player-blue"]
+    certificates.init(folder)
+    certificates.issue(folder, who)
+    run = ["--pace", "fast", "--for", "300 ms", "--json", "--set", "capture.frames_every=1 tick", *SHAPES[name]]
+    code, out, err = house.end(house.up("--pki", folder, *run, players=True))
     assert code == 0, err
     content, capture = last_json(out), house.folder / "run.mcap"
     text, fast = house.table.read_text(), parse_pace("fast")
@@ -67,12 +67,15 @@ KILLED: Final = {
     "supervisor and a node": ("supervisor", "nodes.red"),
     "vhub and a node": ("vhub", "nodes.red"),
 }
+OTHERS: Final = ("nodes.blue", *PLAYERS)
 
 
 def killed(house: House, process: str, *arguments: str) -> dict[str, Any]:
     """Kill a process of a run, let the run go on, and end it; return its result."""
     up = house.up("--json", "--engine", "pure", *arguments, players=True)
     ticks = house.ticking(5)["ticks"]
+    code, _, err = house.ask("foosim", "stop", "red")
+    assert code == 3 and re.search(rf"red shares process {process} with .*: it cannot be stopped alone", err)
     house.kill(process)
     house.ticking(ticks + 50)
     assert house.ask("foosim", "down")[0] == 0
@@ -85,7 +88,8 @@ def killed(house: House, process: str, *arguments: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", KILLED)
 def test_a_process_without_players_that_is_killed_comes_back_to_the_same_world(house: House, name: str) -> None:
-    content = killed(house, "main", *shape(KILLED[name]))
+    others = (role for role in OTHERS if role not in KILLED[name])
+    content = killed(house, "main", *in_process("main", *KILLED[name]), *in_process("other", *others))
     assert content["recoveries"], "the run has an account of it"
     same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, ["engine=pure"]).json
     assert content["digest"] == same["digest"] and content["packets"] == same["packets"]
@@ -93,34 +97,25 @@ def test_a_process_without_players_that_is_killed_comes_back_to_the_same_world(h
 
 
 def test_a_process_with_all_roles_that_is_killed_goes_on_with_players_of_new_memory(house: House) -> None:
-    content = killed(house, "one", "--processes", "one")
+    content = killed(house, "one", *ONE)
     assert "supervisor" in {entry["what"] for entry in content["recoveries"]}
     players = {entry["name"] for entry in content["recoveries"] if entry["what"] == "player"}
     assert players == {"player-blue", "player-red"}
     assert verify_capture(house.folder / content["capture"], 1).equal
 
 
-def test_a_node_that_shares_its_process_cannot_be_stopped_alone(house: House) -> None:
-    up = house.up(*shape(("supervisor", "vhub", "nodes.red")))
-    house.ticking(5)
-    code, _, err = house.ask("foosim", "stop", "red")
-    assert code == 3 and "red shares process main with supervisor, vhub: it cannot be stopped alone" in err
-    assert house.ask("foosim", "down")[0] == 0
-    assert house.end(up)[0] == 0
-
-
 def test_a_player_that_raises_in_a_process_with_the_others_ends_the_run_in_order(
     house: House, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "wrong.py").write_text(
-        "class Wrong:\n"
-        "    def __init__(self, deployment, parameters): pass\n"
+        "from foosim import Player\n"
+        "class Wrong(Player):\n"
         "    def act(self, tick, samples):\n"
         "        raise ValueError('too much')\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     sets = ["--set", "players.player-red.class=wrong:Wrong"]
-    up = house.up("--json", "--engine", "pure", "--processes", "one", *sets, players=True)
+    up = house.up("--json", "--engine", "pure", *ONE, *sets, players=True)
     code, out, err = house.end(up)
     content = last_json(out)
     assert code == 1 and content["failed"] and content["reason"].startswith("player-red failed at tick ")
@@ -131,33 +126,16 @@ def test_a_player_that_raises_in_a_process_with_the_others_ends_the_run_in_order
     assert open_capture(house.folder / content["capture"]).about.finished
 
 
-@pytest.mark.parametrize("name", ["one", "vhub and a node, players and a node"])
-def test_processes_with_several_roles_have_certificates(house: House, name: str) -> None:
-    """The supervisor's needs none for its nodes and players; another one's has the grants of all its roles."""
-    folder, arguments = house.folder / "certs", shape(SHAPES[name])
-    who = ["supervisor", "vhub", "operator.admin"]
-    if name != "one":
-        arguments += shape((*PLAYERS, "nodes.blue"), "other")
-        who += ["process.main", "node.blue", "client.player-red", "client.player-blue"]
-    certificates.init(folder)
-    certificates.issue(folder, who)
-    run = ["--pki", str(folder), "--engine", "pure", "--pace", "fast", "--for", "100 ms", "--json", *arguments]
-    code, out, err = house.end(house.up(*run, players=True))
-    assert code == 0, err
-    same = rehearse(house.table.read_text(), "table.yaml", 50, None, ["engine=pure"]).json
-    assert last_json(out)["digest"] == same["digest"] and last_json(out)["packets"] == same["packets"]
-
-
 def test_a_process_without_its_certificate_is_refused_before_anything_starts(house: House) -> None:
     folder = house.folder / "certs"
     certificates.init(folder)
     certificates.issue(folder, ["supervisor", "vhub", "node.red", "node.blue", "operator.admin"])
-    code, _, err = house.end(house.up("--pki", folder, *shape(("vhub", "nodes.red"))))
+    code, _, err = house.end(house.up("--pki", folder, *in_process("main", "vhub", "nodes.red")))
     assert code == 3 and "has no certificate of process.main; it has: node.blue, node.red, operator.admin" in err
 
 
 def test_a_run_of_one_process_whose_launcher_died_is_resumed(house: House) -> None:
-    up = house.up("--engine", "pure", "--processes", "one", "--for", "4 s", players=True)
+    up = house.up("--engine", "pure", *ONE, "--for", "4 s", players=True)
     house.ticking(5)
     name = house.info().run
     up.kill()

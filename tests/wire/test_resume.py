@@ -22,13 +22,14 @@ from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from foosim.runtime.journal import journal_files, read_records
 from foosim.runtime.run_folder import RunFolder, open_run
-from tests.wire.conftest import LONG, SLOW
+from tests.wire.conftest import LONG, SLOW, in_process
 from tests.wire.test_run import NO_HUB, last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
-BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure", "--set", f"pace={SLOW}")
+SETS = (LONG, "players={}", "engine=pure", f"pace={SLOW}", "nodes.red.process=main")
+BARE = tuple(word for setting in SETS for word in ("--set", setting))
 
 
 def tear(folder: Path, stem: str, count: int) -> None:
@@ -83,7 +84,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     content = last_json(out)
     recovered = [entry["what"] for entry in content["recoveries"]]
     assert "supervisor" in recovered
-    same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, BARE[3::2]).json
+    same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, SETS).json
     assert content["digest"] == same["digest"]
     assert open_capture(house.folder / "far.mcap").about.finished
     verified = verify_capture(house.folder / "far.mcap")
@@ -107,7 +108,7 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
     words = shlex.split(told[3])
     assert words[:3] == ["foosim", "up", str(house.table)]
     assert words[-2:] == ["--from", f"{house.folder / 'far.mcap'}@last"]
-    begun = make_plan(RunOptions(Path(words[2]), sets=tuple(BARE[1::2]), branch=words[-1])).start
+    begun = make_plan(RunOptions(Path(words[2]), sets=SETS, branch=words[-1])).start
     captured = open_capture(house.folder / "far.mcap")
     assert begun is not None and begun.origin.tick == captured.frame_ticks[-1] and int(told[1]) < int(told[2])
     assert captured.ticks.tolist() == list(range(len(captured.ticks))), "what it has stays"
@@ -118,6 +119,6 @@ def _ends_where_inputs_are_lost(house: House, folder: RunFolder) -> None:
 def test_a_run_that_does_not_come_up_says_why(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
     (house.folder / "sitecustomize.py").write_text(NO_HUB)
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
-    alone = ("--processes", "each", "--detach", "--run", "lame")
-    code, _, err = house.run("foosim", "up", house.table, *BARE, *alone)
+    alone = *in_process("null", "vhub"), *in_process("main", "nodes.blue")
+    code, _, err = house.run("foosim", "up", house.table, *BARE, *alone, "--detach", "--run", "lame")
     assert code == 1 and "run lame has ended with exit code" in err and "no licence here" in err

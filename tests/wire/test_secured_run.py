@@ -14,7 +14,7 @@ from foosim.launcher.pki import certificates as pki
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.certificates import operator_credentials
-from tests.wire.conftest import LIMIT_S, House
+from tests.wire.conftest import LIMIT_S, House, in_process
 from tests.wire.test_run import last_json
 
 CLIENTS = ("--set", "clients={hand: {}}", "--set", "players={}")
@@ -32,7 +32,8 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     stranger = house.folder / "stranger"
     pki.init(stranger)
     pki.issue(stranger, ["node.red"])
-    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS, each=True)
+    beside = in_process("main", "nodes.blue")
+    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS, *beside)
     house.ticking()
     info = house.info()
     assert info.simulation.startswith("tls/127.0.0.1:") and info.radio.startswith("tls/127.0.0.1:")
@@ -65,7 +66,11 @@ def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: H
     certificates. The world is the one that would have been."""
     folder = certificates(house.folder / "certs")
     pki.issue(folder, ["client.player-red", "client.player-blue"])
-    up = house.up("--json", "--engine", "pure", "--pki", folder, players=True, each=True)
+    apart = (
+        *in_process("null", "supervisor", "vhub"),
+        *in_process("players", "players.player-red", "players.player-blue"),
+    )
+    up = house.up("--json", "--engine", "pure", "--pki", folder, *apart, players=True)
     house.ticking(5)
     with Control(house.info().simulation, operator_credentials(folder)) as desk:
         house.kill("red")

@@ -17,7 +17,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from foosim.runtime import disk
 from foosim.vhub.recording.recovery import UNCLEAN
-from tests.wire.conftest import House
+from tests.wire.conftest import ONE, House
 
 
 def last_json(out: str) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def last_json(out: str) -> dict[str, Any]:
 def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:
     slow = "network.links.everything.delay=20 ms"  # a picture every 10 ms: some are on their way
     split = ("--set", "capture.split_time=40 ms", "--set", slow)
-    up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", *split, players=True)
+    up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", *split, *ONE, players=True)
     run = house.info()
     house.ticking(100)
     up.kill()
@@ -39,7 +39,7 @@ def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(hou
     assert not had.finished
 
     (house.folder / "elsewhere").mkdir()
-    again = house.up("--for", "2 ms", "--no-capture", "--engine", "pure")
+    again = house.up("--for", "2 ms", "--no-capture", "--engine", "pure", *ONE)
     code, out, err = house.end(again)
     assert code == 0, err
     (line,) = [line for line in out.splitlines() if "recovered" in line]
@@ -67,7 +67,7 @@ def test_a_run_whose_capture_gets_full_ends_with_all_of_it_captured(
 ) -> None:
     path = small_disk(400) / "run.mcap"
     arguments = ("--engine", "pure", "--pace", "fast", "--for", "60s", "--json", "--capture", path)
-    code, out, err = house.end(house.up(*arguments, "--set", "capture.reserve=256 KiB", players=True))
+    code, out, err = house.end(house.up(*arguments, "--set", "capture.reserve=256 KiB", *ONE, players=True))
     content = last_json(out)
     assert code == 1 and content["failed"], err
     assert content["reason"].startswith(f"lost the capture: {path}: ") and "KiB left on its disk" in content["reason"]
@@ -89,7 +89,7 @@ def test_a_run_whose_journals_have_no_room_ends_with_all_that_is_committed_captu
     reserve = "32 MiB" if fault == "reserve" else "64 KiB"
     up = house.up(
         *("--engine", "pure", "--pace", "fast", "--for", "600s", "--json", "--capture", "run.mcap"),
-        *("--set", f"capture.reserve={reserve}"),
+        *("--set", f"capture.reserve={reserve}", *ONE),
         players=True,
     )
     house.ticking(50)

@@ -1,11 +1,9 @@
-"""The guide's examples of one's own: each file as it is written there, in an empty folder, with foosim as installed."""
+"""The guide's examples of one's own: each file as it is written there, in an empty folder that is on Python's path."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
 import sys
 import tomllib
 from collections.abc import Mapping
@@ -18,10 +16,17 @@ from typing import Any, Final, NamedTuple
 import pytest
 from yaml import safe_load
 
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.assembly.world import WorldMarks
+from tests.conftest import Command, Typed
+from tests.own_forms import folder_on_path, forget_modules
+
 ROOT: Final = Path(__file__).parents[2]
 GUIDE: Final = ROOT / "docs" / "how-to" / "extending.md"
-REHEARSE: Final = "from foosim.cli import main; main()"
-SUPERVISOR: Final = "from foosim.cli import main; main()"
 PACKAGE: Final = "pyproject.toml"
 BASES: Final = ("omni.py", "omni_motion.py", "omni_drive.py", "yard.py", "rounds.py", "yard.yaml")
 
@@ -97,10 +102,21 @@ def install(folder: Path, project: str) -> None:
     (left / "entry_points.txt").write_text("\n".join(["[foosim.world]", *(f"{n} = {m}" for n, m in points.items())]))
 
 
-def run(folder: Path, code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    command = [sys.executable, "-P", "-c", code, *arguments]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, on the path of this process and of those that it starts."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return folder_on_path(tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def rehearsed(typed: Typed, folder: Path) -> Command:
+    return typed("rehearse")
+
+
+@pytest.fixture
+def supervisor(typed: Typed, folder: Path) -> Command:
+    return typed()
 
 
 def test_the_guide_says_how_each_is_used() -> None:
@@ -113,78 +129,64 @@ def test_the_guide_says_how_each_is_used() -> None:
 
 
 @pytest.mark.parametrize("name", ["laps.py", "omni.py"])
-def test_an_example_is_the_same_world_on_any_number_of_nodes(tmp_path: Path, name: str) -> None:
-    """In an empty folder, on one and on three nodes, in processes of their own; the check below has two, too."""
-    deployment, sets = planted(tmp_path, name)
+def test_an_example_is_the_same_world_on_any_number_of_nodes(folder: Path, rehearsed: Command, name: str) -> None:
+    """On one and on three nodes; the check below has two, and another process, too."""
+    deployment, sets = planted(folder, name)
     results: list[Any] = []
     for nodes in ("1", "3"):
-        done = run(tmp_path, REHEARSE, deployment, *sets, "--for", "400ms", "--nodes", nodes, "--json")
-        assert done.returncode == 0, done.stderr
-        results.append(json.loads(done.stdout))
+        done = rehearsed(deployment, *sets, "--for", "400ms", "--nodes", nodes, "--json")
+        assert done.code == 0, done.err
+        results.append(json.loads(done.out))
     assert len({result["digest"]["chain"] for result in results}) == 1
     assert ("laps" in results[0]) == (name == "laps.py")
 
 
 @pytest.mark.parametrize("names", RUNS, ids=" and ".join)
-def test_the_check_of_components_finds_nothing_in_an_example(tmp_path: Path, names: tuple[str, ...]) -> None:
+def test_the_check_of_components_finds_nothing_in_an_example(
+    folder: Path, supervisor: Command, names: tuple[str, ...]
+) -> None:
     """Whichever form it is asked for, it compares all of the world."""
-    deployments, settings = zip(*[planted(tmp_path, name) for name in names], strict=True)
+    deployments, settings = zip(*[planted(folder, name) for name in names], strict=True)
     (deployment,), sets = {*deployments}, [word for words in settings for word in words]
     form, ticks = USES[names[-1]].form, str(TICKS[USES[names[-1]].deployment])
-    checked = ("check-component", form, "--in", deployment, "--set", FORCED, *sets, "--ticks", ticks)
-    done = run(tmp_path, SUPERVISOR, *checked)
-    assert done.returncode == 0 and "the same world on 1, 2 and 3 nodes" in done.stdout, done.stdout + done.stderr
+    done = supervisor("check-component", form, "--in", deployment, "--set", FORCED, *sets, "--ticks", ticks)
+    assert done.code == 0 and "the same world on 1, 2 and 3 nodes" in done.out, done
 
 
 ONE: Final = [name for name in USES if not USES[name].files]
 
 
 @pytest.mark.parametrize("name", ONE)
-def test_the_path_without_it_is_refused_with_its_place(tmp_path: Path, name: str) -> None:
+def test_the_path_without_it_is_refused_with_its_place(rehearsed: Command, name: str) -> None:
     use = USES[name]
-    refused = run(tmp_path, REHEARSE, str(ROOT / use.deployment), *use.arguments, "--for", "1s")
-    assert refused.returncode == 2
-    assert "--set:1:" in refused.stderr and "cannot be imported: ModuleNotFoundError" in refused.stderr
-
-
-FRAMES: Final = """
-import json
-from pathlib import Path
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.assembly.world import WorldMarks
-frames = []
-sets = [*SETS, "engine=pure"]
-text = Path(FILE).read_text()
-assert not rehearse(text, FILE, TICKS, 1, sets, Settings(on_commit=frames.append)).json["failed"]
-spec = load_deployment(apply_sets(text, FILE, sets), FILE)
-marks = WorldMarks(spec, frames[-1].layout).between(frames[0], frames[-1])
-slots = {
-    f"{entity.name} {slot}": [list(frame.vector(entity.name, slot, count)) for frame in frames]
-    for entity in frames[0].layout.entities if entity.name in WANTED
-    for slot, count in entity.counts.items()
-}
-print(json.dumps([slots, [text for _, _, text in marks]]))
-"""
+    refused = rehearsed(ROOT / use.deployment, *use.arguments, "--for", "1s")
+    assert refused.code == 2
+    assert "--set:1:" in refused.err and "cannot be imported: ModuleNotFoundError" in refused.err
 
 
 def histories(
     folder: Path, name: str, ticks: int, wanted: tuple[str, ...], more: tuple[str, ...] = ()
 ) -> tuple[dict[str, list[list[float]]], list[str]]:
     """Return the numbers of each slot of some entities at each tick, and what was marked."""
-    deployment, _ = planted(folder, name)
-    sets = (*USES[name].sets, *more)
-    given = f"FILE, SETS, TICKS, WANTED = {deployment!r}, {sets!r}, {ticks}, {wanted!r}\n"
-    done = run(folder, given + FRAMES)
-    assert done.returncode == 0, done.stderr
-    slots, marks = json.loads(done.stdout)
-    return slots, marks
+    file, _ = planted(folder, name)
+    text = apply_sets(Path(file).read_text(), file, [*USES[name].sets, *more, FORCED])
+    keeping = Frames()
+    assert not rehearse(text, file, ticks, settings=Settings(on_commit=keeping)).json["failed"]
+    frames = keeping.frames
+    layout = frames[0].layout
+    slots = {
+        f"{entity.name} {slot}": [list(frame.vector(entity.name, slot, count)) for frame in frames]
+        for entity in layout.entities
+        if entity.name in wanted
+        for slot, count in entity.counts.items()
+    }
+    marks = WorldMarks(load_deployment(text, file), frames[-1].layout).between(frames[0], frames[-1])
+    return slots, [mark for _, _, mark in marks]
 
 
-def test_the_low_pass_follows_with_its_time_constant(tmp_path: Path) -> None:
+def test_the_low_pass_follows_with_its_time_constant(folder: Path) -> None:
     """Against the recursion over the joints that the encoder reads: every 5th tick, at 2 ms a tick."""
-    slots, _ = histories(tmp_path, "low_pass.py", 1200, ("red.goal",))
+    slots, _ = histories(folder, "low_pass.py", 1200, ("red.goal",))
     joints = [[0.0, 0.0], *slots["red.goal joint_positions"]]
     smooth = slots["red.goal encoder.low_pass.smooth"]
     expected = joints[0]
@@ -195,8 +197,8 @@ def test_the_low_pass_follows_with_its_time_constant(tmp_path: Path) -> None:
     assert any(abs(number) > 0.01 for number in smooth[-1])
 
 
-def test_wear_is_the_way_of_the_wheels(tmp_path: Path) -> None:
-    slots, marks = histories(tmp_path, "service.py", 100, ("rover01",))
+def test_wear_is_the_way_of_the_wheels(folder: Path) -> None:
+    slots, marks = histories(folder, "service.py", 100, ("rover01",))
     speeds = slots["rover01 wheel_speeds"]
     way = sum((abs(left) + abs(right)) / 2.0 * 0.02 for left, right in speeds)
     assert slots["rover01 service.worn"][-1] == pytest.approx([way]) and way > 0.5
@@ -215,8 +217,8 @@ def least_gap(slots: Mapping[str, list[list[float]]]) -> float:
     )
 
 
-def test_bases_go_round_and_turn(tmp_path: Path) -> None:
-    slots, _ = histories(tmp_path, "omni.py", 2000, (*RADII,))
+def test_bases_go_round_and_turn(folder: Path) -> None:
+    slots, _ = histories(folder, "omni.py", 2000, (*RADII,))
     for name in RADII:
         xs, ys, _ = zip(*slots[f"{name} position"], strict=True)
         assert min(max(xs) - min(xs), max(ys) - min(ys)) > 3.5 and max(map(abs, (*xs, *ys))) < 2.5, name
@@ -225,58 +227,54 @@ def test_bases_go_round_and_turn(tmp_path: Path) -> None:
     assert least_gap(slots) > 0.5
 
 
-def test_bases_that_are_sent_into_each_other_stop_before_that(tmp_path: Path) -> None:
+def test_bases_that_are_sent_into_each_other_stop_before_that(folder: Path) -> None:
     places = {"alpha": "-1", "beta": "1", "gamma": "0"}
     sets = [f"robots.{name}.x={x} m" for name, x in places.items()]
     sets += [f"robots.{name}.y={y} m" for name, y in zip(RADII, (0, 0, 2), strict=True)]
-    slots, _ = histories(tmp_path, "omni.py", 500, (*RADII,), tuple(sets))
+    slots, _ = histories(folder, "omni.py", 500, (*RADII,), tuple(sets))
     assert 0.0 < least_gap(slots) < 0.1
 
 
-def test_a_kit_of_ones_own_is_a_section_that_checks_places(tmp_path: Path) -> None:
-    deployment, _ = planted(tmp_path, "yards.py")
-    refused = run(tmp_path, REHEARSE, deployment, "--set", "scene=null", "--set", "yard={side: 3 m}", "--for", "1s")
-    assert refused.returncode == 2
-    assert "robots.alpha.model: starts outside of the yard's 3.0 m" in refused.stderr
-    named = run(tmp_path, SUPERVISOR, "components", "model", "omni")
-    assert named.returncode == 0 and "model omni, of omni:Omni" in named.stdout
+def test_a_kit_of_ones_own_is_a_section_that_checks_places(
+    folder: Path, rehearsed: Command, supervisor: Command
+) -> None:
+    deployment, _ = planted(folder, "yards.py")
+    refused = rehearsed(deployment, "--set", "scene=null", "--set", "yard={side: 3 m}", "--for", "1s")
+    assert refused.code == 2
+    assert "robots.alpha.model: starts outside of the yard's 3.0 m" in refused.err
+    named = supervisor("components", "model", "omni")
+    assert named.code == 0 and "model omni, of omni:Omni" in named.out
 
 
-def test_the_reference_has_rules_and_a_scene_that_are_valid(tmp_path: Path) -> None:
+def test_the_reference_has_rules_and_a_scene_that_are_valid(folder: Path, rehearsed: Command) -> None:
     """Those that it shows, in the guide's yard and in the warehouse."""
     page = (ROOT / "docs" / "reference" / "deployment.md").read_text()
     section = page[page.index("## Kits, rules, scene") : page.index("## Components of robots")]
     of_world, of_robot = re.findall(r"(?:^    .*\n)+", section, re.MULTILINE)
-    yard, _ = planted(tmp_path, "omni.py")
+    yard, _ = planted(folder, "omni.py")
     files = examples()
     for name in ("laps.py", "service.py"):
-        (tmp_path / name).write_text(files[name])
+        (folder / name).write_text(files[name])
     text = re.sub(r"scene: .*\n", dedent(of_world), files["yard.yaml"])
     Path(yard).write_text(text)
     sets = [f"robots.rover01.rules={json.dumps(safe_load(of_robot)['robots']['rover01']['rules'])}"]
     for deployment, more in ((yard, []), (str(ROOT / "deploy" / "warehouse.yaml"), sets)):
         arguments = [word for setting in more for word in ("--set", setting)]
-        done = run(tmp_path, REHEARSE, deployment, *arguments, "--for", "100ms", "--json")
-        assert done.returncode == 0, done.stderr
-        assert ("laps" in json.loads(done.stdout)) == (deployment == yard)
+        done = rehearsed(deployment, *arguments, "--for", "100ms", "--json")
+        assert done.code == 0, done.err
+        assert ("laps" in json.loads(done.out)) == (deployment == yard)
 
 
-def test_versions_of_what_is_not_foosims_follow_its_source(tmp_path: Path) -> None:
+def test_versions_of_what_is_not_foosims_follow_its_source(folder: Path) -> None:
     """Nodes compare them, and captures have them."""
-    code = """
-import json
-from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.assembly.used_forms import foreign_versions
-text = open(FILE).read()
-print(json.dumps(foreign_versions(load_deployment(apply_sets(text, FILE, SETS), FILE))))
-"""
     use = USES["laps.py"]
-    code = f"FILE, SETS = {str(ROOT / use.deployment)!r}, {use.sets!r}\n" + code
+    file = ROOT / use.deployment
     seen = []
     for source in (examples()["laps.py"], examples()["laps.py"] + "# changed\n"):
-        (tmp_path / "laps.py").write_text(source)
-        done = run(tmp_path, code)
-        assert done.returncode == 0, done.stderr
-        (version,) = json.loads(done.stdout).items()
+        (folder / "laps.py").write_text(source)
+        sys.modules.pop("laps", None)
+        forget_modules()
+        text = apply_sets(file.read_text(), file.name, use.sets)
+        (version,) = foreign_versions(load_deployment(text, file.name)).items()
         seen.append(version)
     assert [name for name, _ in seen] == ["rule laps:Laps"] * 2 and seen[0][1] != seen[1][1]

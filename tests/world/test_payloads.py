@@ -18,7 +18,7 @@ from msgspec import Struct, structs
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.force import Push
 from foosim.world.actuators.joint_position import JointPositions
 from foosim.world.actuators.joint_torque import JointEfforts
@@ -56,6 +56,7 @@ from foosim.world.sensors.velocity import Velocity
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
 ENCODER = CommandEncoder(DEPLOYMENT)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
 VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "encoder": (RodPosition(0.1, -2.5), [0.1, -2.5], ["m", "rad"]),
     "ball": (BallPosition(1 / 3, -0.0, 1e-300), [1 / 3, -0.0, 1e-300], ["m", "m", "m"]),
@@ -97,10 +98,10 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "pose_3d": (Pose3d(1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8), [1.0, -2.0, 0.5, 0.0, 0.6, 0.0, 0.8],
                 ["m"] * 3 + [""] * 4),
     "force": (Push(1.0, 2.0, 3.0, 0.1, 0.2, 1 / 3), [1.0, 2.0, 3.0, 0.1, 0.2, 1 / 3], ["N"] * 3 + ["N m"] * 3),
-    "joint_position": (JointPositions((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
-    "joint_torque": (JointEfforts((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
-    "joint_velocity": (JointVelocities((0.1, 1 / 3)), [0.1, 1 / 3], [""]),
-    "rotor_speeds": (RotorSpeeds((1.0, 2.0, 3.0, 1 / 3)), [1.0, 2.0, 3.0, 1 / 3], [""]),
+    "joint_position": (JointPositions((0.1, 1 / 3)), [0.1, 1 / 3], ["m or rad"]),
+    "joint_torque": (JointEfforts((0.1, 1 / 3)), [0.1, 1 / 3], ["N or N m"]),
+    "joint_velocity": (JointVelocities((0.1, 1 / 3)), [0.1, 1 / 3], ["m/s or rad/s"]),
+    "rotor_speeds": (RotorSpeeds((1.0, 2.0, 3.0, 1 / 3)), [1.0, 2.0, 3.0, 1 / 3], ["rad/s"]),
 }  # fmt: skip
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
@@ -245,59 +246,127 @@ def test_an_unknown_robot_names_the_nearest() -> None:
         channel_codec(DEPLOYMENT, "red.gol", "encoder")
 
 
+TAKES = "red.goal/position takes slide (m), spin (rad)"
+
+
 @pytest.mark.parametrize(
-    ("command", "text"),
+    ("slide", "spin", "text"),
     [
-        (Command(nan, 0.0), "rod_position.slide is not finite, nan"),
-        (Command(0.0, -inf), "rod_position.spin is not finite, -inf"),
-        (Command(10**400, 0.0), f"rod_position.slide is not finite, 1{'0' * 43}...0"),
-        (Command("left", 0.0), "rod_position.slide is not a number, 'left'"),  # type: ignore[arg-type]
-        (Command(0.0, None), "rod_position.spin is not a number, null"),  # type: ignore[arg-type]
+        (nan, 0.0, "slide is not finite, nan"),
+        (0.0, -inf, "spin is not finite, -inf"),
+        (10**400, 0.0, f"slide is not finite, 1{'0' * 43}...0"),
+        ("left", 0.0, "slide is not a number, 'left'"),
+        (0.0, None, "spin is not a number, null"),
     ],
 )
-def test_a_command_that_no_node_could_clamp_is_an_error_of_its_sender(command: Command, text: str) -> None:
-    with pytest.raises(BadValue) as error:
-        ENCODER.encode("red.goal", command)
-    assert str(error.value) == text
-    with pytest.raises(BadValue) as error:
-        ENCODER.encode_numbers("red.goal", "position", [command.slide], {"spin": command.spin})
-    assert str(error.value) == text
+def test_a_command_that_no_node_could_clamp_is_an_error_of_its_sender(slide: Any, spin: Any, text: str) -> None:
+    for command in (Command(slide, spin), {"spin": spin, "slide": slide}, (slide, spin)):
+        with pytest.raises(BadValue) as error:
+            ENCODER.encode("red.goal", command)
+        assert str(error.value) == f"{TAKES}: {text}"
 
 
 @pytest.mark.parametrize("number", [np.float32(0.5), np.float64(0.5), np.array(0.5), Fraction(1, 2), Decimal("0.5")])
 def test_a_number_is_whatever_becomes_a_float(number: Any) -> None:
-    assert ENCODER.encode("red.goal", Command(number, 0))[1] == np.array([0.5, 0.0]).tobytes()
+    assert ENCODER.encode("red.goal", Command(number, 0))[0][1] == np.array([0.5, 0.0]).tobytes()
     assert PayloadCodec(JointPositions, "arm").encode(JointPositions(np.array([0.5, 1.0], dtype=np.float32))) == (  # type: ignore[arg-type]
         np.array([0.5, 1.0]).tobytes()
     )
 
 
-@pytest.mark.parametrize("slide", [0.123, 99.0])
-def test_a_command_goes_to_the_node_as_it_is(slide: float) -> None:
+@given(slide=FINITE, spin=FINITE)
+def test_a_command_goes_to_the_node_as_it_is_however_it_is_written(slide: float, spin: float) -> None:
     """Also beyond the limits, which the node applies."""
-    channel, payload = ENCODER.encode("red.goal", Command(slide, -1000.0))
-    assert (channel, payload) == ("position", np.array([slide, -1000.0]).tobytes())
-    for numbers, named in (([slide, -1000.0], {}), ([slide], {"spin": -1000.0}), ([], {"spin": -1000, "slide": slide})):
-        assert ENCODER.encode_numbers("red.goal", channel, numbers, named) == payload
+    numbers: list[Any] = [Command(slide, spin), {"spin": spin, "slide": slide}, (slide, spin), np.array([slide, spin])]
+    for command in numbers:
+        for written in (command, {"position": command}):
+            assert ENCODER.encode("red.goal", written) == [("position", np.array([slide, spin]).tobytes())]
 
 
 @pytest.mark.parametrize(
-    ("numbers", "named", "said"),
+    ("command", "text"),
     [
-        ([], {}, "nothing"),
-        ([0.1], {}, "0.1"),
-        ([0.1, 0.2, 0.3], {}, "0.1, 0.2, 0.3"),
-        ([0.1, 0.2], {"spin": 0.2}, "0.1, 0.2, spin"),
-        ([0.1], {"slide": 0.2}, "0.1, slide"),
-        ([0.1], {"turn": 0.2}, "0.1, turn"),
+        ({}, "slide, spin are missing"),
+        ([], "0 numbers given"),
+        ((0.1,), "1 number given"),
+        ((0.1, 0.2, 0.3), "3 numbers given"),
+        ({"slide": 0.1}, "spin is missing"),
+        ({"slide": 0.1, "spni": 0.2}, "no such name, 'spni', nearest is 'spin'"),
+        ({"slide": 0.1, "spin": 0.2, "turn": 0.3}, "no such name, 'turn'"),
+        ({"positon": {"slide": 0.1, "spin": 0.2}}, "no such name, 'positon'"),
+        ({"position": Drive(0.0, 0.0)}, "a Drive is none of these"),
+        ("up", "not numbers by name or in their order, 'up'"),
+        (0.1, "not numbers by name or in their order, 0.1"),
+        (None, "not numbers by name or in their order, null"),
     ],
 )
-def test_numbers_that_are_not_those_of_a_command_name_its_fields(
-    numbers: list[float], named: dict[str, float], said: str
-) -> None:
+def test_names_and_numbers_that_are_none_of_a_command_name_its_fields(command: Any, text: str) -> None:
     with pytest.raises(BadValue) as error:
-        ENCODER.encode_numbers("red.goal", "position", numbers, named)
-    assert str(error.value) == f"red.goal's position takes slide, spin, each once, '{said}'"
+        ENCODER.encode("red.goal", command)
+    assert str(error.value) == f"{TAKES}: {text}"
+
+
+REACH = "arm/reach takes positions (m or rad) of shoulder, elbow"
+TURN = "arm/turn takes velocities (m/s or rad/s) of wrist"
+
+
+def yard(*sets: str) -> CommandEncoder:
+    """Commands of robots that move by kinematics, and of an arm with joints."""
+    path = TABLE.with_name("yard.yaml")
+    return CommandEncoder(load_deployment(apply_sets(path.read_text(), path.name, sets), path.name))
+
+
+@pytest.fixture(scope="module")
+def arm() -> CommandEncoder:
+    """An arm with two actuators, whose joints the deployment names."""
+    reach = "{kind: joint_position, gain: 8 Hz, joints: [shoulder, elbow]}"
+    return yard(f"robots.arm.actuators={{reach: {reach}, turn: {{kind: joint_velocity, joints: [wrist]}}}}")
+
+
+@given(reach=st.tuples(FINITE, FINITE), turn=FINITE)
+def test_joints_are_commanded_by_name_or_in_their_order(
+    arm: CommandEncoder, reach: tuple[float, float], turn: float
+) -> None:
+    named = dict(zip(("shoulder", "elbow"), reach, strict=True))
+    sent = [("reach", np.array(reach).tobytes()), ("turn", np.array([turn]).tobytes())]
+    forms: list[Any] = [reach, named, {"positions": reach}, (reach,), JointPositions(reach), np.array(reach)]
+    for command in forms:
+        assert arm.encode("arm", {"turn": {"wrist": turn}, "reach": command}) == sent
+        assert arm.encode("arm", {"reach": command}) == sent[:1]
+    assert arm.encode("arm", {"turn": [turn], "reach": JointPositions(reach)}) == sent
+    assert arm.encode("arm", JointPositions(reach)) == sent[:1]
+
+
+@given(numbers=st.lists(FINITE, min_size=1, max_size=7))
+def test_joints_that_the_deployment_does_not_name_are_commanded_in_their_order(numbers: list[float]) -> None:
+    for command in (numbers, tuple(numbers), {"positions": numbers}, {"joints": numbers}):
+        assert YARD.encode("arm", command) == [("joints", np.array(numbers).tobytes())]
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ((0.1, 0.2), f"{REACH}; {TURN}: a command of arm is commands by actuator, a list of 2"),
+        ({"reech": (0.1, 0.2)}, f"{REACH}; {TURN}: arm has no such actuator (there are: reach, turn), 'reech',"
+         " nearest is 'reach'"),
+        ({"reach": (0.1,)}, f"{REACH}: 1 number given"),
+        ({"reach": {"positions": (0.1, 0.2, 0.3)}}, f"{REACH}: 3 numbers given"),
+        ({"reach": JointPositions((0.1,))}, f"{REACH}: 1 number given"),
+        (JointPositions((0.1,)), f"{REACH}: 1 number given"),
+        ({"reach": {"elbow": 0.1}}, f"{REACH}: shoulder is missing"),
+        ({"reach": {"shoulder": 0.0, "elbwo": 0.1}}, f"{REACH}: no such name, 'elbwo', nearest is 'elbow'"),
+        ({"reach": {"position": (0.1, 0.2)}}, f"{REACH}: no such name, 'position'"),
+        ({"reach": (0.1, "far")}, f"{REACH}: positions is not a number, 'far'"),
+        ({"turn": ()}, f"{TURN}: 0 numbers given"),
+    ],
+)  # fmt: skip
+def test_a_wrong_command_of_an_arm_names_actuators_and_joints(arm: CommandEncoder, command: Any, text: str) -> None:
+    with pytest.raises(BadValue) as error:
+        arm.encode("arm", command)
+    assert str(error.value) == text
+
+
+YARD = yard()
 
 
 @pytest.mark.parametrize("robot", ["camera", "ball", "red.gaol"])
@@ -316,4 +385,4 @@ def test_a_rod_takes_no_drive_and_a_rover_no_command(fleet_text: Callable[..., s
         hall.encode("rover01", Command(0.0, 0.0))
     with pytest.raises(UnknownName, match=r"no robot that takes a Drive \(there are: rover01, rover02\), 'base'"):
         hall.encode("base", Drive(0.0, 0.0))
-    assert hall.encode("rover01", Drive(1.2, -1.2)) == ("drive", np.array([1.2, -1.2]).tobytes())
+    assert hall.encode("rover01", Drive(1.2, -1.2)) == [("drive", np.array([1.2, -1.2]).tobytes())]

@@ -163,7 +163,10 @@ class Winch:
         return (0.0, 100.0), (view.read(self._rate)[0], 2.0)
 '''
 LISTENER: Final = '''
-class Listener:
+from foosim import Player
+
+
+class Listener(Player):
     """Keeps what it hears, by robot and channel, and commands what its parameters say."""
 
     heard = {}
@@ -611,7 +614,7 @@ def test_a_command_that_is_not_finite_names_robot_player_file_and_line() -> None
     sets = ("engine=pure", WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": nan}))
     reason = rehearse(TEXT, TABLE.name, 20, 1, sets).json["reason"]
     line = 1 + MODULES["own_listener"].splitlines().index("    def act(self, tick, samples):")
-    assert "command of red.goal: " in reason and f"(own_listener.py:{line})" in reason
+    assert "red.goal/turn takes rate" in reason and f"(own_listener.py:{line})" in reason
 
 
 @pytest.mark.usefixtures("site")

@@ -21,9 +21,11 @@ import msgspec
 from foosim.capture.contents import CHUNK_BYTES, check_new, sync_folder
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import AFTER, LAST, PART, files_from, whole_path
-from foosim.capture.reader import About, Scan, deployment_of, read_about
+from foosim.capture.reader import TICK_MARKS, About, Scan, deployment_of, read_about
+from foosim.capture.rows import TICK
 from foosim.common import limits
 from foosim.common.errors import Malformed
+from foosim.common.units import format_ns
 from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import decode_any
@@ -89,6 +91,23 @@ def recover_capture(path: Path, journals: Path | None = None, out: Path | None =
         return _recover(about, read_journal(journals, VHUB), out)
     finally:
         os.close(lock)
+
+
+def check_finished(path: Path) -> None:
+    """Read a finished capture to its end. Raises CaptureError for damage, with the command that cuts out what precedes
+    it."""
+    about = read_about(whole_path(path))
+    scan, tick = Scan(about.path), -1
+    try:
+        for message in scan.messages(frozenset({TICK})):
+            tick = scan.decode(TICK_MARKS, message).tick
+    except CaptureError as error:
+        problem = f"capture {about.path} is finished and damaged; it is left as it is: {error}"
+        if tick < 2:
+            raise CaptureError(problem) from None
+        time = format_ns((tick - 1) * deployment_of(about).tick_ns).replace(" ", "")
+        part = f"foosim capture cut {about.path} --to {time} -o PART"
+        raise CaptureError(f"{problem}\n  what is before the damage: {part}") from None
 
 
 def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:

@@ -15,7 +15,7 @@ from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
+from foosim.world.parameters.joints import JointGroup, JointSettings, Positions, set_points
 
 Gain = Annotated[float, Quantity(units.FREQUENCY, "0.001 Hz", "100 kHz")]
 
@@ -32,7 +32,7 @@ class JointPositionSettings(JointSettings):
 class JointPositions(Struct, frozen=True):
     """The set-points of joints, in their order (m or rad)."""
 
-    positions: Many
+    positions: Positions
 
 
 def _slots(settings: JointPositionSettings, carrier: Carrier) -> Mapping[str, int]:

@@ -7,7 +7,7 @@ from msgspec import Struct
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
+from foosim.world.parameters.joints import Efforts, JointGroup, JointSettings, set_points
 
 
 class JointTorqueSettings(JointSettings):
@@ -17,7 +17,7 @@ class JointTorqueSettings(JointSettings):
 class JointEfforts(Struct, frozen=True):
     """The efforts of joints, in their order (N or N m)."""
 
-    efforts: Many
+    efforts: Efforts
 
 
 @actuator(

@@ -7,7 +7,7 @@ from msgspec import Struct
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.joints import JointGroup, JointSettings, Many, set_points
+from foosim.world.parameters.joints import JointGroup, JointSettings, Velocities, set_points
 
 
 class JointVelocitySettings(JointSettings):
@@ -17,7 +17,7 @@ class JointVelocitySettings(JointSettings):
 class JointVelocities(Struct, frozen=True):
     """The set-points of the speeds of joints, in their order (m/s or rad/s)."""
 
-    velocities: Many
+    velocities: Velocities
 
 
 @actuator(

@@ -13,11 +13,12 @@ from msgspec import Meta, Struct
 
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.quantities import RadiansPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.parameters.rotors import QuadrotorRobot
 
-Speeds = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+Speeds = Annotated[tuple[RadiansPerSecond, ...], Meta(min_length=4, max_length=4)]
 
 
 class RotorSpeedsSettings(ActuatorSettings):

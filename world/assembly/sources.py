@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib.machinery import ModuleSpec
@@ -114,8 +114,13 @@ def _folder(top: str) -> str:
     return place.rpartition("/")[0]
 
 
-@cache
 def _distribution(top: str) -> tuple[str, ...]:
+    return tuple(sorted(set(distributions().get(top, ()))))
+
+
+@cache
+def distributions() -> Mapping[str, list[str]]:
+    """Return the installed distributions by the top names of their modules; all their files are read, once."""
     from importlib.metadata import packages_distributions  # brings the parser of e-mail
 
-    return tuple(sorted(set(packages_distributions().get(top, ()))))
+    return packages_distributions()

@@ -11,7 +11,7 @@ from functools import cache
 from hashlib import blake2b
 from typing import Any, Final
 
-from foosim.world.assembly.sources import sources_of
+from foosim.world.assembly.sources import distributions, sources_of
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Form, Model
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
@@ -82,9 +82,9 @@ def _version(made: Callable[..., Any]) -> str:
 
 def _package_version(package: str) -> str:
     """Return the version of the distribution that a package is of, empty where there is none."""
-    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+    from importlib.metadata import PackageNotFoundError, version
 
-    for distribution in packages_distributions().get(package, ()):
+    for distribution in distributions().get(package, ()):
         try:
             return version(distribution)
         except PackageNotFoundError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, Final, NamedTuple
 
@@ -24,7 +24,7 @@ from foosim.world.components.entities import (
     RuleMounting,
     mounting_of,
 )
-from foosim.world.components.fitted import FittedActuator, actuators_of, named_modifiers
+from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.components.view import (
     ComponentError,
     Mounting,
@@ -32,7 +32,6 @@ from foosim.world.components.view import (
     View,
     WritableView,
     called,
-    called_of,
     component_error,
     has_together,
 )
@@ -322,23 +321,6 @@ class World:
             self._entity_rules[index] = tuple(
                 (label, _watched_entity_rule(spec, layout, entities[index], label, rule)) for label, rule in its
             )
-
-    def forms(self) -> Iterator[tuple[object, str]]:
-        """Yield the objects that compute, and what each is called."""
-        entities = self._layout.entities
-        for index, model in self.models.items():
-            yield model, called_of(f"model {entities[index].model}", entities[index].name)
-        for label, rule in self._rules.items():
-            yield rule, called_of(f"rule {label}", WORLD)
-        for fitted in self.actuators.values():
-            for one in fitted:
-                yield one.actuator, called_of(f"actuator {one.channel}", one.robot)
-                yield from named_modifiers(one.modifiers)
-        for name, motion in self._motions.items():
-            yield motion, f"motion {name}"
-        for index, rules in self._entity_rules.items():
-            for label, its in rules:
-                yield its, called_of(f"rule {label}", entities[index].name)
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""

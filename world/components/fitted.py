@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, NamedTuple
@@ -20,7 +20,6 @@ from foosim.world.components.view import (
     Sensor,
     WritableView,
     called,
-    called_of,
     component_error,
 )
 from foosim.world.forms import registry
@@ -204,12 +203,6 @@ class FittedActuator:
     def failed(self, tick: int, error: BaseException) -> ComponentError:
         """Return the error of an actuator that has raised."""
         return component_error(f"actuator {self.channel}", self.robot, tick, error)
-
-
-def named_modifiers(modifiers: Iterable[FittedModifier]) -> Iterator[tuple[object, str]]:
-    """Yield the objects of modifiers, and what each is called."""
-    for one in modifiers:
-        yield one.modifier, called_of(one.what, one.robot)
 
 
 # --- making ----------------------------------------------------------------------------------------------------------

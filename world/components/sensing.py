@@ -36,10 +36,6 @@ class Sensing:
     def __init__(self) -> None:
         self._plans: dict[tuple[int, ...], Plan] = {}
 
-    def groups(self) -> list[tuple[object, str]]:
-        """Return what computes several sensors or modifiers together, and their names."""
-        return [(group.made, group.what) for plan in list(self._plans.values()) for group in plan.groups]
-
     def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
 

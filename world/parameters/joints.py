@@ -22,8 +22,11 @@ FORCE_MAX: Final = 1e6
 SPEED_MAX: Final = 1e3
 """How fast a joint without a limit of its speed is driven at most (m/s or rad/s)."""
 
-Many = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]
-"""A number for each joint: m or rad, m/s or rad/s, N or N m."""
+_EACH: Final = Meta(min_length=1, max_length=JOINTS_MAX)
+"""A number for each joint."""
+Positions = Annotated[tuple[Annotated[float, Meta(extra={"unit": "m or rad"})], ...], _EACH]
+Velocities = Annotated[tuple[Annotated[float, Meta(extra={"unit": "m/s or rad/s"})], ...], _EACH]
+Efforts = Annotated[tuple[Annotated[float, Meta(extra={"unit": "N or N m"})], ...], _EACH]
 
 
 class JointSettings(ActuatorSettings):

@@ -9,8 +9,8 @@ const ENDED = 4410;
 
 /** Why the server closed, where another try is of no use. */
 const REFUSED = /** @type {Record<number, string>} */ ({
-  4401: "The token in this page's address is not valid for this console. Open an address that foosim-console printed.",
-  4403: "This page comes from another address than the console's. Open the address that foosim-console printed.",
+  4401: "The token in this page's address is not valid for this console. Open an address that foosim view printed.",
+  4403: "This page comes from another address than the console's. Open the address that foosim view printed.",
 });
 
 /** The token behind `#view=` or `#operate=` in an address; empty without one. @param {string} hash */

@@ -1,4 +1,4 @@
-// Events of the network by hand: forms of `foosim-net partition`, `clog`, `set` and `heal`.
+// Events of the network by hand: forms of `foosim net partition`, `clog`, `set` and `heal`.
 
 import { dialog } from "./dialogs.js";
 import { field, h, select } from "./ui.js";

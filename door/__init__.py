@@ -1,0 +1,73 @@
+"""foosim from Python: simulations, clients, captures, rehearsals, and the base class of a controller.
+
+    import foosim
+
+    with foosim.Simulation("deploy/table.yaml") as simulation:
+        simulation.step({"red.goal": {"slide": 0.05, "spin": 0.0}})
+
+`foosim.components` has what components of one's own are made of, `foosim.env` environments for learning. What is not
+used is not imported.
+"""
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from foosim import components, env
+    from foosim._capture import Capture, open_capture
+    from foosim._rehearse import load_deployment, rehearse
+    from foosim.client.client import Client, connect
+    from foosim.client.player import Commands, Packet, Player, Sample, Samples, Turn
+    from foosim.client.replay_listener import hear_replay
+    from foosim.deployment.schema import Deployment
+    from foosim.protocol.replay_messages import PlayedPacket, PlayedPoses
+    from foosim.rehearsal.simulation import Simulation
+
+__all__ = [
+    "Capture",
+    "Client",
+    "Commands",
+    "Deployment",
+    "Packet",
+    "PlayedPacket",
+    "PlayedPoses",
+    "Player",
+    "Sample",
+    "Samples",
+    "Simulation",
+    "Turn",
+    "components",
+    "connect",
+    "env",
+    "hear_replay",
+    "load_deployment",
+    "open_capture",
+    "rehearse",
+]
+_MODULES = {
+    "foosim._capture": ("Capture", "open_capture"),
+    "foosim._rehearse": ("load_deployment", "rehearse"),
+    "foosim.client.client": ("Client", "connect"),
+    "foosim.client.player": ("Commands", "Packet", "Player", "Sample", "Samples", "Turn"),
+    "foosim.client.replay_listener": ("hear_replay",),
+    "foosim.deployment.schema": ("Deployment",),
+    "foosim.protocol.replay_messages": ("PlayedPacket", "PlayedPoses"),
+    "foosim.rehearsal.simulation": ("Simulation",),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import what is asked for."""
+    import sys
+    from importlib import import_module
+
+    if name in ("components", "env"):
+        return import_module(f"foosim.{name}")
+    for module, names in _MODULES.items():
+        if name in names:
+            found: object = getattr(import_module(module), name)
+            globals()[name] = found
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

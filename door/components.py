@@ -1,0 +1,147 @@
+"""What components of one's own are made of: decorators, settings, views, units, bodies.
+
+`m`, `rad`, `m_s` and so on are the types of numbers in readings and commands: floats with a unit. `Length`, `Speed`
+and so on are the types of settings: texts with a unit in a deployment, SI numbers in the code.
+"""
+
+from foosim.common import units
+from foosim.common.batched.noise import NoiseKey
+from foosim.common.exact_math import cos, sin
+from foosim.common.finding import Finding
+from foosim.common.keyed_random import chance_threshold
+from foosim.common.spec_base import Force, Length, Mass, Rate, SpecBase, Speed, Spin, Torque, default
+from foosim.common.units import Quantity
+from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
+from foosim.world.components.misfit import Misfit
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.surroundings import Surroundings
+from foosim.world.components.view import ModifierMounting, Mounting, SolvingView, View, WritableView
+from foosim.world.forms.forms import ROBOTS, Carrier
+from foosim.world.forms.per_field import PerField
+from foosim.world.forms.quantities import Amperes as A
+from foosim.world.forms.quantities import Degrees as deg
+from foosim.world.forms.quantities import Metres as m
+from foosim.world.forms.quantities import MetresPerSecond as m_s
+from foosim.world.forms.quantities import MetresPerSecondSquared as m_s2
+from foosim.world.forms.quantities import NewtonMetres as Nm
+from foosim.world.forms.quantities import Newtons as N
+from foosim.world.forms.quantities import NewtonSeconds as Ns
+from foosim.world.forms.quantities import Radians as rad
+from foosim.world.forms.quantities import RadiansPerSecond as rad_s
+from foosim.world.forms.quantities import Share as share
+from foosim.world.forms.quantities import Volts as V
+from foosim.world.forms.quantities import Watts as W
+from foosim.world.forms.registry import actuator, entity_rule, kit, model, modifier, motion, rule, scene, sensor
+from foosim.world.forms.settings import (
+    ActuatorSettings,
+    EntityRuleSettings,
+    ModifierSettings,
+    RobotSettings,
+    RuleSettings,
+    SceneSettings,
+    SensorSettings,
+)
+from foosim.world.frame import Frame
+from foosim.world.layout import Entity
+from foosim.world.matter.materials import CONCRETE, METAL, PLASTIC, WOOD
+from foosim.world.matter.physics import Physics
+from foosim.world.placing import MountedAt
+from foosim.world.scene import ORIGIN, Body, Box, Capsule, Cylinder, Link, Shape, Sphere
+from foosim.world.spec import WorldSpec
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from foosim.vhub.network.custom_models import Judged
+
+__all__ = [
+    "CONCRETE",
+    "METAL",
+    "ORIGIN",
+    "PLASTIC",
+    "ROBOTS",
+    "WOOD",
+    "A",
+    "ActuatorSettings",
+    "Body",
+    "Box",
+    "Capsule",
+    "Carrier",
+    "Cylinder",
+    "Entity",
+    "EntityRuleSettings",
+    "Finding",
+    "Force",
+    "Frame",
+    "Judged",
+    "Length",
+    "Link",
+    "MarkKind",
+    "Marked",
+    "Mass",
+    "Misfit",
+    "ModifierMounting",
+    "ModifierSettings",
+    "MotionMounting",
+    "Motors",
+    "Mounted",
+    "MountedAt",
+    "Mounting",
+    "N",
+    "Nm",
+    "NoiseKey",
+    "Ns",
+    "PerField",
+    "Physics",
+    "Quantity",
+    "Rate",
+    "RobotSettings",
+    "RuleMounting",
+    "RuleSettings",
+    "SceneSettings",
+    "SensorSettings",
+    "Shape",
+    "SolvingView",
+    "SpecBase",
+    "Speed",
+    "Sphere",
+    "Spin",
+    "Surroundings",
+    "Torque",
+    "V",
+    "View",
+    "W",
+    "WorldSpec",
+    "WritableView",
+    "actuator",
+    "chance_threshold",
+    "cos",
+    "default",
+    "deg",
+    "entity_rule",
+    "kit",
+    "m",
+    "m_s",
+    "m_s2",
+    "model",
+    "modifier",
+    "motion",
+    "rad",
+    "rad_s",
+    "rule",
+    "scene",
+    "sensor",
+    "share",
+    "sin",
+    "units",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import what link models return where one is made: no other component needs the network."""
+    import sys
+
+    if name == "Judged":
+        from foosim.vhub.network import custom_models
+
+        return custom_models.Judged
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

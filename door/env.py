@@ -1,0 +1,22 @@
+"""Deployments as environments for learning, and rewards of the table. It needs the extra `learn`.
+
+To import this registers its environments with Gymnasium: `gymnasium.make("foosim.env:foosim/Table-v0")`.
+"""
+
+from foosim.client.vectors import Column
+from foosim.painting.overhead import OverheadPainter
+from foosim.players.learning.table_rewards import DefendShot, Goals
+from foosim.rehearsal.env import TABLE, FoosimEnv, FoosimParallelEnv, Nothing, Reward, parallel_env
+
+__all__ = [
+    "TABLE",
+    "Column",
+    "DefendShot",
+    "FoosimEnv",
+    "FoosimParallelEnv",
+    "Goals",
+    "Nothing",
+    "OverheadPainter",
+    "Reward",
+    "parallel_env",
+]

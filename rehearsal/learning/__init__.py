@@ -1,1 +1,0 @@
-"""Training of the player that comes with foosim: a shot is defended."""
