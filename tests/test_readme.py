@@ -39,6 +39,7 @@ PYPROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES: Final = tuple(PYPROJECT["tool"]["setuptools"]["package-dir"].values())
 OTHER_OPTIONS: Final = {
     "--help",
+    "--install-completion",
     "--version",
     "--strict",
     "--hypothesis-profile",
