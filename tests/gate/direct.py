@@ -62,13 +62,16 @@ def run_all(folder: Path) -> dict[str, Failed]:
 
 def _run_forked(mutant: DirectMutant, output: Path) -> int:
     """Run a mutant's test in a fork, which ends with the exit code of pytest."""
+    sys.stdout.flush()
     child = os.fork()
     if child == 0:
         with output.open("w") as file:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
             mutant.plant(Planting())
-            os._exit(pytest.main([*OPTIONS, mutant.test]))
+            code = pytest.main([*OPTIONS, mutant.test])
+            sys.stdout.flush()
+            os._exit(code)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
