@@ -44,7 +44,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
         assert client.receive(LIMIT_S)
     node = ("foosim", "role", "node", "--connect", info.simulation)
     code, _, error = house.run(*node, "--name", "red", "--pki", stranger)
-    assert code == 3 and "its certificate is not accepted here" in error
+    assert code == 3 and "its certificate is not accepted here" in error, (code, error)
     code, _, error = house.run(*node, "--name", "red")
     assert code == 2 and "needs certificates: give their folder by --pki DIR" in error
     code, _, error = house.ask(*node, "--name", "green", "--pki", folder)
