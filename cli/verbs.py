@@ -145,7 +145,7 @@ class Foosim(Verbs):
             "doctor": Verb("cli.doctor", "Check whether a deployment can run on this machine and its hosts."),
             "fit": Verb(
                 "fitting.main",
-                "Fit rolling friction, friction and restitution of a table to measured tracks of its ball.",
+                "Fit rolling friction, friction and restitution of a table to measured tracks.",
             ),
         },
     }

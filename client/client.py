@@ -291,7 +291,7 @@ class Client:
     # --- packets -----------------------------------------------------------------------------------------------------
 
     def command(self, commands: Commands) -> None:
-        """Command robots, by name: `{"red.goal": {"slide": 0.05, "spin": 0.0}}`; see `Actuator.set`.
+        """Command robots, by name: `{"robot-1": {"v": 0.5, "w": 0.0}}`; see `Actuator.set`.
 
         Raises UnknownName for a robot or an actuator, BadValue for names and numbers that are none of a command;
         NotJoined, RunEnded.

@@ -53,7 +53,7 @@ def fit_command(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Fit rolling friction, friction and restitution of a table to measured tracks of its ball.
+    """Fit rolling friction, friction and restitution of a table to measured tracks.
 
     A track is where a free ball was, that no figure touched: columns `time`, `x` and `y`, each with its unit in the
     header (`time [s]` or `time_s`), in the table's frame of reference. A column `track` tells several tracks of a file

@@ -3,7 +3,7 @@
     kill n2 at 1 s               its robots move to the other nodes
     kill n2 for 300 ms at 1 s    and it comes back
     cut n3 for 300 ms at 1 s     no message leaves or reaches it
-    move red.goal to n2 at 1 s
+    move robot-1 to n2 at 1 s
 
 `at` is simulated time, `for` time of the processes' clocks.
 """

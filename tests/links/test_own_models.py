@@ -223,14 +223,14 @@ def test_a_capture_without_its_package(tmp_path: Path, foggy: Path, monkeypatch:
     assert line == "link model fog is of foggy 1.2 in the capture, here it is not installed"
     with pytest.raises(ModelError, match="link model 'fog': not a link model that is installed here, there are none"):
         what_if(capture)
-    refused = replay("whatif", tmp_path / "run.mcap")
+    refused = replay("what-if", tmp_path / "run.mcap")
     assert (refused.code, refused.out) == (2, "")
     assert refused.err.startswith(f"warning: {line}\nlink model 'fog': not a")
     other = tmp_path / "other.yaml"
     other.write_text("network:\n  links:\n  - {id: all, from: '*', to: '*', model: {name: mist}}\n")
-    refused = replay("whatif", tmp_path / "run.mcap", "--network", other)
+    refused = replay("what-if", tmp_path / "run.mcap", "--network", other)
     assert refused.code == 2 and refused.err.startswith(f"{other}:3:49: network.links[0].model.name: not a")
-    assert replay("whatif", tmp_path / "run.mcap", "--set", "network.links.all.model=null").code == 0
+    assert replay("what-if", tmp_path / "run.mcap", "--set", "network.links.all.model=null").code == 0
 
 
 def test_a_report_shows_the_model_with_its_parameters() -> None:

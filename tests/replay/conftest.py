@@ -21,7 +21,7 @@ from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import FRAME, PROFILE, Fate, PacketRow
-from foosim.cli.capture.command import app
+from foosim.cli.verbs import app
 from foosim.common.errors import Refused
 from foosim.console.report.collect import Report, gather
 from foosim.rehearsal.run import rehearse
@@ -158,8 +158,13 @@ class Done:
 
 
 def replay(*arguments: str | Path) -> Done:
-    """Run `foosim capture` as a person would: what is refused is told on standard error."""
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    """Run `foosim capture` as a person would."""
+    return foosim("capture", *arguments)
+
+
+def foosim(*words: str | Path) -> Done:
+    """Run `foosim` as a person would: what is refused is told on standard error."""
+    done = CliRunner().invoke(app, [str(word) for word in words])
     if isinstance(done.exception, Refused):
         return Done(done.exception.exit_code, done.stdout, f"{done.stderr}{done.exception}\n")
     if done.exception is not None and not isinstance(done.exception, SystemExit):

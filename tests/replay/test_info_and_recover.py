@@ -48,7 +48,7 @@ def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
 def test_what_is_no_capture_is_refused_before_anything_is_simulated(bad_files: list[Path]) -> None:
     deployment = load_deployment(TABLE.read_text(), TABLE.name)
     for bad in bad_files:
-        for command in ("info", "verify", "whatif"):
+        for command in ("info", "verify", "what-if"):
             done = replay(command, bad)
             assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1, command
         with pytest.raises(BadBranch, match=f"--from: {bad}: "):

@@ -322,12 +322,12 @@ def test_the_program_in_the_docs_listens(run: Path, capsys: pytest.CaptureFixtur
 
 # --- the command as a process ----------------------------------------------------------------------------------------
 
-COMMAND = str(Path(sysconfig.get_path("scripts")) / "foosim capture")
+COMMAND = str(Path(sysconfig.get_path("scripts")) / "foosim"), "capture"
 
 
 def test_without_a_terminal_it_says_plain_lines_and_ctrl_c_ends_it_in_order(run: Path) -> None:
     process = subprocess.Popen(
-        [COMMAND, "play", str(run), "--loop", "--json"],
+        [*COMMAND, "play", str(run), "--loop", "--json"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -348,7 +348,7 @@ def test_a_terminal_gives_keys_and_gets_its_mode_back(run: Path) -> None:
     master, slave = pty.openpty()
     before = termios.tcgetattr(slave)
     # In a session of its own, whose terminal this one is: as a shell starts it.
-    command = ["setsid", "--ctty", COMMAND, "play", str(run), "--loop"]
+    command = ["setsid", "--ctty", *COMMAND, "play", str(run), "--loop"]
     process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave)
     read_until(master, b"space pause")
     assert not termios.tcgetattr(slave)[3] & termios.ICANON

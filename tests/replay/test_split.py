@@ -76,7 +76,7 @@ def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> Non
     for file in files_from(split):
         if not file.name.endswith("3.mcap"):
             (tmp_path / file.name).write_bytes(file.read_bytes())
-    for command in ("info", "verify", "whatif", "play", "recover"):
+    for command in ("info", "verify", "what-if", "play", "recover"):
         done = replay(command, tmp_path / "run.mcap")
         assert done.code in (1, 2) and "run_0003.mcap: is missing, run_0004.mcap goes on behind it" in done.err, done
     (tmp_path / "run_0000.mcap").touch()

@@ -17,7 +17,7 @@ from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource
 from foosim.console.shown.source import Wanted
 from tests.console.test_capture_source import Heard, running
-from tests.replay.conftest import TICKS, replay
+from tests.replay.conftest import TICKS, foosim, replay
 from tests.replay.test_play import playing
 
 
@@ -46,9 +46,9 @@ def test_what_cannot_be_shown_ends_the_command_as_bad_input(run: Path, tmp_path:
         ((run, "--offset", "1s"), "--offset needs --second"),
         ((run, "--second", run, "--offset", "soon"), "--offset: "),
     ):
-        done = replay("view", *arguments)
+        done = foosim("view", *arguments)
         assert done.code == 2 and said in done.err, done
-    done = replay("view", run, "--listen", "0.0.0.0")
+    done = foosim("view", run, "--listen", "0.0.0.0")
     assert done.code == 3 and "--certificate" in done.err
 
 

@@ -121,7 +121,7 @@ def test_a_worse_network_loses_more_of_the_same_draws(run: Path) -> None:
 def test_a_network_with_walls_needs_the_world_and_has_it(run: Path, tmp_path: Path) -> None:
     other = tmp_path / "radio.yaml"
     other.write_text(f"network: {{{NETWORKS['wifi']}, {PLACES}}}\n")
-    typed = replay("whatif", run, "--network", other, "--json", "--packets")
+    typed = replay("what-if", run, "--network", other, "--json", "--packets")
     found = json.loads(typed.out)
     assert found["changed"] > 100 and len(found["changes"]) == found["changed"]
     assert set(found["new_causes"]) & {"collision", "snr"}
@@ -138,7 +138,7 @@ def test_the_age_of_information_is_the_area_under_the_saw() -> None:
 
 def test_the_command_shows_links_and_draws_them(run: Path, tmp_path: Path) -> None:
     drawing = tmp_path / "changed.svg"
-    typed = replay("whatif", run, "--set", "network.links.everything.loss=50 %", "--picture", drawing)
+    typed = replay("what-if", run, "--set", "network.links.everything.loss=50 %", "--picture", drawing)
     assert "changed" in typed.out and "random_loss" in typed.out and "red.goal" in typed.out
     assert "red.goal" in drawing.read_text()
 
@@ -165,7 +165,7 @@ def test_a_picture_of_many_links_is_bounded(run: Path) -> None:
 
 
 def bad(run: Path, *arguments: str | Path) -> Done:
-    typed = replay("whatif", run, *arguments)
+    typed = replay("what-if", run, *arguments)
     assert typed.code == 2, typed.out
     return typed
 
@@ -189,7 +189,7 @@ def test_an_unfinished_capture_is_judged_as_far_as_it_goes(tmp_path: Path) -> No
     torn.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
     found = what_if(open_capture(torn))
     assert found.packets > 0
-    assert "does not have the end of its run" in replay("whatif", torn).err
+    assert "does not have the end of its run" in replay("what-if", torn).err
 
 
 def test_a_broadcast_whose_fate_is_behind_the_end_is_left_out(tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def test_why_a_host_does_not_answer_is_said(other: There, monkeypatch: pytest.Mo
     silent = other.remote("-o", "ProxyCommand=sleep 1000", "-o", "ConnectTimeout=1000")
     assert why_silent(silent, 0.5) == ("no answer within 0.5 s", f"make `{silent.typed}` work")
     text, remedy = why_silent(other.remote(commands="/nowhere"))
-    assert "there is no /nowhere/foosim guard on host there" in text and remedy.startswith("install foosim ")
+    assert "there is no /nowhere/foosim on host there" in text and remedy.startswith("install foosim ")
     text, remedy = why_silent(other.remote())
     assert text == "ended with exit code 2 on host there: :1:1: no YAML document, ''", "it was asked nonsense"
     monkeypatch.setattr(doctor_remote, "version", lambda name: "99.0")

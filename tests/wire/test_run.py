@@ -414,7 +414,7 @@ def test_a_run_waits_for_what_is_started_by_hand_and_ends_in_order_when_a_requir
     player = house.start(*line.split(": ", 1)[1].split())
     house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")
     other_cpu = "from foosim.node import main; main.library_fingerprint = lambda: bytes(32)"
-    code, err = altered_node(house, other_cpu, "blue", command[4])
+    code, err = altered_node(house, other_cpu, "blue", command[6])
     assert code == 3 and "arithmetic fingerprint 0000000000000000, this is " in err
     blue = house.start(*command)
     house.ticking(5)
@@ -516,7 +516,7 @@ def test_a_node_with_another_source_of_a_form_is_refused(house: House, monkeypat
     )
     line = house.read_until(up.stderr, "waiting for node blue; start it on its machine: ")
     command = line.split(": ", 1)[1].split()
-    code, err = altered_node(house, f"import sys; sys.path.insert(0, {str(other)!r})", "blue", command[4])
+    code, err = altered_node(house, f"import sys; sys.path.insert(0, {str(other)!r})", "blue", command[6])
     assert code == 3 and "sensor scaled:Dozes has version " in err and "install the same on all machines" in err, err
     assert house.end(house.start(*command))[0] == 0
     assert house.end(up)[0] == 0

@@ -160,7 +160,7 @@ def test_why_a_process_could_not_be_started_is_said(there: There, monkeypatch: p
     refused["ssh_options"][1] = str(there.folder / "other_config")
     cases = {
         "it refused the key: `ssh -F": Remote("there", Host(**refused)),
-        "there is no /nowhere/foosim guard on host there: install foosim": there.remote(commands="/nowhere"),
+        "there is no /nowhere/foosim on host there: install foosim": there.remote(commands="/nowhere"),
         "cannot be reached: ssh: connect to host 127.0.0.1": there.remote(port=free_port()),
         "its host key is not known": there.remote("-o", f"UserKnownHostsFile={empty}"),
         "its name is not known: correct hosts.there.address": there.remote(ssh="no-such-host.invalid"),
@@ -185,9 +185,9 @@ def test_a_capture_comes_home_whole_or_stays(there: There, tmp_path: Path) -> No
     content = os.urandom(3_000_001)
     (folder / CAPTURE).write_bytes(content)
     (folder / "capture_0001.mcap").write_bytes(content[:2_000_000])
-    damaging = there.bin / "foosim guard"
+    damaging = there.bin / "foosim"
     for damage in ("head -c 2999999", "head -c 3050000", "tr a b", "grep -av end"):
-        damaging.write_text(f'#!/bin/sh\n{command_path("foosim guard")} "$@" | {damage}\n')
+        damaging.write_text(f'#!/bin/sh\n{command_path("foosim")} "$@" | {damage}\n')
         damaging.chmod(0o755)
         with pytest.raises(Failed, match="it came damaged"):
             fetch_capture(there.remote(commands=None), RUN, home)
@@ -202,7 +202,7 @@ def test_a_capture_comes_home_whole_or_stays(there: There, tmp_path: Path) -> No
 def test_a_run_whose_host_does_not_have_foosim_says_so_and_ends(there: There, house: House) -> None:
     hosts = {"there": there.host(commands="/nowhere")}
     code, out, err = house.end(house.up("--json", "--set", f"hosts={hosts}", "--set", "nodes.blue.host=there"))
-    assert code == 1 and "there is no /nowhere/foosim guard on host there" in last_json(out)["reason"], err
+    assert code == 1 and "there is no /nowhere/foosim on host there" in last_json(out)["reason"], err
     assert processes_with(str(house.folder / "state")) == {}
 
 
