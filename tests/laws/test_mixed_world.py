@@ -26,7 +26,7 @@ from tests.forms.worlds import driver, still
 from tests.laws.test_yard import yard
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-TICKS: Final = 120
+TICKS: Final = 200
 NAME: Final = "mixed.yaml"
 MODIFIERS: Final[dict[str, Any]] = {
     "pose": [

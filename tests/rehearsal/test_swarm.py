@@ -41,7 +41,7 @@ from foosim.vhub.state.records import TickRecord
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS: Final = 30_000
 FIRST: Final = 1001
-SEEDS: Final = 5
+SEEDS: Final = 8
 """The gate flies a dozen more without their bugs."""
 
 
