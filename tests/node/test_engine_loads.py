@@ -25,7 +25,7 @@ from foosim.world.layout import Entity, Layout, build_layout
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
-TICKS: Final = 700
+TICKS: Final = 1000
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s")
 
 
