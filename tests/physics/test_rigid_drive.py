@@ -35,7 +35,7 @@ class Pushing(Yard):
 
 def yard(sections: dict[str, Any] | None = None, **robot: Any) -> Pushing:
     bot = {"model": "differential_drive", "dynamics": "rigid", **robot}
-    return Pushing(yard_text({"bot": bot}, engine="bullet", substeps=SUBSTEPS, **(sections or {})))
+    return Pushing(yard_text({"bot": bot}, engine="mujoco", substeps=SUBSTEPS, **(sections or {})))
 
 
 def told(one: Pushing, linear: float, angular: float, ticks: int) -> None:
