@@ -362,7 +362,7 @@ def _scenery(view: View) -> Iterator[Finding]:
                 what = "a surface for free bodies, in a world without any"
                 yield Finding(("scenery", name, "surface"), what, surface)
         elif no_meshes and view.get("scenery", name, "shape") == "mesh":
-            what = f"the engine {engine} has no meshes (boxes and cylinders it has, and the engine bullet has all)"
+            what = f"the engine {engine} has no meshes (boxes and cylinders it has; bullet and mujoco have all)"
             yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
         yield from _radio(view, ("scenery", name, "radio"))
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import chain, islice
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pydantic import ValidationError
 
@@ -56,7 +56,7 @@ from foosim.world.assembly.state_fields import field_findings
 from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Model
+from foosim.world.forms.forms import Engine, Kit, with_article
 from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
@@ -294,23 +294,48 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
 
 
 def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
-    """A rigid body that the engine does not have."""
+    """Rigid bodies that the engine does not have, and those of which no engine has both."""
     engine = registry.find("engine", deployment.engine)
     assert isinstance(engine, Engine), engine
-    if engine.islands:
-        return
-    for name, model in rigid_bodies(deployment):
-        what = f"the engine has no rigid bodies such as {name}, a {model.name} (bullet has bodies of any kind)"
-        yield Finding(("engine",), what, engine.name)
-        return
+    body, rod = next(rigid_bodies(deployment), None), next(_rods(deployment), None)
+    if body is not None and rod is not None:
+        for one, other in ((body, rod), (rod, body)):
+            what = f"{one.what}, which no engine solves beside {'.'.join(other.location)}, {other.what}"
+            yield Finding(one.location, what, one.location[-1], at="key")
+    elif body is not None and not engine.islands:
+        what = f"the engine solves rods and balls of a table; {'.'.join(body.location)} is {body.what}"
+        yield Finding(("engine",), what, engine.name, "'mujoco'")
+    elif rod is not None and engine.islands:
+        what = f"the engine solves no rods and balls of a table; {'.'.join(rod.location)} is {rod.what}"
+        yield Finding(("engine",), what, engine.name, "'bullet'")
 
 
-def rigid_bodies(deployment: Deployment) -> Iterator[tuple[str, Model]]:
-    """Yield the robots and objects that need an engine with bodies of any kind, with their models."""
-    for name, settings in (*deployment.robots.items(), *deployment.objects.items()):
-        model = registry.model_of(settings)
-        if model.is_rigid and model.couples:
-            yield name, model
+class _Rigid(NamedTuple):
+    """Where something rigid is declared, and what it is."""
+
+    location: tuple[str, str]
+    what: str
+
+
+def _rods(deployment: Deployment) -> Iterator[_Rigid]:
+    """Yield the robots, or else the objects of kits, that are rods and balls of a table."""
+    for name, robot in deployment.robots.items():
+        if (model := registry.model_of(robot)).shares_solve:
+            yield _Rigid(("robots", name), with_article(model.name))
+    for key in deployment.kits:
+        kit = registry.find("kit", key)
+        for name, model_name in kit.entities.items() if isinstance(kit, Kit) else ():
+            if registry.find_model(model_name).shares_solve:
+                yield _Rigid((key, name), with_article(model_name))
+
+
+def rigid_bodies(deployment: Deployment) -> Iterator[_Rigid]:
+    """Yield the robots and objects that need an engine with bodies of any kind."""
+    for section, entities in (("robots", deployment.robots), ("objects", deployment.objects)):
+        for name, settings in entities.items():
+            model = registry.model_of(settings)
+            if model.is_rigid and model.couples:
+                yield _Rigid((section, name), with_article(model.name))
 
 
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:

@@ -41,7 +41,7 @@ def _text(**sections: Any) -> str:
         "seed": 1,
         "tick": "10 ms",
         "substeps": 4,
-        "engine": "bullet",
+        "engine": "mujoco",
         "pace": "fast",
         "assets": "models",
         "scene": {"kind": "empty"},

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.interface import Island
+from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.world.components.drives import NO_DRIVES, Drives
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS, NO_ENTITY, PARTNERS, PARTNERS_MAX, Model
 from foosim.world.forms.settings import EntitySettings

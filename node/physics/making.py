@@ -6,9 +6,10 @@ from collections.abc import Generator, Sequence
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import ISLAND_ENGINES_MAX, AnyEngine, EngineKind
+from foosim.node.physics.interface import AnyEngine, EngineKind
 from foosim.world.forms import registry
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.scenery import SceneryMesh
 
 SPARES: Final = 2
 """Engines that a node may build before the first one is given back: the next layout's, and the one after that."""
@@ -53,7 +54,7 @@ def make_engine(deployment: Deployment, layout: Layout) -> AnyEngine:
 def prepare_spares(deployment: Deployment, layout: Layout) -> None:
     """Get ready what would hold up the ticks later, when another engine is built beside them."""
     if has_rigid(layout):
-        kind_of(deployment).prepare_spares(ISLAND_ENGINES_MAX if layout.couples else SPARES)
+        kind_of(deployment).prepare_spares(SPARES)
 
 
 def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
@@ -62,3 +63,17 @@ def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, No
         return (yield from kind_of(deployment).in_steps(deployment, layout))
     yield
     return NoEngine()
+
+
+def check_shapes(deployment: Deployment, name: str, text: str) -> None:
+    """Try what an engine makes of somebody's numbers: meshes of scenery, and bodies. Files must have been read.
+
+    `text` is that of the deployment. Raises AssetError.
+    """
+    layout = build_layout(deployment)
+    if layout.couples:
+        make_engine(deployment, layout).close()
+    elif any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values()):
+        from foosim.node.physics.mesh_trial import check_meshes
+
+        check_meshes(deployment, name, text)

@@ -7,43 +7,32 @@ and whatever that has computed before.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from math import fsum, inf
 from typing import Any, Final
 
-import mujoco
-
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Island
-from foosim.node.physics.mujoco_model import SCENERY, ModelBuilder, Placed, is_mover, without_names
+from foosim.node.physics.mesh_pieces import MeshPieces
+from foosim.node.physics.mujoco_model import SCENERY, ModelBuilder, Placed, step, without_names
 from foosim.world.assembly.sections import physics_of
-from foosim.world.assembly.volumes import is_felt
+from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
 from foosim.world.components.drives import Motor, share_of
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
+from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
 from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
 
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were used last."""
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
-step = mujoco.mj_step
 
-Composition = tuple[tuple[int, ...], tuple[int, ...]]
-"""The kinds of an island's bodies, in name order, and those of the movers in their way."""
-
-
-class EngineError(AssertionError):
-    """MuJoCo warned of a result that is not to be trusted."""
-
-
-def _warned(text: str) -> None:
-    raise EngineError(text)
-
-
-mujoco.set_mju_user_warning(lambda text: None)  # by default MuJoCo writes MUJOCO_LOG.TXT into the working folder
+Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+"""The kinds of an island's bodies, in name order, those of movers in their way, and the pieces of meshes in reach."""
 
 
 class MujocoIslands:
@@ -54,7 +43,10 @@ class MujocoIslands:
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
         scene = build_scene(deployment, layout)
-        self._scenery = tuple([shape for shape in scene.scenery if shape.surface in self._physics.sides])
+        felt = [shape for shape in scene.scenery if shape.surface in self._physics.sides]
+        self._scenery = tuple([shape for shape in felt if not isinstance(shape.geometry, Mesh)])
+        self._meshes = MeshPieces(felt)
+        self._volumes = Volumes(deployment, layout) if self._meshes.pieces else None
         self._bodies: dict[int, Body] = {}
         self._kinds: dict[int, int] = {}
         """Of each entity with a body the number of its kind. Entities of one kind differ in name and place alone."""
@@ -67,6 +59,15 @@ class MujocoIslands:
         self._unnamed = list(known)
         self._models: dict[Composition, CompositionEngine] = {}
         """The one that was used last at the end."""
+        self._check({self._kinds[index]: layout.entities[index] for index in reversed(self._bodies)})
+
+    def _check(self, first: Mapping[int, Entity]) -> None:
+        """Build each kind of body alone; raise AssetError for the first entity of a kind that MuJoCo refuses."""
+        for kind, entity in first.items():
+            try:
+                self._build(((kind,), (), ()) if entity.is_rigid else ((), (kind,), ()))
+            except ValueError as error:
+                raise AssetError(f"{entity.name}: MuJoCo refuses its body: {error}") from error
 
     def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
         """Write the next state of an island's bodies into the numbers, which have its present one.
@@ -74,17 +75,29 @@ class MujocoIslands:
         `start` are the numbers of the tick's start, at which movers are.
         """
         kinds = self._kinds
-        key = tuple([kinds[one.index] for one in island.bodies]), tuple([kinds[one.index] for one in island.movers])
+        bodies, movers = ([kinds[one.index] for one in its] for its in (island.bodies, island.movers))
+        key = tuple(bodies), tuple(movers), self._pieces_near(island, numbers)
         engine = self._models.pop(key, None)
         if engine is None:
-            while len(self._models) >= MODELS_MAX:
-                del self._models[next(iter(self._models))]
-            bodies, movers = ([self._unnamed[kind] for kind in its] for its in key)
-            engine = CompositionEngine(self._physics, self._dt, self._substeps, self._scenery, bodies, movers)
+            engine = self._build(key)
         self._models[key] = engine
         engine.load(island, [self._bodies[one.index] for one in (*island.bodies, *island.movers)], numbers, start)
         engine.step(island)
         engine.read(island, numbers)
+
+    def _pieces_near(self, island: Island, numbers: Sequence[float]) -> tuple[int, ...]:
+        """Return the pieces of meshes that the bodies of an island may touch within the tick."""
+        if self._volumes is None:
+            return ()
+        rows = [self._volumes.rows[entity.index] for entity in island.bodies]
+        return self._meshes.near(self._volumes.boxes_at(numbers)[rows])
+
+    def _build(self, key: Composition) -> CompositionEngine:
+        while len(self._models) >= MODELS_MAX:
+            del self._models[next(iter(self._models))]
+        bodies, movers = ([self._unnamed[kind] for kind in kinds] for kinds in key[:2])
+        scenery = [*self._scenery, *chain.from_iterable([self._meshes.pieces[piece] for piece in key[2]])]
+        return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers)
 
     def close(self) -> None:
         """Free all models."""
@@ -117,7 +130,7 @@ class CompositionEngine:
         built = ModelBuilder(physics, substep_s, scenery, bodies, movers)
         self.m, self._placed, self._owners = built.m, built.placed, built.owners
         self._silent, self._motors, clock = built.silent, built.motors, built.clock
-        self.d = d = mujoco.MjData(self.m)
+        self.d = d = built.d
         self._q, self._v = d.qpos.tolist(), d.qvel.tolist()
         self._qpos, self._qvel, self._warm, self._applied = d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied
         self._contact = d.contact

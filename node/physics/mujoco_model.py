@@ -45,8 +45,8 @@ from foosim.world.scene import (
 HEAVY: Final = 1e7
 """Mass (kg) and inertia (kg m2) of what no contact moves: movers, and the clock of motors."""
 IMPRATIO: Final = 300.0
-"""Friction is this much stiffer than a contact is normal to it. At 100 a box creeps by 90 um/s on a slope of 15 degrees,
-at 300 by 29; at 1000 wheels shake at substeps of 10 ms. tests/physics/test_solid_truths.py has the scenes."""
+"""Friction is this much stiffer than a contact is normal to it. At 100 a box creeps by 90 um/s on a slope of 15
+degrees, at 300 by 29; at 1000 wheels shake at substeps of 10 ms. tests/physics/test_solid_truths.py has the scenes."""
 TOLERANCE: Final = 1e-10
 LINE_SEARCHES: Final = 50
 HARD: Final = (0.0, 0.99, 0.001, 0.5, 2.0)
@@ -57,8 +57,8 @@ BOUNCY_ERP: Final = 0.02
 """The share of an overlap that a substep corrects in a contact with restitution, at most: it adds to the rebound."""
 FRICTION_SUBSTEPS: Final = 12.0
 FRICTION_S_MAX: Final = 0.05
-"""The time constant of friction. MuJoCo's cone couples normal and tangential speeds: with a shorter one what slides hops,
-by 10 mm at 3 m/s with 8 substeps; with a longer one what is slow is braked by less than its friction."""
+"""The time constant of friction. MuJoCo's cone couples normal and tangential speeds: with a shorter one what slides
+hops, by 10 mm at 3 m/s with 8 substeps; with a longer one what is slow is braked by less than its friction."""
 SERVO: Final = (0.999, 0.999, 0.001, 0.5, 2.0)
 LIMIT: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 LEAST: Final = 1e-5
@@ -66,6 +66,9 @@ LEAST: Final = 1e-5
 GEOMS: Final = {Box: "BOX", Sphere: "SPHERE", Cylinder: "CYLINDER", Capsule: "CAPSULE", Hull: "MESH", Mesh: "MESH"}
 SCENERY: Final = -1
 """The place of what is no body."""
+
+step = mujoco.mj_step
+mujoco.set_mju_user_warning(lambda text: None)  # by default MuJoCo writes MUJOCO_LOG.TXT into the working folder
 
 
 def is_mover(body: Body) -> bool:
@@ -93,8 +96,11 @@ class Placed:
 
 
 class ModelBuilder:
-    """Builds one model. `m` is MuJoCo's, `placed` says where its bodies are, `owners` whose shape each geom is: the
-    place of the body, `SCENERY` of the scenery. `clock` is the place of the clock in `qvel`, -1 without motors."""
+    """Builds one model and its data, `m` and `d`.
+
+    `placed` says where its bodies are, `owners` whose shape each geom is: the place of the body, `SCENERY` of the
+    scenery. `clock` is the place of the clock in `qvel`, -1 without motors.
+    """
 
     def __init__(
         self,
@@ -120,6 +126,7 @@ class ModelBuilder:
             self._add_motors()
         self._add_pairs()
         self.m = m = self._spec.compile()
+        self.d = mujoco.MjData(m)
         light = m.dof_M0[m.dof_M0 < HEAVY / 10]
         m.stat.meaninertia = float(light.mean()) if len(light) else 1.0  # scales the solver's tolerance
         self.placed: list[Placed] = []
@@ -283,12 +290,10 @@ def _wxyz(q: Quaternion) -> tuple[float, float, float, float]:
 
 def without_names(body: Body) -> Body:
     """Return what a model is made of: links without names and looks; a mover has no masses."""
-    moves_alone = is_mover(body)
+    moves_alone, black = is_mover(body), (0.0, 0.0, 0.0, 1.0)
     links = []
     for link in body.links:
-        shapes = tuple(
-            [Shape(one.geometry, one.surface, (0.0, 0.0, 0.0, 1.0), one.position, one.orientation) for one in link.shapes]
-        )
-        bare = replace(link, name="", shapes=shapes)
+        shapes = [Shape(one.geometry, one.surface, black, one.position, one.orientation) for one in link.shapes]
+        bare = replace(link, name="", shapes=tuple(shapes))
         links.append(replace(bare, inertia=ORIGIN, centre_of_mass=ORIGIN, principal=UPRIGHT) if moves_alone else bare)
     return Body("", "", ORIGIN, tuple(links))

@@ -166,7 +166,7 @@ def test_all_problems_of_a_file_come_at_once_in_its_order() -> None:
     assert problems_of(text) == [
         "small.yaml:3:7: seed: not a whole number, 'x'",
         "small.yaml:5:11: substeps: does not divide the tick of 2000000 ns, 3, nearest is 2 and 4",
-        "small.yaml:6:9: engine: unknown engine (there are: bullet, pure, or any module:Class), 'bulet', "
+        "small.yaml:6:9: engine: unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'bulet', "
         "nearest is 'bullet'",
         "small.yaml:10:3: robots: a robot that no node owns, 'red.goal'",
         "small.yaml:29:14: nodes.one.robots[0]: unknown robot, 'red.gaol', nearest is 'red.goal'",

@@ -108,7 +108,7 @@ heavy = ("numpy", "pybullet", "foosim.node.physics.interface", "foosim.deploymen
 print(json.dumps([[one.name, one.meshes] for one in found] + [name for name in heavy if name in sys.modules]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == [["bullet", True], ["pure", False]]
+    assert json.loads(done.stdout) == [["bullet", True], ["mujoco", True], ["pure", False]]
 
 
 @pytest.mark.usefixtures("site")
@@ -125,19 +125,17 @@ def test_its_class_is_what_a_node_makes() -> None:
 
 
 def test_an_installed_engine_is_known_by_its_name(site: Path) -> None:
-    assert "unknown engine (there are: bullet, pure, or any module:Class), 'still'" in problem("engine=still")
+    assert "unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'still'" in problem("engine=still")
     install(site)
-    assert registry.names("engine") == ["bullet", "pure", "still"]
-    assert (
-        "engine: unknown engine (there are: bullet, pure, still, or any module:Class), 'stil', nearest is 'still'"
-        in problem("engine=stil")
-    )
+    assert registry.names("engine") == ["bullet", "mujoco", "pure", "still"]
+    known = "bullet, mujoco, pure, still, or any module:Class"
+    assert f"engine: unknown engine (there are: {known}), 'stil', nearest is 'still'" in problem("engine=stil")
     apply_sets(TEXT, TABLE.name, ["engine=still"])
     (own,), (installed,) = (
         [one["enum"] for one in deployment_schema(installed=theirs)["properties"]["engine"]["anyOf"] if "enum" in one]
         for theirs in (False, True)
     )
-    assert (own, installed) == (["bullet", "pure"], ["bullet", "pure", "still"])
+    assert (own, installed) == (["bullet", "mujoco", "pure"], ["bullet", "mujoco", "pure", "still"])
     (told,) = chosen("engine", "still")
     assert as_json(told)["meshes"] is False and as_json(told)["class"] == "own_still:Still"
     assert list(lines(told)) == ["engine still, of own_still:Still", "  Moves nothing but the ball."]

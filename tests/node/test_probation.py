@@ -136,7 +136,7 @@ def rocks() -> tuple[str, Deployment]:
         "seed": 1,
         "tick": "10 ms",
         "substeps": 2,
-        "engine": "bullet",
+        "engine": "mujoco",
         "pace": "fast",
         "scene": {"kind": "empty"},
         "objects": objects,

@@ -27,7 +27,7 @@ def said(arm: str = ARM, *, folder: Path, objects: Any = None, **robot: Any) -> 
     (folder / "arm.urdf").write_text(arm)
     robots = {"arm": {"model": "urdf", "file": "arm.urdf", "fixed": True, "actuators": JOINTS, **robot}}
     try:
-        pin_assets(yard_text(robots, engine="bullet", objects=objects or {}), "yard.yaml", folder)
+        pin_assets(yard_text(robots, engine="mujoco", objects=objects or {}), "yard.yaml", folder)
     except Refused as error:
         return str(error)
     return ""
@@ -163,6 +163,6 @@ def test_an_engine_that_does_not_have_such_bodies(tmp_path: Path) -> None:
     text = yard_text({"base": {"model": "differential_drive"}}, engine="pure", objects={"crate": box})
     with pytest.raises(Refused) as refused:
         pin_assets(text, "yard.yaml", tmp_path)
-    what = "engine: the engine has no rigid bodies such as crate, a box (bullet has bodies of any kind), 'pure'"
+    what = "engine: the engine solves rods and balls of a table; objects.crate is a box, 'pure', nearest is 'mujoco'"
     assert str(refused.value).endswith(what)
-    pin_assets(text.replace("engine: pure", "engine: bullet"), "yard.yaml", tmp_path)
+    pin_assets(text.replace("engine: pure", "engine: mujoco"), "yard.yaml", tmp_path)

@@ -31,7 +31,7 @@ def at(**place: str) -> dict[str, str]:
 
 
 def text_of(objects: dict[str, Any], robots: dict[str, Any] | None = None, **sections: Any) -> str:
-    return yard_text(robots or QUAD, engine="bullet", substeps=4, objects=objects, **sections)
+    return yard_text(robots or QUAD, engine="mujoco", substeps=4, objects=objects, **sections)
 
 
 def problems(text: str, folder: Path | None = None) -> list[str]:

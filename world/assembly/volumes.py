@@ -17,7 +17,6 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.assembly.rest import is_slow, moves
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -33,9 +32,6 @@ FEW: Final = 16
 """Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
 SKIN_M: Final = 0.05
 """Which boxes may overlap is looked up anew when a side of one is this far from where it was then."""
-LOOKED_AT: Final = 64
-"""Bodies that a look ahead starts from, and islands that it finds."""
-
 X, Y, Z, W = range(4)
 ROTATION: Final = np.array(
     [
@@ -97,6 +93,8 @@ class Volumes:
         ]
         self._layout = layout
         self._entities = [entity for entity, _ in felt]
+        self.rows = {entity.index: row for row, entity in enumerate(self._entities)}
+        """The row of each entity in `boxes_at`."""
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
         self._free = np.array([row for row, _, _ in free], np.intp)
@@ -106,8 +104,6 @@ class Volumes:
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
         self._middles = np.array(middles).reshape(-1, 1, 3)
         self._halves = np.array(halves).reshape(-1, 1, 3)
-        self._ways = np.array([body.speed_limit * tick_s if body.is_free else 0.0 for _, body in felt])
-        """How far each body gets in a tick (m)."""
         self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
@@ -133,7 +129,7 @@ class Volumes:
 
         It is the same list as the last one where it is equal to that.
         """
-        boxes = self._boxes_at(numbers)
+        boxes = self.boxes_at(numbers)
         if self._near is None or not (np.abs(boxes - self._near.boxes) <= SKIN_M).all():
             self._near = _near(boxes)
         ones, others = self._near.ones, self._near.others
@@ -145,44 +141,6 @@ class Volumes:
         if found is not None and found != self._found[1]:
             self._found = pairs, found
         return self._found[1]
-
-    def approaching(self, numbers: Sequence[float], ticks: int) -> list[BodyIsland]:
-        """Return the islands that may come about within some ticks: two of the present ones together, or one with a
-        mover. Those come first whose volumes are nearest. At least one of the two moves.
-
-        Volumes grow by their declared speed limits x so many ticks. What moves is limited to the first `LOOKED_AT`
-        bodies and movers, so that a look costs little in any world.
-        """
-        present = self.islands(numbers)
-        boxes = self._boxes_at(numbers)
-        entities = self._entities
-        moving = [row for row, entity in enumerate(entities) if _is_fast(entity, numbers)][:LOOKED_AT]
-        if not moving:
-            return []
-        gaps = np.maximum(boxes[moving, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[moving, None, 1])
-        gap = gaps.max(axis=2)
-        reach = self._ways * (ticks - 1)
-        near = (gap > 0.0) & (gap <= np.array(reach[moving])[:, None] + reach[None, :])
-        at, other = near.nonzero()
-        home = {index: number for number, island in enumerate(present) for index in island.entities}
-        homes, is_mover = np.array([home[entity.index] for entity in entities]), np.array(self._is_mover)
-        one, two = homes[moving][at], homes[other]
-        apart = np.flatnonzero((one != two) & ~(is_mover[moving][at] & is_mover[other]))
-        pairs = np.minimum(one, two)[apart] * len(present) + np.maximum(one, two)[apart]
-        ordered = pairs[np.lexsort((pairs, gap[at, other][apart]))]
-        nearest = ordered[np.sort(np.unique(ordered, return_index=True)[1])][:LOOKED_AT]
-        return [
-            self._together(present[pair // len(present)], present[pair % len(present)], numbers)
-            for pair in nearest.tolist()
-        ]
-
-    def _together(self, one: BodyIsland, other: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
-        """Return two islands as one; a mover, which is alone in its island, is in the way of the other."""
-        members = sorted([*one.entities, *other.entities])
-        bodies = [self._layout.entities[index] for index in members if self._layout.entities[index].is_rigid]
-        alone = {index for index in members if not self._layout.entities[index].is_rigid}
-        movers = tuple(sorted({*one.movers, *other.movers, *alone}))
-        return BodyIsland(tuple([entity.index for entity in bodies]), movers, self._nearest(bodies, numbers))
 
     def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
         if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice
@@ -217,7 +175,7 @@ class Volumes:
         found += [BodyIsland((index,), (), name) for index, name in self._alone]
         return sorted(found, key=lambda island: island.entities)
 
-    def _boxes_at(self, numbers: Sequence[float]) -> Numbers:
+    def boxes_at(self, numbers: Sequence[float]) -> Numbers:
         """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
         boxes = self._boxes.copy()
         if self._poses is not None:
@@ -277,11 +235,6 @@ def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     meet = ((low[others] <= high[ones]) & (high[others] >= low[ones])).all(axis=1)
     pairs = np.sort(np.stack((order[ones[meet]], order[others[meet]]), axis=1), axis=1)
     return sorted(map(tuple, pairs.tolist()))
-
-
-def _is_fast(entity: Entity, numbers: Sequence[float]) -> bool:
-    """Whether a body or a mover may get anywhere."""
-    return not is_slow(entity, numbers) if entity.is_rigid else moves(entity, numbers)
 
 
 def _pose_places(entity: Entity) -> list[int]:

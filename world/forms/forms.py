@@ -257,6 +257,11 @@ class Model(Form):
         return None if callable(self.slots) else self.slots
 
     @property
+    def shares_solve(self) -> bool:
+        """Whether it is a rod or a ball of a table: an engine solves all of these together."""
+        return self.is_rigid and not self.couples
+
+    @property
     def can_be_free(self) -> bool:
         """Whether its entities are rigid bodies that nothing holds, or some may be."""
         return self.is_rigid and (self.declared is None or LINEAR_VELOCITY in self.declared)
@@ -337,7 +342,7 @@ class Engine(Form):
     """What computes rigid bodies.
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`).
+    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table.
     """
 
     meshes: bool = False
