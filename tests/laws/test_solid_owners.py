@@ -18,7 +18,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.run import deal_robots
-from foosim.world.assembly.rest import Rest, is_slow
+from foosim.world.assembly.rest import Rest, is_still
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.components.drives import Drives
 from foosim.world.frame import Frame
@@ -123,13 +123,13 @@ def test_rest_that_is_not_in_the_frame_is_caught(monkeypatch: pytest.MonkeyPatch
     def stack_differs() -> bool:
         frames = Frames()
         one, last = run(stack(), 150, 1, on_commit=frames), frames.frames[-1]
-        assert all(is_slow(last.layout[name], last.numbers) for name in STACK)
+        assert all(is_still(last.layout[name], last.numbers) for name in STACK)
         return run(stack(), 150, 2, is_shuffled=True).digests != one.digests
 
     def count(self: Rest, bodies: Sequence[Entity], drives: Sequence[Drives], numbers: list[float]) -> None:
         memory = self.__dict__.setdefault("memory", {})
         for entity in bodies:
-            memory[entity.index] = memory.get(entity.index, 0) + 1 if is_slow(entity, numbers) else 0
+            memory[entity.index] = memory.get(entity.index, 0) + 1 if is_still(entity, numbers) else 0
 
     def may_rest(self: Rest, bodies: Sequence[Entity], *_: object) -> bool:
         memory = self.__dict__.setdefault("memory", {})

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
-from foosim.world.assembly.volumes import BodyIsland, Volumes
+from foosim.world.assembly.volumes import BodyIsland, Volumes, solver_by_name
 from foosim.world.layout import Layout
 from foosim.world.models.rod import RodRobot, line_x_m
 from foosim.world.parameters.table import TABLE, table_of
@@ -189,6 +189,11 @@ class Assignment:
         if shares is None:
             shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
+
+    def _solver_of_any(self, island: BodyIsland) -> str:
+        if island.nearest:
+            return self.owners[island.nearest]
+        return solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
 
     def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:
         mine: dict[str, list[tuple[int, ...]]] = {node: [] for node in self.roster}
