@@ -21,7 +21,7 @@ from foosim.world.spec import WorldSpec
 
 STILL_M: Final = 50e-6
 STILL_RAD: Final = 50e-6
-"""What stays within these of a pose is still. In the time of rest a box creeps by 15 um down a slope of 15 degrees; a
+"""What stays within these of a pose is still. In the time of rest a box creeps by 22 um down a slope of 15 degrees; a
 ball on one of 0.05 degrees rolls by 760 um, a pole that is 2 mrad past its balance turns by 3 mrad."""
 MAY_CHANGE: Final = frozenset((STILL_TICKS, STILL_POSE, "partners", "refused", "clamped"))
 """Fields of a body at rest that may change: references follow their entities into another layout."""
