@@ -14,8 +14,8 @@ from pathlib import Path
 
 from foosim.client.main import PlayerShell, run_to_end
 from foosim.common.addresses import Address
-from foosim.launcher.journal_check import supervisor_records
 from foosim.launcher.plan import Plan
+from foosim.launcher.resume import supervisor_records
 from foosim.node.main import NodeShell
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane

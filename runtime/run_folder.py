@@ -121,6 +121,11 @@ class RunFolder:
         except (OSError, msgspec.DecodeError):
             return None
 
+    def capture(self) -> Path | None:
+        """Return the path of the capture that the run was launched with; None without one."""
+        launch = self.launch()
+        return None if launch is None or not launch.capture else Path(launch.capture)
+
     def is_fresh(self) -> bool:
         """Whether nothing has run in it yet."""
         return not any((self.path / name).exists() for name in (LAUNCHER_FILE, LAUNCH_FILE, LOCK_FILE, RUN_FILE))

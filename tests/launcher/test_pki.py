@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 from foosim.cli.pki import app
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
-from foosim.launcher.pki import certificates as pki
-from foosim.launcher.pki.certificates import FileExists
+from foosim.launcher import pki
+from foosim.launcher.pki import FileExists
 from foosim.runtime.transport import certificates
 from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
 from foosim.runtime.transport.certificate_folder import CertificateError

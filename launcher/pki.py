@@ -1,4 +1,4 @@
-"""Makes certificates: a root, and one for each process, client and operator under it.
+"""Makes certificates: a root, and one for each process, client and operator under it; and which of them a host needs.
 
 Elliptic curve P-256. The root lasts ten years and may issue no further authority; what it issues lasts 90 days, names
 one identity, and serves both sides of a connection, since every process connects and two listen. Keys are never
@@ -8,8 +8,9 @@ overwritten, and can be read by their owner only.
 from __future__ import annotations
 
 import os
+import re
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from ipaddress import ip_address
@@ -23,8 +24,10 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
+from foosim.deployment.processes import joint_processes
+from foosim.deployment.schema import Deployment, places
+from foosim.protocol import identity as names_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.identity import parse_identity
 from foosim.runtime.transport.certificate_files import (
     check_certificate,
     check_key,
@@ -35,7 +38,7 @@ from foosim.runtime.transport.certificate_files import (
     read_key,
 )
 from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, CertificateError
-from foosim.runtime.transport.certificates import certificate_path, identities_in, key_path
+from foosim.runtime.transport.certificates import certificate_path, identities_in, key_path, load_credentials
 
 ROOT_NAME: Final = "foosim"
 ROOT_DAYS: Final = 3650
@@ -48,7 +51,8 @@ SLACK: Final = timedelta(hours=1)
 LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "::1")
 LISTENERS: Final = frozenset({SUPERVISOR, VHUB})
 """Identities whose certificates have host names: the others only connect."""
-HOST_LENGTH_MAX: Final = 253
+LABEL: Final = "[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?"
+HOST_NAME: Final = re.compile(rf"(?=.{{1,253}}$){LABEL}(\.{LABEL})*", re.IGNORECASE | re.ASCII)
 
 
 class FileExists(Refused):
@@ -109,19 +113,14 @@ def _is_due(folder: Path, identity: str, ca: x509.Certificate, hosts: Sequence[s
 
 def init(folder: Path) -> Path:
     """Make the folder with a root, and return the root's path. Raises FileExists."""
-    _make_folder(folder)
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise CertificateError(f"{folder}: cannot be made, {error.strerror}") from None
     _refuse_existing(folder / CA_FILE, folder / CA_KEY_FILE)
     key = ec.generate_private_key(ec.SECP256R1())
-    subject = _subject(ROOT_NAME)
-    root = (
-        _builder(subject, subject, key.public_key(), ROOT_DAYS)
-        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-        .add_extension(_usage(is_ca=True), critical=True)
-        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
-        .sign(key, hashes.SHA256())
-    )
     _write(folder / CA_KEY_FILE, _key_bytes(key))
-    _write(folder / CA_FILE, root.public_bytes(serialization.Encoding.PEM))
+    _write(folder / CA_FILE, _signed(ROOT_NAME, key.public_key(), ROOT_DAYS, (None, key)))
     return folder / CA_FILE
 
 
@@ -130,23 +129,23 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
 
     `hosts`: names and addresses by which others reach it, beside those of this machine.
     """
-    names = _alternatives(hosts)
-    days = _checked_days(days)
+    own = socket.gethostname().lower()
+    known = [*LOCAL_HOSTS, *([own] if HOST_NAME.fullmatch(own) else []), *hosts]
+    names = [_alternative(host) for host in dict.fromkeys(known)]
+    if not 1 <= days <= LEAF_DAYS_MAX:
+        raise BadValue(f"days of a certificate are from 1 to {LEAF_DAYS_MAX}", days)
     for identity in identities:
-        parse_identity(identity)
+        names_of.parse_identity(identity)
     _refuse_existing(*(path(folder, identity) for identity in identities for path in (certificate_path, key_path)))
     if not identities:
         return []
-    root, root_key = _authority(folder)
-    made = []
+    authority = _authority(folder)
     for identity in identities:
         key = ec.generate_private_key(ec.SECP256R1())
-        own = [x509.DNSName(identity), *names]
         _write(key_path(folder, identity), _key_bytes(key))
-        certificate = _leaf(identity, key.public_key(), own, days, root, root_key)
-        _write(certificate_path(folder, identity), certificate.public_bytes(serialization.Encoding.PEM))
-        made.append(certificate_path(folder, identity))
-    return made
+        leaf = _signed(identity, key.public_key(), days, authority, [x509.DNSName(identity), *names])
+        _write(certificate_path(folder, identity), leaf)
+    return [certificate_path(folder, identity) for identity in identities]
 
 
 def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) -> list[Path]:
@@ -157,45 +156,75 @@ def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) ->
     further = [_alternative(host) for host in hosts]
     if not identities:
         return []
-    root, root_key = _authority(folder)
+    authority = _authority(folder)
     made = []
     for identity in identities:
         path = certificate_path(folder, identity)
         old = read_certificate(path)
         check_key(key_path(folder, identity), old)
         days = max(1, (old.not_valid_after_utc - old.not_valid_before_utc).days)
-        alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         key = old.public_key()
         assert isinstance(key, ec.EllipticCurvePublicKey), "issued here"
-        names = list(dict.fromkeys([*alternatives, *further]))
-        certificate = _leaf(identity, key, names, days, root, root_key)
+        alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         fresh = path.with_name(f"{path.name}.new")
         fresh.unlink(missing_ok=True)
-        _write(fresh, certificate.public_bytes(serialization.Encoding.PEM))
-        fresh.replace(path)
-        made.append(path)
+        _write(fresh, _signed(identity, key, days, authority, list(dict.fromkeys([*alternatives, *further]))))
+        made.append(fresh.replace(path))
     return made
 
 
 def show_folder(folder: Path) -> list[Shown]:
     """Return the folder's contents: the root, then by identity. Raises CertificateError when there is no root."""
-    now = wall_clock.now_utc()
-    ca = read_certificate(folder / CA_FILE)
-    shown = [_shown("", folder / CA_FILE, ca, _problem(lambda: read_ca(folder, now)))]
-    for identity in identities_in(folder):
-        path = certificate_path(folder, identity)
-        try:
-            found = read_certificate(path)
-        except CertificateError as error:
-            shown.append(Shown(identity, str(path), now, now, (), "", error.what))
-            continue
+    read_certificate(folder / CA_FILE)
+    return [_shown(folder, identity) for identity in ("", *identities_in(folder))]
 
-        def check(identity: str = identity, path: Path = path, found: x509.Certificate = found) -> None:
-            check_certificate(path, found, identity, ca, now)
-            check_key(key_path(folder, identity), found)
 
-        shown.append(_shown(identity, path, found, _problem(check)))
-    return shown
+def _shown(folder: Path, identity: str) -> Shown:
+    """Return what is shown of an identity's certificate, without one of the root's."""
+    now, problem = wall_clock.now_utc(), ""
+    path = certificate_path(folder, identity) if identity else folder / CA_FILE
+    try:
+        if identity:
+            load_credentials(folder, identity)
+        else:
+            read_ca(folder, now)
+    except CertificateError as error:
+        problem = error.what
+    try:
+        found = read_certificate(path)
+    except CertificateError:
+        return Shown(identity, str(path), now, now, (), "", problem)
+    hosts = tuple(host for host in hosts_of(found) if host != identity)
+    begins, ends = found.not_valid_before_utc, found.not_valid_after_utc
+    return Shown(identity or common_name(found), str(path), begins, ends, hosts, fingerprint(found), problem)
+
+
+def fingerprint(certificate: x509.Certificate) -> str:
+    """Return the fingerprint of a certificate, in hex."""
+    return certificate.fingerprint(hashes.SHA256()).hex()
+
+
+def identities_on(deployment: Deployment, host: str | None) -> list[str]:
+    """Return a run's identities on a host, in the order of `identities_of`; None: those on no host."""
+    where = places(deployment)
+    known = {VHUB: where.get(VHUB)}
+    known |= {names_of.node(name): where.get(name) for name in deployment.nodes}
+    known |= {names_of.client(name): where.get(name) for name in deployment.players}
+    known |= {names_of.process(name): where.get(its.roles[0]) for name, its in joint_processes(deployment).items()}
+    return [who for who in names_of.identities_of(deployment) if known.get(who) == host]
+
+
+def files_for(deployment: Deployment, host: str, folder: Path) -> dict[str, bytes]:
+    """Return the files of a folder that a host needs, by name: the root, and each key before its certificate.
+
+    Raises CertificateError for one that would be refused.
+    """
+    contents = {CA_FILE: (folder / CA_FILE).read_bytes()}
+    for who in identities_on(deployment, host):
+        load_credentials(folder, who)
+        for path in (key_path(folder, who), certificate_path(folder, who)):
+            contents[path.name] = path.read_bytes()
+    return contents
 
 
 # --- inside ----------------------------------------------------------------------------------------------------------
@@ -214,48 +243,19 @@ def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateK
     return root, key
 
 
-def _leaf(
-    identity: str,
+def _signed(
+    name: str,
     key: ec.EllipticCurvePublicKey,
-    names: Sequence[x509.GeneralName],
     days: int,
-    root: x509.Certificate,
-    root_key: ec.EllipticCurvePrivateKey,
-) -> x509.Certificate:
-    sides = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
-    return (
-        _builder(_subject(identity), root.subject, key, days)
-        .add_extension(x509.SubjectAlternativeName(names), critical=False)
-        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-        .add_extension(_usage(is_ca=False), critical=True)
-        .add_extension(x509.ExtendedKeyUsage(sides), critical=False)
-        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
-        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(root_key.public_key()), critical=False)
-        .sign(root_key, hashes.SHA256())
-    )
-
-
-def _builder(
-    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePublicKey, days: int
-) -> x509.CertificateBuilder:
-    now = wall_clock.now_utc()
-    return (
-        x509.CertificateBuilder()
-        .subject_name(subject)
-        .issuer_name(issuer)
-        .public_key(key)
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - SLACK)
-        .not_valid_after(now - SLACK + timedelta(days=days))
-    )
-
-
-def _subject(name: str) -> x509.Name:
-    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-
-
-def _usage(is_ca: bool) -> x509.KeyUsage:
-    return x509.KeyUsage(
+    authority: tuple[x509.Certificate | None, ec.EllipticCurvePrivateKey],
+    hosts: Sequence[x509.GeneralName] = (),
+) -> bytes:
+    """Return a certificate in PEM, signed by a root and its key; without a root it is one itself."""
+    root, root_key = authority
+    is_ca = root is None
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+    begins = wall_clock.now_utc() - SLACK
+    usage = x509.KeyUsage(
         digital_signature=not is_ca,
         content_commitment=False,
         key_encipherment=False,
@@ -266,11 +266,24 @@ def _usage(is_ca: bool) -> x509.KeyUsage:
         encipher_only=False,
         decipher_only=False,
     )
-
-
-def _alternatives(hosts: Sequence[str]) -> list[x509.GeneralName]:
-    """Return the hosts as in a certificate, those of this machine first. Raises BadValue."""
-    return [_alternative(host) for host in dict.fromkeys([*LOCAL_HOSTS, *_own_names(), *hosts])]
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject if root is None else root.subject)
+        .public_key(key)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(begins)
+        .not_valid_after(begins + timedelta(days=days))
+        .add_extension(x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None), critical=True)
+        .add_extension(usage, critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
+    )
+    if not is_ca:
+        issuer = x509.AuthorityKeyIdentifier.from_issuer_public_key(root_key.public_key())
+        sides = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH])
+        for extension in (x509.SubjectAlternativeName(hosts), sides, issuer):
+            builder = builder.add_extension(extension, critical=False)
+    return builder.sign(root_key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
 
 
 def _alternative(host: str) -> x509.GeneralName:
@@ -278,33 +291,9 @@ def _alternative(host: str) -> x509.GeneralName:
         return x509.IPAddress(ip_address(host))
     except ValueError:
         pass
-    labels = host.split(".")
-    if not host.isascii() or len(host) > HOST_LENGTH_MAX or not all(_is_label(label) for label in labels):
+    if not HOST_NAME.fullmatch(host):
         raise BadValue("not a host name or an IP address", host)
     return x509.DNSName(host)
-
-
-def _is_label(label: str) -> bool:
-    return 0 < len(label) <= 63 and label.replace("-", "a").isalnum() and label[0] != "-" and label[-1] != "-"
-
-
-def _own_names() -> list[str]:
-    """Return this machine's name where others could use it."""
-    name = socket.gethostname().lower()
-    return [name] if name.isascii() and all(map(_is_label, name.split("."))) else []
-
-
-def _checked_days(days: int) -> int:
-    if not 1 <= days <= LEAF_DAYS_MAX:
-        raise BadValue(f"days of a certificate are from 1 to {LEAF_DAYS_MAX}", days)
-    return days
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:
-        raise CertificateError(f"{folder}: cannot be made, {error.strerror}") from None
 
 
 def _refuse_existing(*paths: Path) -> None:
@@ -331,18 +320,3 @@ def _key_bytes(key: ec.EllipticCurvePrivateKey) -> bytes:
     return key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
-
-
-def _problem(check: Callable[[], object]) -> str:
-    try:
-        check()
-    except CertificateError as error:
-        return error.what
-    return ""
-
-
-def _shown(identity: str, path: Path, found: x509.Certificate, problem: str) -> Shown:
-    fingerprint = found.fingerprint(hashes.SHA256()).hex()
-    begins, ends = found.not_valid_before_utc, found.not_valid_after_utc
-    hosts = tuple(host for host in hosts_of(found) if host != identity)
-    return Shown(identity or common_name(found), str(path), begins, ends, hosts, fingerprint, problem)
