@@ -130,6 +130,6 @@ def show(folder: Folder, json: JsonOption = False) -> None:
 def _line(its: Shown) -> str:
     if its.problem:
         return f"{its.identity:24} {its.problem}"
-    days = its.days_left(wall_clock.now_utc())
+    days = (its.ends - wall_clock.now_utc()).total_seconds() / 86_400
     hosts = ", ".join(its.hosts) or "issues certificates"
     return f"{its.identity:24} until {its.ends:%Y-%m-%d} ({days:.0f} days), {hosts}"

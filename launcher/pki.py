@@ -71,9 +71,6 @@ class Shown:
     fingerprint: str
     problem: str
 
-    def days_left(self, now: datetime) -> float:
-        return (self.ends - now) / timedelta(days=1)
-
 
 def provide(
     folder: Path,
