@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import subprocess
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
 from foosim.common.errors import Failed
 from foosim.deployment.schema import places
-from foosim.launcher.console_child import Page
 from foosim.launcher.display import Display
 from foosim.launcher.hosts.prepare import check_free
 from foosim.launcher.new_capture import check_capture, check_rooms, check_texts, default_capture
@@ -46,7 +45,7 @@ def begin(
     run: str | None,
     detached: bool,
     display: Display,
-    page: Page | None,
+    page: Sequence[str] | None,
 ) -> Up | Outcome:
     """Return a new run that the caller runs, or start it detached. Raises Refused.
 
@@ -65,7 +64,7 @@ def begin(
     return Up(plan, path, display, run, console=page)
 
 
-def go_on(folder: RunFolder, display: Display, page: Page | None) -> Up | Outcome:
+def go_on(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
     """Return a run to be resumed, or the outcome of one that has ended. Raises Refused."""
     if folder.result() is not None:
         _prepare((), None, display)

@@ -12,10 +12,6 @@ from foosim.deployment.schema import Capture
 from foosim.runtime.disk import Level, Room, room_on_disk
 
 
-class CaptureExists(Refused):
-    """A capture is never overwritten."""
-
-
 def default_capture(world: str, stamp: str) -> Path:
     """Return the default path of a run's capture; `stamp` is the time in its name."""
     stem = f"{world}-{stamp}"
@@ -40,7 +36,7 @@ def check_capture(path: Path, *, is_split: bool = False) -> Path:
     """
     try:
         for found in parts_at(path).values() if is_split or path.exists() else ():
-            raise CaptureExists(f"{found} exists, and a capture is never overwritten")
+            raise Refused(f"{found} exists, and a capture is never overwritten")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             return path

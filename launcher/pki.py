@@ -55,10 +55,6 @@ LABEL: Final = "[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?"
 HOST_NAME: Final = re.compile(rf"(?=.{{1,253}}$){LABEL}(\.{LABEL})*", re.IGNORECASE | re.ASCII)
 
 
-class FileExists(Refused):
-    """A certificate or key that is there already and is not overwritten."""
-
-
 @dataclass(frozen=True, slots=True)
 class Shown:
     """One certificate, for people and scripts. `problem` is empty when its holder would be let in."""
@@ -109,7 +105,7 @@ def _is_due(folder: Path, identity: str, ca: x509.Certificate, hosts: Sequence[s
 
 
 def init(folder: Path) -> Path:
-    """Make the folder with a root, and return the root's path. Raises FileExists."""
+    """Make the folder with a root, and return the root's path. Raises Refused."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
@@ -296,15 +292,13 @@ def _alternative(host: str) -> x509.GeneralName:
 def _refuse_existing(*paths: Path) -> None:
     existing = [str(path) for path in paths if path.exists()]
     if existing:
-        raise FileExists(f"exists already, and is not overwritten: {', '.join(existing)}")
+        raise Refused(f"exists already, and is not overwritten: {', '.join(existing)}")
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a new file that only its owner reads. Raises FileExists, CertificateError."""
+    """Write a new file that only its owner reads. Raises CertificateError."""
     try:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except FileExistsError:
-        raise FileExists(f"exists already, and is not overwritten: {path}") from None
     except OSError as error:
         raise CertificateError(f"{path}: cannot be made, {error.strerror}") from None
     with os.fdopen(file, "wb") as stream:

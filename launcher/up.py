@@ -24,7 +24,7 @@ from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch,
 from foosim.launcher.children.processes import Child, Launcher, counted_signals
 from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands
-from foosim.launcher.console_child import ConsoleChild, Page
+from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
 from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
 from foosim.launcher.hosts.ssh import remotes as remotes_of
@@ -68,11 +68,11 @@ class Up:
         display: Display,
         run: str | None = None,
         resumed: RunFolder | None = None,
-        console: Page | None = None,
+        console: Sequence[str] | None = None,
     ) -> None:
         """`capture` is the path of its capture; None captures nothing. `run` names it, `resumed` is the run to resume.
 
-        `console` is the page that is served with the run.
+        `console` has the options of the page that is served with the run.
         """
         self.plan = plan
         self.capture = capture

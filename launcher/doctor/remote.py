@@ -88,7 +88,12 @@ def examine_all(case: Case, name: str, text: str, limit_s: float = LIMIT_S) -> l
     is_placed = is_well(finding for finding in found if finding.subject == PLACEMENT)
     can_be_tried = bool(address.port) and not address.is_wildcard and is_placed
     reach = str(address) if can_be_tried else ""
-    question = Question("", name, text, case.listen, case.insecure, _root(case), reach, "")
+    root = ""
+    if case.pki is not None:
+        root = "unknown"
+        with suppress(CertificateError):
+            root = fingerprint(read_ca(case.pki, wall_clock.now_utc()))
+    question = Question("", name, text, case.listen, case.insecure, root, reach, "")
 
     def ask_one(remote: Remote) -> list[Finding]:
         radio = str(case.radio) if reach and remote.name == places(case.deployment).get(VHUB) else ""
@@ -98,16 +103,6 @@ def examine_all(case: Case, name: str, text: str, limit_s: float = LIMIT_S) -> l
     listener = listening(address) if can_be_tried else nullcontext()
     with listener, ThreadPoolExecutor(min(len(hosts), HOSTS_AT_ONCE)) as pool:
         return [*found, *(finding for findings in pool.map(ask_one, hosts) for finding in findings)]
-
-
-def _root(case: Case) -> str:
-    """Return the fingerprint of the run's root; empty for a run without, `unknown` for one that cannot be read."""
-    if case.pki is None:
-        return ""
-    try:
-        return fingerprint(read_ca(case.pki, wall_clock.now_utc()))
-    except CertificateError:
-        return "unknown"
 
 
 # --- asking ----------------------------------------------------------------------------------------------------------
@@ -247,16 +242,12 @@ def serve(given: IO[bytes], told: IO[bytes]) -> None:
         question = msgspec.json.decode(line, type=Question)
     except msgspec.DecodeError as error:
         raise Malformed(f"not a question: {error}") from None
-    findings = examine(case_of(question))
+    deployment = load_deployment(question.text, question.name)
+    pki = deployment.hosts[question.host].pki
+    folder = Path(pki) if pki is not None and question.ca else None  # its own, if the run has any
+    host, ca, reach = question.host, question.ca, question.reach
+    case = Case(deployment, question.listen, question.insecure, folder, host=host, ca=ca, reach=reach)
+    findings = examine(case)
     with listening(parse_address(question.radio)) if question.radio else nullcontext():
         _say(told, msgspec.json.encode(Answer(library_fingerprint().hex(), findings)))
         given.readline(LINE_BYTES_MAX)
-
-
-def case_of(question: Question) -> Case:
-    """Return the case for this host, with its own folder of certificates, if the run has any."""
-    deployment = load_deployment(question.text, question.name)
-    pki = deployment.hosts[question.host].pki
-    folder = Path(pki) if pki is not None and question.ca else None
-    host, ca, reach = question.host, question.ca, question.reach
-    return Case(deployment, question.listen, question.insecure, folder, host=host, ca=ca, reach=reach)

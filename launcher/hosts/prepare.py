@@ -37,34 +37,26 @@ REMEDIES: Final = {
 }
 
 
-class OutOfReach(Refused):
-    """Processes are to run on other machines, and the supervisor does not listen where those reach it."""
-
-
-class NoFolder(Refused):
-    """A process on another machine needs certificates, and their folder there is not known."""
-
-
 def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, Remote]) -> None:
-    """Raise OutOfReach when a process on another machine could not connect to where the supervisor listens.
+    """Raise Refused when a process on another machine could not connect to where the supervisor listens.
 
-    Raises NoFolder when it would have no certificate to do so.
+    Also when it would have no certificate to do so.
     """
     for name, remote in remotes.items():
         there = f"{name} on host {remote.name} ({remote.host.address})"
         if address.is_loopback and not parse_address(remote.host.address).is_loopback:
-            raise OutOfReach(
+            raise Refused(
                 f"{there} cannot connect to {address}; give --listen HOST[:PORT], or `listen:` in the deployment, "
                 "with an address of this machine that it reaches"
             )
         if address.protocol == "tls" and remote.host.pki is None:
-            raise NoFolder(
+            raise Refused(
                 f"{there} has no certificate: set hosts.{remote.name}.pki to their folder on it; "
                 "`foosim pki init DIR FILE --send` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:
-            raise OutOfReach(f"{there} is a unit of systemd and needs a fixed port; give --listen HOST:PORT")
+            raise Refused(f"{there} is a unit of systemd and needs a fixed port; give --listen HOST:PORT")
 
 
 def send_files(remote: Remote, contents: Mapping[str, bytes]) -> list[str]:

@@ -72,9 +72,9 @@ class Remote:
         return self.ssh(guard)
 
     def unit_started(self, name: str) -> list[str]:
-        """Return the command line that starts a node's unit: the system's for root, else the user's own."""
+        """Return the command line that starts a node's unit (deploy/systemd): root's is the system's."""
         script = f'if [ "$(id -u)" = 0 ]; then user=; else user=--user; {OWN_BUS}; fi'
-        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start {unit_name(name)}"])
+        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start foosim-node@{name}.service"])
 
     def why(self, code: int, lines: Sequence[str]) -> str:
         """Return why ssh, or its command, ended with this code; `lines` are the last ones of its log."""
@@ -101,11 +101,6 @@ class Remote:
     def is_away(code: int, lines: Sequence[str]) -> bool:
         """Whether it was the network: the machine may come back by itself."""
         return code == SSH_FAILED and any(said in line for line in lines for said in _AWAY)
-
-
-def unit_name(node: str) -> str:
-    """Return the name of the unit of systemd that runs a node, by its template in deploy/systemd."""
-    return f"foosim-node@{node}.service"
 
 
 def remotes(deployment: Deployment) -> dict[str, Remote]:

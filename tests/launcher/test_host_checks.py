@@ -10,7 +10,7 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher import pki as certificates
-from foosim.launcher.hosts.prepare import NoFolder, OutOfReach, check_hosts
+from foosim.launcher.hosts.prepare import check_hosts
 from foosim.launcher.hosts.ssh import remotes
 from foosim.launcher.pki import files_for
 from foosim.launcher.plan import check_certificates, make_plan
@@ -55,7 +55,7 @@ def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
     check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
     assert check_certificates(plan) == []
     plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts[:2]), pki=folder))
-    with pytest.raises(NoFolder, match=r"red on host right .* set hosts.right.pki .* `foosim pki init DIR FILE"):
+    with pytest.raises(Refused, match=r"red on host right .* set hosts.right.pki .* `foosim pki init DIR FILE"):
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
 
@@ -69,7 +69,7 @@ def test_hosts_have_to_reach_the_supervisor() -> None:
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
     check("192.168.10.1")
-    with pytest.raises(OutOfReach, match=r"blue on host left \(192.168.10.2\) cannot connect to tcp/127.0.0.1:7400"):
+    with pytest.raises(Refused, match=r"blue on host left \(192.168.10.2\) cannot connect to tcp/127.0.0.1:7400"):
         check("127.0.0.1:7400")
-    with pytest.raises(OutOfReach, match="needs a fixed port"):
+    with pytest.raises(Refused, match="needs a fixed port"):
         check("192.168.10.1", "nodes.blue.launch=systemd")

@@ -17,7 +17,7 @@ from foosim.client import control
 from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
 from foosim.launcher.children.processes import Child
 from foosim.launcher.children.restarts import WAITS_S
-from foosim.launcher.console_child import ADDRESSES, Page
+from foosim.launcher.console_child import ADDRESSES
 from foosim.launcher.display import Display
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
@@ -164,7 +164,7 @@ def test_without_a_terminal_the_address_of_the_page_comes_before_the_run(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
     display = Display(said)
-    console = Up(make_plan(RunOptions(TABLE, processes="each")), None, display, "run", console=Page())._console
+    console = Up(make_plan(RunOptions(TABLE, processes="each")), None, display, "run", console=[])._console
     console._launcher.start("console", ["sleep", "100"], tmp_path / "log")
     with display, console:
         display.say("run run")
