@@ -21,7 +21,7 @@ from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
 from foosim.launcher.children.child_time import ChildTimes, observe
 from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
-from foosim.launcher.children.processes import Child, Launcher, counted_signals
+from foosim.launcher.children.processes import Child, Launcher
 from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands
 from foosim.launcher.console_child import ConsoleChild
@@ -33,6 +33,7 @@ from foosim.launcher.plan import Plan
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.early_signals import handling
 from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.open_plane_warning import Exposure
@@ -122,7 +123,7 @@ class Up:
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended."""
-        with counted_signals(self._count), self.display, self._console:  # its pages show the end of the run
+        with handling(self._count), self.display, self._console:  # its pages show the end of the run
             try:
                 is_started = self._start()
                 if is_started:
@@ -554,6 +555,6 @@ class Up:
         lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 
-    def _count(self) -> None:
-        """Take note of a Ctrl-C."""
+    def _count(self, number: int, frame: object) -> None:
+        """Take note of a Ctrl-C, SIGTERM or SIGHUP."""
         self._interrupts += 1

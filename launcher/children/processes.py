@@ -13,8 +13,8 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -205,19 +205,3 @@ class Launcher:
                 os.killpg(child.process.pid, number)
             except ProcessLookupError:
                 continue
-
-
-@contextmanager
-def counted_signals(count: Callable[[], None]) -> Iterator[None]:
-    """Call `count` at each Ctrl-C, SIGTERM or SIGHUP instead of ending."""
-
-    def take(number: int, frame: object) -> None:
-        count()
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, take) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -91,11 +91,6 @@ class Case:
         address, place = self.address.next_port(), places(self.deployment).get(VHUB)
         return address if place is None else replace(address, host=self.deployment.hosts[place].address)
 
-    @property
-    def has_vhub(self) -> bool:
-        """Whether the vHub is to run on this machine."""
-        return places(self.deployment).get(VHUB) == self.host
-
     def provide(self, more: str = "") -> str:
         """Return the command that issues missing certificates, and sends them to a host."""
         return f"foosim pki init DIR FILE{more} --send" if self.is_there else f"foosim pki init {self.pki} FILE{more}"
@@ -204,8 +199,7 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
     if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
         remedy = case.provide(f" --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
-    soon = credentials.ends_soon(wall_clock.now_utc())
-    if soon:
+    if soon := credentials.ends_soon(wall_clock.now_utc()):
         return who, "warning", soon, case.provide()
     return who, "fine", f"until {credentials.until:%Y-%m-%d}", ""
 
@@ -217,7 +211,7 @@ def _ports(case: Case) -> Iterator[_Said]:
     """Whether the processes that listen on this machine can use their addresses."""
     if not case.is_there:
         yield _port("simulation plane", case.address)
-    if case.has_vhub:
+    if places(case.deployment).get(VHUB) == case.host:
         yield _port("radio plane", case.radio)
 
 
@@ -232,13 +226,11 @@ def _network(case: Case) -> Iterator[_Said]:
     """Whether processes on this host would reach the supervisor."""
     if not case.reach:
         return
-    address = parse_address(case.reach)
-    why = why_not_reached(address)
-    if why:
+    if why := why_not_reached(parse_address(case.reach)):
         remedy = "let the firewalls between pass this port, or listen at an address that this host reaches (--listen)"
-        yield "supervisor", "problem", f"{address} is not reached: {why}", remedy
+        yield "supervisor", "problem", f"{case.reach} is not reached: {why}", remedy
     else:
-        yield "supervisor", "fine", f"{address} is reached", ""
+        yield "supervisor", "fine", f"{case.reach} is reached", ""
 
 
 def _placement(case: Case) -> Iterator[_Said]:

@@ -177,8 +177,8 @@ def check_free(addresses: Iterable[Address]) -> None:
     for address in addresses:
         why, remedy = why_not_free(address)
         if why:
-            what = f"cannot listen on {address}: {why}"
-            raise Failed(f"{what}; {remedy} (--listen HOST:PORT, or `listen:` in the deployment)")
+            how = f"{remedy} (--listen HOST:PORT, or `listen:` in the deployment)"
+            raise Failed(f"cannot listen on {address}: {why}; {how}")
 
 
 @contextmanager
