@@ -82,11 +82,12 @@ def provide(
     """
     made: list[Path] = [] if (folder / CA_FILE).exists() else [init(folder)]
     ca, there = read_ca(folder, wall_clock.now_utc()), identities_in(folder)
-    for reached, who_has in ((hosts, LISTENERS), ((), set(identities) - LISTENERS)):
-        wanted = [who for who in identities if who in who_has]
-        made += issue(folder, [who for who in wanted if who not in there], reached, days)
-        due = [who for who in wanted if who in there and _is_due(folder, who, ca, reached, within_days)]
-        made += renew(folder, due, reached)
+    for who in identities:
+        reached = hosts if who in LISTENERS else ()
+        if who not in there:
+            made += issue(folder, [who], reached, days)
+        elif _is_due(folder, who, ca, reached, within_days):
+            made.append(renew(folder, who, reached))
     return made
 
 
@@ -130,8 +131,6 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
     for identity in identities:
         names_of.parse_identity(identity)
     _refuse_existing(*(path(folder, identity) for identity in identities for path in (certificate_path, key_path)))
-    if not identities:
-        return []
     authority = _authority(folder)
     for identity in identities:
         key = ec.generate_private_key(ec.SECP256R1())
@@ -141,29 +140,23 @@ def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), da
     return [certificate_path(folder, identity) for identity in identities]
 
 
-def renew(folder: Path, identities: Sequence[str], hosts: Sequence[str] = ()) -> list[Path]:
-    """Issue certificates anew, for the same keys, names and lengths of time; `hosts` are added to the names.
+def renew(folder: Path, identity: str, hosts: Sequence[str] = ()) -> Path:
+    """Issue a certificate anew, for the same key, names and length of time; `hosts` are added to the names.
 
     A process takes the new one when it is started again. Raises CertificateError, BadValue.
     """
-    further = [_alternative(host) for host in hosts]
-    if not identities:
-        return []
-    authority = _authority(folder)
-    made = []
-    for identity in identities:
-        path = certificate_path(folder, identity)
-        old = read_certificate(path)
-        check_key(key_path(folder, identity), old)
-        days = max(1, (old.not_valid_after_utc - old.not_valid_before_utc).days)
-        key = old.public_key()
-        assert isinstance(key, ec.EllipticCurvePublicKey), "issued here"
-        alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-        fresh = path.with_name(f"{path.name}.new")
-        fresh.unlink(missing_ok=True)
-        _write(fresh, _signed(identity, key, days, authority, list(dict.fromkeys([*alternatives, *further]))))
-        made.append(fresh.replace(path))
-    return made
+    path = certificate_path(folder, identity)
+    old = read_certificate(path)
+    check_key(key_path(folder, identity), old)
+    days = max(1, (old.not_valid_after_utc - old.not_valid_before_utc).days)
+    key = old.public_key()
+    assert isinstance(key, ec.EllipticCurvePublicKey), "issued here"
+    alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    names = list(dict.fromkeys([*alternatives, *map(_alternative, hosts)]))
+    fresh = path.with_name(f"{path.name}.new")
+    fresh.unlink(missing_ok=True)
+    _write(fresh, _signed(identity, key, days, _authority(folder), names))
+    return fresh.replace(path)
 
 
 def show_folder(folder: Path) -> list[Shown]:

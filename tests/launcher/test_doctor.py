@@ -126,7 +126,7 @@ def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, fol
     finding = found(case, "vhub")
     assert finding.state == "problem" and finding.remedy.endswith(f"foosim pki init {folder} FILE --host 127.0.0.9")
     assert found(case, "node.red").state == "fine", "who only connects listens nowhere"
-    certificates.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
+    certificates.renew(folder, "vhub", hosts=["127.0.0.9"])
     assert found(case, "vhub").state == "fine"
 
 
