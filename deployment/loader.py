@@ -21,10 +21,10 @@ from pydantic import ValidationError
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
-from foosim.deployment.checks import DEPLOYMENT_KEYS, check_references
+from foosim.deployment.checks import DEPLOYMENT_KEYS, Names, check_references
 from foosim.deployment.components import read_components
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network_checks import check_network, check_network_alone
+from foosim.deployment.network_checks import check_network, check_phase
 from foosim.deployment.overrides import place_sets
 from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
@@ -177,17 +177,17 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
     if not isinstance(tree, Fields) or set(tree.values) != {"network"}:
         return None
     tree, set_problems = place_sets(tree, sets)
-    data = plain(tree)
-    findings = list(islice(check_network_alone(data), PROBLEMS_MAX + 1))
-    network = None
+    data, network = plain(tree)["network"], None
+    findings: Iterator[Finding] = iter(())
     try:
-        network = Network.model_validate(data["network"])
+        network = Network.model_validate(data)
     except ValidationError as error:
-        findings += islice(schema_findings(error, ("network",)), PROBLEMS_MAX + 1)
-    if network is not None and not findings:
-        findings += islice(rule_findings(network, (), {}), PROBLEMS_MAX + 1)
+        findings = schema_findings(error, ("network",))
+    else:
+        of_itself = list(islice(check_network(network, Names(()), data.get("radios") or {}), PROBLEMS_MAX + 1))
+        findings = iter(of_itself) if of_itself else rule_findings(network, (), {})
     places = Places(tree, tree, {})
-    found = [*problems, *set_problems, *map(places.problem, findings)]
+    found = [*problems, *set_problems, *map(places.problem, islice(findings, PROBLEMS_MAX + 1))]
     if found or network is None:
         raise DeploymentError(_report(found))
     return network
@@ -272,25 +272,29 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
 
 
 def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, list[Problem]]:
-    """The deployment that a tree is, and the problems of what is in it. Raises TooManyComparisons."""
+    """The deployment that a tree is, and the problems of what is in it: those of fields by themselves, else between
+    fields, else of the world that they make. Raises TooManyComparisons."""
     assert expanded.tree is not None, "it can be examined"
     data = plain_shared(expanded.tree)
 
     def first(*findings: Iterable[Finding]) -> list[Finding]:
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))
 
-    between = first(check_references(data), check_network(data))
-    deployment, of_components, error = _validated(data)
-    of_schema = first(of_components, () if error is None else schema_findings(error))
-    within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
-    if deployment is not None and not between and not within:
-        rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
+    deployment, of_fields = _validated(data)
+    within = [*first(of_fields), *first(_unused_findings(data, expanded))]
+    if deployment is None or within:
+        return deployment, [*map(places.problem, within)]
+    network, ends = deployment.network, Names(deployment.endpoints())
+    of_network = check_network(network, ends, (data.get("network") or {}).get("radios") or {})
+    between = first(check_references(deployment, ends), of_network, check_phase(network, deployment.tick_ns))
+    within = first(check_timing(deployment, ends))
+    if not between and not within:
         for part in () if deployment.lacks_files else _state_findings(deployment):
             between = between or first(part)
-        findings = findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment)
-        between = between or first(*findings)
-    made = [places.problem(finding, is_made=True) for finding in between]
-    return deployment, [*made, *map(places.problem, within)]
+        rules = rule_findings(network, ends.endpoints, deployment.carriers())
+        whole = findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment)
+        between = between or first(*whole)
+    return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
 
 
 def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
@@ -343,14 +347,14 @@ def _start_findings(deployment: Deployment) -> Iterator[Finding]:
         yield from overlap_findings(deployment)
 
 
-def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:
-    """The deployment that plain data is, or what the components of its robots and what the schema refuse."""
+def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
+    """The deployment that plain data is, and what the components of its robots and what the schema refuse."""
     data, findings = read_components(data, DEPLOYMENT_KEYS)
     try:
         deployment = Deployment.model_validate(data)
     except ValidationError as error:
-        return None, findings, error
-    return (None if findings else deployment), findings, None
+        return None, chain(findings, schema_findings(error))
+    return (None if findings else deployment), iter(findings)
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
@@ -359,13 +363,8 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
         section = next((of for key, of in SECTION_OF_KEY.items() if key in whole.values), None)
         if section is None:
             continue
-        alone = {**data, section: {name: plain(whole)}}
-        timing = (finding for finding in check_timing(alone) if finding.location[-1] in ("rate", "offset"))
-        _, of_components, error = _validated(alone)
-        details = () if error is None else error.errors(include_url=False, include_context=False)
-        is_wrong = any(each["loc"][:2] == (section, name) and each["type"] != "missing" for each in details)
-        of_schema = schema_findings(error) if error is not None and is_wrong else ()
-        for finding in chain(of_components, of_schema, timing):
+        _, findings = _validated({**data, section: {name: plain(whole)}})
+        for finding in findings:
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-from foosim.common.errors import BadValue, show
-from foosim.common.names import nearest_name
+from foosim.common.errors import BadValue
+from foosim.common.names import nearest_quoted
 from foosim.deployment.schema import SUPERVISOR, VHUB, Deployment, places
 
 Shape = Literal["deployed", "one", "each"]
@@ -40,8 +40,7 @@ def parse_shape(text: str) -> Shape:
         if shape == text:
             found: Shape = shape
             return found
-    nearest = nearest_name(text, SHAPES)
-    raise BadValue(f"not one of {', '.join(SHAPES)}", text, None if nearest is None else show(nearest))
+    raise BadValue(f"not one of {', '.join(SHAPES)}", text, nearest_quoted(text, SHAPES))
 
 
 def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str, Process]:

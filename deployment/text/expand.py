@@ -18,7 +18,7 @@ from typing import Final
 from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.finding import Location
-from foosim.common.names import nearest_name
+from foosim.common.names import nearest_quoted
 from foosim.deployment.text.each import EACH, BadSign, Each, Filling, put
 from foosim.deployment.text.fleets import Fleet, fleet_and_number, member, members, read_fleets
 from foosim.deployment.text.includes import INCLUDE
@@ -264,9 +264,8 @@ class Expansion:
             self._report.stop()
         if not chosen and place not in self._unmatched:  # by another entry of a template
             self._unmatched.add(place)
-            nearest = nearest_name(text, self._population.names)
-            what = "a selector that matches no robot"
-            self._report.add(place, path, what, text, None if nearest is None else repr(nearest))
+            nearest = nearest_quoted(text, self._population.names)
+            self._report.add(place, path, "a selector that matches no robot", text, nearest)
         return chosen
 
     # --- entries for each robot ---------------------------------------------------------------------------------------

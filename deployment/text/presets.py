@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from foosim.common.errors import BadValue
-from foosim.common.names import nearest_name
+from foosim.common.names import nearest_quoted
 from foosim.deployment.text.report import Report
 from foosim.deployment.text.templates import merged, without
 from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Tree, plain
@@ -32,8 +32,8 @@ def with_preset(name: str, section: Tree, report: Report) -> Tree:
     value = section.values[PRESET]
     chosen = plain(value)
     if not isinstance(chosen, str) or chosen not in kit.presets:
-        nearest = nearest_name(chosen, kit.presets) if isinstance(chosen, str) else None
-        bad = BadValue(f"unknown preset, valid are {', '.join(kit.presets)}", chosen, nearest and repr(nearest))
+        nearest = nearest_quoted(chosen, kit.presets) if isinstance(chosen, str) else None
+        bad = BadValue(f"unknown preset, valid are {', '.join(kit.presets)}", chosen, nearest)
         report.add_value(value.place, (name, PRESET), bad)
         chosen = next(iter(kit.presets))
     return merged(_tree(kit.presets[chosen], value.place), without(section, PRESET))

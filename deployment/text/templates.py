@@ -12,7 +12,7 @@ from typing import Final
 
 from foosim.common import limits
 from foosim.common.finding import Location
-from foosim.common.names import NAME_RULE, is_name, nearest_name
+from foosim.common.names import NAME_RULE, is_name, nearest_quoted
 from foosim.deployment.text.report import Report
 from foosim.deployment.text.yaml import Fields, Leaf, Place, Tree, plain
 
@@ -119,7 +119,7 @@ class Templates:
         elif name in self._refused:
             return None
         elif name not in self._written:
-            what, nearest = "unknown template", nearest_name(name, self._written)
+            what, nearest = "unknown template", nearest_quoted(name, self._written)
         elif name in chain:
             what = f"a template that is like itself ({' is like '.join([*chain[chain.index(name) :], name])})"
         elif len(chain) >= limits.LIKE_DEPTH_MAX:
@@ -128,7 +128,7 @@ class Templates:
             return self.whole(name, chain)
         if like.place not in self._reported:  # by another entry of a fleet
             self._reported.add(like.place)
-            self._report.add(like.place, path, what, name, None if nearest is None else repr(nearest))
+            self._report.add(like.place, path, what, name, nearest)
         return None
 
     def _use(self, like: Tree, section: str) -> None:
