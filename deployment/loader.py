@@ -102,7 +102,7 @@ def apply_sets(text: Text, name: str, sets: Sequence[str]) -> str:
     travels in the handshake and is attached to the capture. Loading it gives the changed deployment, and its own
     canonical text is itself.
     """
-    return _applied(text, name, (), tuple(sets))
+    return _applied(text, name, tuple(sets))
 
 
 def with_owners(text: Text, name: str, owners: Mapping[str, Sequence[str]], sets: Sequence[str] = ()) -> str:
@@ -110,22 +110,43 @@ def with_owners(text: Text, name: str, owners: Mapping[str, Sequence[str]], sets
 
     What runs where its robot's node is (`$node`) runs anywhere: the nodes have other names. Raises DeploymentError.
     """
-    return _applied(text, name, tuple((node, tuple(robots)) for node, robots in owners.items()), tuple(sets))
+    return _applied(text, name, tuple(sets), tuple((node, tuple(robots)) for node, robots in owners.items()))
+
+
+def with_network(text: Text, name: str, other: tuple[Text, str] | None, sets: Sequence[str]) -> str:
+    """The canonical text of the deployment in `text` with another network, and after settings.
+
+    `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
+    Raises DeploymentError with all problems, each in its file.
+    """
+    return _applied(text, name, tuple(sets), network=other)
 
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
-def _applied(text: Text, name: str, owners: tuple[tuple[str, tuple[str, ...]], ...], sets: tuple[str, ...]) -> str:
-    """The result of `apply_sets` and `with_owners`, cached for repeated rehearsals."""
+def _applied(
+    text: Text,
+    name: str,
+    sets: tuple[str, ...],
+    owners: tuple[tuple[str, tuple[str, ...]], ...] = (),
+    network: tuple[Text, str] | None = None,
+) -> str:
+    """The result of `apply_sets`, `with_owners` and `with_network`, cached for repeated rehearsals."""
     tree, problems = read_source(text, name)
     if owners and isinstance(tree, Fields):
         without_places_by_node(tree)
         place = tree.keys.get("nodes", tree.place)
         nodes: dict[str, Tree] = {node: _listed(robots, place) for node, robots in owners}
         tree.values["nodes"], tree.keys["nodes"] = Fields(place, nodes, dict.fromkeys(nodes, place)), place
+    if network is not None and isinstance(tree, Fields):
+        there, there_problems = read_source(*network)
+        problems = [*problems, *there_problems]
+        if isinstance(there, Fields) and "network" in there.values:
+            tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
+        elif there is not None:
+            problems.append(Problem(there.place, describe("missing key", "network")))
     tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
-    deployment = _check(tree, problems)
-    _keep(canonical, name, deployment)
+    _keep(canonical, name, _check(tree, problems))
     return canonical
 
 
@@ -231,26 +252,6 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
         assert expanded.tree is not None, "it was loaded"
         places = Places(tree, expanded.tree, {})
         raise DeploymentError(_report([places.problem(finding, is_made=True) for finding in findings]))
-
-
-def with_network(text: Text, name: str, other: tuple[Text, str] | None, sets: Sequence[str]) -> str:
-    """The canonical text of the deployment in `text` with another network, and after settings.
-
-    `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
-    Raises DeploymentError with all problems, each in its file.
-    """
-    tree, problems = read_source(text, name)
-    if other is not None and isinstance(tree, Fields):
-        there, there_problems = read_source(*other)
-        problems = [*problems, *there_problems]
-        if isinstance(there, Fields) and "network" in there.values:
-            tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
-        elif there is not None:
-            problems.append(Problem(there.place, describe("missing key", "network")))
-    tree, problems = _with_sets(tree, problems, sets)
-    canonical = _canonical(tree)
-    _check(tree, problems)
-    return canonical
 
 
 def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
