@@ -22,7 +22,7 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
 from foosim.deployment.checks import DEPLOYMENT_KEYS, Names, check_references
-from foosim.deployment.components import read_components
+from foosim.deployment.components import check_components, read_components
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network_checks import check_network, check_phase
 from foosim.deployment.overrides import place_sets
@@ -214,30 +214,25 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
     return network
 
 
-def check_open_meshes(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse walls without a thickness: meshes that are not closed, of a material of which it is not said how thick.
+def check_complete(text: Text, name: str, deployment: Deployment) -> None:
+    """Refuse what is known of a deployment with its files: walls without a thickness, robots whose files do not give
+    what their components need, and what starts in a mesh.
 
-    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
+    `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
     """
-    findings = []
+    parts = [_open_meshes(deployment), field_findings(deployment)]
+    states = _state_findings(deployment) if deployment.asset_files else ()
+    found = (list(islice(part, PROBLEMS_MAX + 1)) for part in chain(parts, states))
+    refuse_findings(text, name, next(filter(None, found), []))
+
+
+def _open_meshes(deployment: Deployment) -> Iterator[Finding]:
+    """Meshes that are not closed, of a material of which it is not said how thick."""
     for thing in deployment.open_meshes():
         radio = deployment.scenery[thing].radio
         material = "concrete" if radio is None or radio.is_ is None else radio.is_
         what = f"a wall without a thickness: the mesh is not closed, write {{is: {material}, thickness: 10 cm}}"
-        findings.append(Finding(("scenery", thing, "radio"), what, material))
-    refuse_findings(text, name, findings)
-
-
-def check_state_fields(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse robots whose models are made from files, where these do not give what the robots' components need; and
-    what starts in a mesh.
-
-    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
-    """
-    findings = list(islice(field_findings(deployment), PROBLEMS_MAX + 1))
-    for part in _state_findings(deployment) if deployment.asset_files else ():
-        findings = findings or list(islice(part, PROBLEMS_MAX + 1))
-    refuse_findings(text, name, findings)
+        yield Finding(("scenery", thing, "radio"), what, material)
 
 
 def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
@@ -288,13 +283,12 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     network, ends = deployment.network, Names(deployment.endpoints())
     of_network = check_network(network, ends, (data.get("network") or {}).get("radios") or {})
     between = first(check_references(deployment, ends), of_network, check_phase(network, deployment.tick_ns))
-    within = first(check_timing(deployment, ends))
+    within = first(check_timing(deployment, ends)) or first(check_components(deployment))
     if not between and not within:
-        for part in () if deployment.lacks_files else _state_findings(deployment):
-            between = between or first(part)
+        states = () if deployment.lacks_files else _state_findings(deployment)
         rules = rule_findings(network, ends.endpoints, deployment.carriers())
-        whole = findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment)
-        between = between or first(*whole)
+        whole = chain(findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment))
+        between = next(filter(None, map(first, chain(states, [whole]))), [])
     return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
 
 

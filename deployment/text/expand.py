@@ -22,10 +22,9 @@ from foosim.common.names import nearest_quoted
 from foosim.deployment.text.each import EACH, BadSign, Each, Filling, put
 from foosim.deployment.text.fleets import Fleet, fleet_and_number, members, read_fleets
 from foosim.deployment.text.includes import INCLUDE
-from foosim.deployment.text.presets import with_preset
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.selection import Chosen, Population, TooManyComparisons, is_several
-from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, without
+from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, with_preset, without
 from foosim.deployment.text.yaml import DEPTH_MAX, Fields, Items, Leaf, Place, Problem, Tree, measure, plain
 from foosim.world.scenery import SCENERY_MAX
 
