@@ -13,7 +13,7 @@ from contextlib import redirect_stdout
 
 from foosim.client.loading import ClassPathError, load_player
 from foosim.common.finding import Finding
-from foosim.common.plain_data import quoted
+from foosim.common.names import quoted
 from foosim.deployment.schema import Deployment
 
 

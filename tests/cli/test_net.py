@@ -95,14 +95,20 @@ def test_lint_of_a_network_alone_says_what_it_cannot_know(command: Command, tmp_
     done = command("lint", file)
     assert done.code == 0
     assert done.out.startswith("a network section without its deployment: the selectors match no endpoints")
-    network = "  radios:\n    wifi: {preset: wifi_5, loss: 2}\n  links:\n  - {id: x, from: a, via: wif}\n"
-    file.write_text(f"network:\n{network}")
-    done = command("lint", file)
-    assert done.code == 2
-    assert [line.split(": ", 1)[1] for line in done.err.splitlines()] == [
+
+    def problems_of(text: str) -> list[str]:
+        file.write_text(text)
+        done = command("lint", file)
+        assert done.code == 2
+        return [line.split(": ", 1)[1] for line in done.err.splitlines()]
+
+    network = "network:\n  radios:\n    wifi: {preset: wifi_5, loss: 2}\n  links:\n  - {id: x, from: a, via: wif}\n"
+    assert problems_of(network) == [
         "network.radios.wifi.preset: not one of perfect, range_only, acoustic, wifi_2_4_indoor, wifi_5_indoor,"
         " dot11p, lte, lora_eu868, zigbee, wired_1g, internet, 'wifi_5', nearest is 'wifi_5_indoor'",
         "network.radios.wifi.loss: not a probability (a number and one of p, %), 2",
+    ]
+    assert problems_of(network.replace("wifi_5, loss: 2", "wifi_5_indoor")) == [
         "network.links[0]: missing key, 'to'",
         "network.links[0].via: unknown radio, 'wif', nearest is 'wifi'",
     ]

@@ -263,7 +263,7 @@ FAILING: Final = {
     "    def shapes(self): return ()": "    def shapes(self): return (1 // 0,)",
     "    def physics(self): return None": "    def physics(self): return self.nothing",
     "    def findings(self): return iter(())": "    def findings(self): yield from 3",
-    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda data: 1 // 0)",
+    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda section, spec: 1 // 0)",
 }
 """Lines of a kit, and others that raise."""
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.misfit import Misfit
 from foosim.world.components.view import Mounting
@@ -29,7 +28,7 @@ def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -
     for place, name in enumerate(named):
         if name not in names:
             what = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-            raise Misfit((setting, place), what, name, quoted(nearest_name(name, names)))
+            raise Misfit((setting, place), what, name, nearest_quoted(name, names))
         if name in named[:place]:
             raise Misfit((setting, place), "named twice", name)
     return tuple([names.index(name) for name in named])
@@ -133,5 +132,5 @@ def link_index(body: Body, name: str | None) -> int:
     name = name.removeprefix(f"{body.name}/")
     if name not in names:
         what = f"{body.name} has no such link; there are {', '.join(names)}"
-        raise Misfit(("at", "link"), what, name, quoted(nearest_name(name, names)))
+        raise Misfit(("at", "link"), what, name, nearest_quoted(name, names))
     return names.index(name)
