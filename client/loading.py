@@ -1,21 +1,32 @@
-"""Finds the class that a deployment names as `module:Class`, and checks it without calling it."""
+"""Finds the class that a deployment names as `module:Class`, and checks it without calling it.
+
+A user's module may print, raise, exit, crash or hang when it is imported. What it prints goes to standard error. One
+that crashes ends this process, and so does one that hangs, at a limit: its stack is written to standard error first.
+"""
 
 from __future__ import annotations
 
+import faulthandler
 import importlib
 import inspect
 import pkgutil
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from foosim.client.errors import PlayerError
-from foosim.client.failing import Unanswered, describe, in_library, place_of
+from foosim.client.errors import PlayerError, Unanswered
 from foosim.client.player import Player
 from foosim.common.errors import CHOICES_MAX
+from foosim.common.finding import Finding
 from foosim.common.names import class_path_of, nearest_name
+from foosim.common.plain_data import quoted
+from foosim.world.forms.failures import failure_of, in_library, place_of_code
+
+if TYPE_CHECKING:
+    from foosim.deployment.schema import Deployment
 
 MADE_WITH: Final = ("deployment", "parameters")
 CALLED_WITH: Final = ("tick", "samples")
@@ -58,6 +69,38 @@ def load_player(path: str) -> Callable[..., Any]:
     return found
 
 
+def player_findings(deployment: Deployment, names: Iterable[str]) -> list[Finding]:
+    """Return the problems of these players' classes, each at its place in the deployment.
+
+    All modules together may take as long as `deadlines.start`.
+    """
+    paths = {name: deployment.players[name].class_ for name in sorted(names)}
+    faults = class_faults(paths.values(), deployment.deadlines.start_ns / 1e9)
+    return [
+        Finding(("players", name, "class"), faults[path].problem, path, quoted(faults[path].nearest))
+        for name, path in paths.items()
+        if path in faults
+    ]
+
+
+def class_faults(paths: Iterable[str], limit_s: float) -> dict[str, ClassPathError]:
+    """Return the problems of class paths, by path; valid paths are left out."""
+    found: dict[str, ClassPathError] = {}
+    if not faulthandler.is_enabled():
+        faulthandler.enable(2)
+    faulthandler.dump_traceback_later(limit_s, exit=True, file=2)
+    try:
+        with redirect_stdout(sys.stderr):
+            for path in sorted(set(paths)):
+                try:
+                    load_player(path)
+                except ClassPathError as error:
+                    found[path] = error
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    return found
+
+
 def _import(path: str, name: str) -> ModuleType:
     try:
         return import_module(name)
@@ -66,8 +109,7 @@ def _import(path: str, name: str) -> ModuleType:
     except BaseException as error:  # SystemExit, too: a module may do anything
         if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
             raise _not_found(path, error.name) from error
-        what = f"importing {name} failed: {describe(error)}{place_of(error, name)}"
-        raise ClassPathError(path, what) from error
+        raise ClassPathError(path, f"importing {name} failed: {failure_of(error, name)}") from error
 
 
 def _not_found(path: str, missing: str) -> ClassPathError:
@@ -93,7 +135,7 @@ def _unfit(made: Any, name: str) -> str:
     if not inspect.isclass(made):
         return f"{name} is no class, {made!r:.{SHOWN_MAX}}"
     if not issubclass(made, Player):
-        return f"{name} is no Player{_place_of_class(made)}; write: from foosim import Player, class {name}(Player):"
+        return f"{name} is no Player{place_of_code(made)}; write: from foosim import Player, class {name}(Player):"
     if inspect.isabstract(made):
         return f"{name} is abstract: none can be made of it"
     taken = _other_arguments(made, *MADE_WITH)
@@ -105,15 +147,6 @@ def _unfit(made: Any, name: str) -> str:
     elif isinstance(method, staticmethod | classmethod):
         taken = _other_arguments(made.act, *CALLED_WITH)
     return f"{name}.act cannot be called with ({', '.join(CALLED_WITH)}): it takes {taken}" if taken else ""
-
-
-def _place_of_class(made: type) -> str:
-    """Return ` (file:line: code)` of a class; empty where its source is not there."""
-    try:
-        lines, line = inspect.getsourcelines(made)
-        return f" ({inspect.getsourcefile(made)}:{line}: {lines[0].strip()})"
-    except (OSError, TypeError):
-        return ""
 
 
 def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:

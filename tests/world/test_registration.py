@@ -38,8 +38,8 @@ REFUSED: Final = {
     'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
     'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
     'model("own", SpecBase)': "its settings are a class derived from EntitySettings, not SpecBase",
-    'model("own", RobotSettings, variants=3)': "variants are a mapping of values of dynamics to what differs, not 3",
-    'model("own", RobotSettings, variants={"rigid": 3})': "variants are a mapping of values of dynamics to what "
+    'model("own", RobotSettings, variants=3)': "variants is a mapping of values of dynamics to what differs, not 3",
+    'model("own", RobotSettings, variants={"rigid": 3})': "variants is a mapping of values of dynamics to what "
     "differs, not a mapping of 1",
     'model("own", RobotSettings, variants={"rigid": {"is_rigid": True}})': "it has variants, and its settings have no "
     "dynamics, which chooses one",
@@ -50,7 +50,7 @@ REFUSED: Final = {
     'sensor("own", Settings, Number, needs="contacts")': "needs is a tuple of names, not 'contacts': a tuple of one is "
     "('contacts',)",
     'sensor("own", Settings, Number, needs=(3,))': "needs is a tuple of names, not a list of 1",
-    'sensor("own", Settings, Number, kit=3)': "kit is the name of a kit, not 3",
+    'sensor("own", Settings, Number, kit=3)': "kit is a name, not 3",
     'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
     'sensor("own", Settings, Number, speaks=("contacts",))': "speaks is a name, not a list of 1",
     'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, "
@@ -84,10 +84,10 @@ REFUSED: Final = {
     'motion("own", writes="position")': "writes is a tuple of names, not 'position'",
     'model("own", RobotSettings, slots={"down": 2})': "down, which foosim writes, is one number, not 2",
     'model("own", RobotSettings, tags="vehicle")': "tags is a tuple of names, not 'vehicle'",
-    'model("own", RobotSettings, motion=None)': "motion is the name of a motion, not null",
+    'model("own", RobotSettings, motion=None)': "motion is a name, not null",
     'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators, drive: settings are a mapping with "
     "a kind, not 'wheel_speeds'",
-    'kit("own", SpecBase, entities=("ball",))': "entities are a mapping of names to models, not a list of 1",
+    'kit("own", SpecBase, entities=("ball",))': "entities is a mapping of names to models, not a list of 1",
     'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
     'kit("own", SpecBase, addable="ball")': "addable is a tuple of names, not 'ball'",
     'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
