@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.common.errors import UnknownName
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ROBOTS, Component, Form, Model, References
 from foosim.world.forms.payloads import PayloadCodec
@@ -44,12 +44,7 @@ def chosen(form: str | None, name: str | None) -> list[Form]:
     forms = FORMS if form is None else (form,)
     if name is None:
         return [registry.find(one, kind) for one in forms for kind in registry.names(one)]
-    try:
-        return [registry.find(one, name) for one in forms]
-    except UnknownName:
-        raise
-    except Refused as error:
-        raise BadValue(error.what, name) from None
+    return [registry.find(one, name) for one in forms]
 
 
 def as_json(component: Form) -> dict[str, Any]:

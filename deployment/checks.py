@@ -14,17 +14,17 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from foosim.common import limits, names, units
-from foosim.common.errors import BadValue, Refused, UnknownName, describe
+from foosim.common.errors import BadValue, Refused, describe
 from foosim.common.finding import Finding, Location, path_text
 from foosim.common.plain_data import PlainData
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
+from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.assembly.used_forms import OWN
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
-from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.layout import WORLD
 from foosim.world.spec import KITS
 
@@ -118,10 +118,8 @@ def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]
         try:
             rule = registry.find("rule", settings["kind"])
             rule.settings.model_validate(dict(settings))
-        except UnknownName as error:
-            yield f"its rule {label}: {error.what}"
-        except Refused as error:
-            yield f"its rule {label}: {error.what}, {settings['kind']!r}"
+        except BadValue as error:
+            yield f"its rule {label}: {error}"
         except ValidationError as error:
             for finding in settings_findings(error, rule.settings, ()):
                 path = path_text(finding.location if finding.at == "value" else finding.location[:-1])

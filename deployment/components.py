@@ -9,11 +9,19 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, BadValue
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import NS_PER_S, parse_ns
 from foosim.deployment.schema_errors import settings_findings
+from foosim.world.assembly.misfits import (
+    SECTIONS,
+    component_problems,
+    model_problems,
+    models_of,
+    needs_kit,
+    rule_problems,
+)
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     JOINTS,
@@ -26,13 +34,6 @@ from foosim.world.forms.forms import (
     WorldRule,
     with_article,
 )
-from foosim.world.forms.misfits import (
-    component_problems,
-    model_problems,
-    models_of,
-    needs_kit,
-    rule_problems,
-)
 from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
 from foosim.world.forms.settings import (
     BASES,
@@ -44,8 +45,6 @@ from foosim.world.forms.settings import (
 )
 from foosim.world.spec import KITS, schedule_of
 
-SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
-"""The sections of a robot that have components, and their form."""
 ROBOTS: Final = "robots"
 JOINT_POSITIONS: Final = JOINTS[0]
 OF_MODEL: Final = ("actuators", "rules")
@@ -89,10 +88,8 @@ def _unknown_engine(kind: Any) -> Iterator[Finding]:
         return
     try:
         registry.find("engine", kind)
-    except UnknownName as error:
+    except BadValue as error:
         yield Finding(("engine",), error.problem, kind, error.nearest)
-    except Refused as error:
-        yield Finding(("engine",), error.what, kind)
 
 
 class _Reader:
@@ -113,10 +110,8 @@ class _Reader:
             return False
         try:
             return registry.lookup("kit", key) is not None
-        except UnknownName as error:
+        except BadValue as error:
             self.findings.append(Finding((key,), error.problem, key, error.nearest, at="key"))
-        except Refused as error:
-            self.findings.append(Finding((key,), error.what, key, at="key"))
         return False
 
     def kit(self, name: str, section: Any) -> Any:
@@ -140,12 +135,10 @@ class _Reader:
             return RobotSettings.model_construct(model="")
         try:
             model = registry.find_model(name)
-        except UnknownName as error:
+        except BadValue as error:
             choices = [other.name for other in models_of(robots=location[0] == ROBOTS)]
             refused = error if ":" in name else registry.unknown("model", name, choices)
             self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "model"), error.what, name))
         else:
             return self._entity_of(model.variant(robot.get("dynamics")), location, robot)
         self._components_of(None, location, robot)
@@ -213,10 +206,8 @@ class _Reader:
                 if model is not None or not callable(component.several):
                     self.findings += self._unfit_modifiers(component, found, counts, location)
             return found
-        except UnknownName as error:
+        except BadValue as error:
             self.findings.append(Finding((*location, "kind"), error.problem, kind, error.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "kind"), error.what, kind))
         except ValidationError as error:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
         refused = BASES[form].model_construct(kind=kind)

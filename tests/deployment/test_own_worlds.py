@@ -274,14 +274,16 @@ def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: 
     written(site, *lines, "kit('zoo', SpecBase)(Zoo)")
     registry.find("kit", "own_form:Zoo")
     (told,) = problems("zoo={}")
-    assert re.match(r"kit zoo(: \w+)? fails: \w+Error: .*, 'zoo'$", told), told
+    assert re.match(r"kit zoo(: check fails| failed at tick 0): \w+Error: .*, 'zoo'$", told), told
     assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
 
 
 def test_a_scene_that_fails_is_named_with_the_place_in_its_file(site: Path) -> None:
     written(site, "def shapes(settings):", "    return [settings.height]", "scene('plain', SceneSettings)(shapes)")
     (told,) = problems("scene={kind: 'own_form:shapes'}")
-    assert told.startswith("scene own_form:shapes fails: AttributeError: 'SceneSettings' object has no attribute")
+    assert told.startswith(
+        "scene own_form:shapes failed at tick 0: AttributeError: 'SceneSettings' object has no attribute"
+    )
 
 
 # --- what a form of one world says of another ------------------------------------------------------------------------
@@ -391,7 +393,9 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
     text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
     done = rehearse(text, "x.yaml", 20, 1)
     assert not done.json["failed"], done.json["reason"]
-    with pytest.raises(DeploymentError, match=r"robots.mast: .*it sends rays from a robot without a body, 'mast'"):
+    with pytest.raises(
+        DeploymentError, match=r"robots.mast.sensors: .*it sends rays from a robot without a body, 'mast'"
+    ):
         load_deployment(text.replace("own_form:Mast", "own_form:Ghost"), "x.yaml")
 
 

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.assembly.misfits import models_of
 from foosim.world.forms import registry
-from foosim.world.forms.misfits import models_of
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
 from tests.own_forms import folder_on_path, problems, written
@@ -100,9 +100,9 @@ def test_a_registration_that_cannot_be_is_refused_with_name_module_and_place(sit
     path = written(site, f"{registration}(Own)")
     form = registration.partition("(")[0]
     line = len(path.read_text().splitlines())
-    with pytest.raises(Refused) as error:
+    with pytest.raises(BadValue) as error:
         find(form, "own_form:Own")
-    told = str(error.value)
+    told = error.value.problem
     word = {"rule": "rule of worlds", "entity_rule": "rule of entities"}.get(form, form)
     assert told.startswith(f"cannot be imported: Refused: {word} own of own_form: {REFUSED[registration]}"), told
     assert told.endswith(f" (own_form.py:{line})")
@@ -221,12 +221,12 @@ def test_what_a_broken_module_has_imported_before_stays_registered(site: Path) -
     """It stays imported, so that nothing would register it again."""
     code = """
 import json
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue
 from foosim.world.forms.registry import find
 for kind in ("own_broken:Own", "own_broken:Own"):
     try:
         find("sensor", kind)
-    except Refused as error:
+    except BadValue as error:
         told = str(error)
 print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module, told]))
 """

@@ -47,6 +47,7 @@ from foosim.world.spec import WorldSpec
 
 NO_FORCE: Final = (0.0, 0.0)
 """What is asked of the motor of a joint that nothing drives."""
+NO_STATUS: Final = "no status of"
 NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose marks cannot be told."""
@@ -184,7 +185,7 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # noqa: BLE001  # a run goes on without it
-                status |= {"failed": f"status of {what}: {failure_of(error)}"}
+                status |= {"failed": f"{NO_STATUS} {what}: {failure_of(error)}"}
     return status
 
 
@@ -199,7 +200,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     `world_status` returned."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [registry.find("kit", name).made for name in sorted(spec.kits)]
-    found = [f"no {failed}" for failed in [status.get("failed")] if failed]
+    found = [status["failed"]] if "failed" in status else []
     for one in dict.fromkeys(made):
         if hasattr(one, "text"):
             try:
@@ -460,7 +461,7 @@ class World:
                 continue
             count = entity.counts.get("joint_positions") if entity.is_rigid else None
             what = "a tuple of (target, greatest force)" + ("" if count is None else f" for {count} motors")
-            if not _are_motors(motors, count):
+            if not are_motors(motors, count):
                 error = WrongResult(actuators[0].actuator.command, what, motors)
                 raise actuators[0].failed(tick, error) from error
 
@@ -564,14 +565,15 @@ def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: 
     return Watched(rule, layout, places_of(robot, *written, component=label))
 
 
-def _are_motors(asked: object, count: int | None) -> bool:
+def are_motors(asked: object, count: int | None) -> bool:
     """Whether that is what an actuator can ask of so many motors of a rigid body, or of any number of a motion's."""
     lengths = (2,) if count is None else (2, 3)
     return (
         isinstance(asked, tuple)
         and count in (None, len(asked))
         and all(isinstance(one, tuple) and len(one) in lengths for one in asked)
-        and all(isinstance(number, int | float) for one in asked for number in one)
+        and all(isinstance(number, int | float) and isfinite(number) for one in asked for number in one)
+        and all(one[1] >= 0.0 for one in asked)
     )
 
 

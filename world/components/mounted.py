@@ -9,8 +9,7 @@ import numpy as np
 from foosim.common.names import nearest_name
 from foosim.common.plain_data import quoted
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats

@@ -1,15 +1,18 @@
-"""What forms do not find in the world that they are to be in: models, fields, motions, kits.
+"""What forms do not find in the world that they are to be in: models, fields, motions, kits, what their settings name.
 
-A problem is a text without a place: a deployment names the robot, rule or kit that has the form.
+A problem is a text without a place: a deployment names the robot, rule or kit that has the form. A finding has one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
-from foosim.common.errors import CHOICES_MAX, Refused, UnknownName
+from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
+from foosim.common.finding import Finding, Location
+from foosim.common.keyed_random import draw_key
 from foosim.common.names import nearest_name
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     ROBOTS,
@@ -23,11 +26,18 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
+from foosim.world.forms.settings import ComponentSettings, RobotSettings
+from foosim.world.layout import build_layout
+from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
 """The rigid models that may share a solve (`assembly.islands.table_reach_of`)."""
 PLACED_BY: Final = ("check_place", "place_at")
 """The methods of a model of which a running world can have more."""
+SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
+"""The sections of a robot that have components, and their form."""
+
+# --- models and components -------------------------------------------------------------------------------------------
 
 
 def find_kit_model(name: str) -> Model | None:
@@ -52,32 +62,32 @@ def needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str
         yield f"{noun or word_of(form.form)} of {with_article(form.kit)} in a world without one"
 
 
-def model_problems(model: Model, kits: Collection[str]) -> Iterator[str]:
-    """Yield why entities of a model would not be solved in a world with these kits."""
+def model_problems(model: Model, kits: Collection[str], having: Mapping[str, int] | None = None) -> Iterator[str]:
+    """Yield why entities of a model would not be solved in a world with these kits.
+
+    `having` are the fields of its state, where they follow from settings; without them nothing is missing.
+    """
     if model.is_rigid and not model.couples and model.name not in REACHED:
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
     if not model.motion:
         return
     try:
         motion = registry.find("motion", model.motion)
-    except Refused as error:
-        text = error.what if isinstance(error, UnknownName) else f"{error.what}, {model.motion!r}"
-        yield f"a model without its motion: {text}"
+    except BadValue as error:
+        yield f"a model without its motion: {error}"
         return
     assert isinstance(motion, Motion), motion
+    has = model.declared if having is None else having
     for verb, fields in (("needs", motion.needs), ("writes", motion.writes)):
-        missing = [] if model.declared is None else [field for field in fields if field not in model.declared]
+        missing = [] if has is None else [field for field in fields if field not in has]
         if missing:
-            yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {fields_of(model, missing)}"
+            yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {_fields_of(model, missing, has)}"
     for problem in needs_kit(motion, kits, motion.name):
         yield f"a model whose motion is {problem}"
 
 
 def component_problems(form: Form, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
-    """Yield what a robot of a model does not have that a component or rule of it needs.
-
-    `having` are the fields of its state, where they follow from settings; without them nothing is missing.
-    """
+    """Yield what a robot of a model does not have that a component or rule of it needs; `having` as above."""
     has = model.declared if having is None else having
     word = word_of(form.form)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
@@ -86,13 +96,13 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
         fitting = ", ".join(_having(needs))
-        valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {fields_of(model, missing, has)}")
+        valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
         yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
     if not isinstance(form, EntityRule):
         return
     written = [] if has is None else [field for field in form.writes if field not in has]
     if written:
-        yield f"{word} that writes {', '.join(written)}: {fields_of(model, written, has)}"
+        yield f"{word} that writes {', '.join(written)}: {_fields_of(model, written, has)}"
     if not model.is_solved:
         yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
 
@@ -114,15 +124,25 @@ def _speaks_by_model(sensor: Component) -> bool:
     return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
 
 
+def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
+    """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
+    fields = [*(having or ())]
+    shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
+    nearest = nearest_name(missing[0], fields)
+    near = "" if nearest is None else f", nearest to {missing[0]} is {nearest}"
+    return f"{with_article(model.name)} has {shown or 'no fields'}{near}"
+
+
+# --- rules of the world and kits -------------------------------------------------------------------------------------
+
+
 def rule_problems(rule: WorldRule) -> Iterator[str]:
     """Yield the models that a rule of worlds names, and that there are not."""
     for word, models in (("remembers something of each", rule.each), ("writes", rule.writes)):
         for model in models:
-            if model != ROBOTS or word == "writes":
-                found = None if ":" in model else registry.lookup("model", model)
-                if found is None:
-                    error = UnknownName("unknown model", model, registry.names("model"))
-                    yield f"{word_of('rule')} that {word} {model}: {error.what}"
+            if (model != ROBOTS or word == "writes") and (":" in model or registry.lookup("model", model) is None):
+                error = UnknownName("unknown model", model, registry.names("model"))
+                yield f"{word_of('rule')} that {word} {model}: {error}"
 
 
 def kit_problems(name: str, kit: Kit, kits: Mapping[str, Kit], reserved: Sequence[str]) -> Iterator[str]:
@@ -147,9 +167,8 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
     """Yield why an entity without an owner cannot be of a model."""
     try:
         model = registry.find_model(name)
-    except Refused as error:
-        text = error.what if isinstance(error, UnknownName) else f"{error.what}, {name!r}"
-        yield f"of a model that is not there: {text}"
+    except BadValue as error:
+        yield f"of a model that is not there: {error}"
         return
     if model.is_robot:
         yield f"of the model {model.name}, which is one of robots: these have owners, and are in robots:"
@@ -168,10 +187,54 @@ def _not_placed(name: str) -> Iterator[str]:
             yield f"of the model {model.name}, which has no {' and no '.join(missing)}"
 
 
-def fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None = None) -> str:
-    """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
-    fields = [*(having or model.declared or ())]
-    shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
-    nearest = nearest_name(missing[0], fields)
-    near = "" if nearest is None else f", nearest to {missing[0]} is {nearest}"
-    return f"{with_article(model.name)} has {shown or 'no fields'}{near}"
+# --- a world with its files ------------------------------------------------------------------------------------------
+
+
+def components_of(robot: RobotSettings) -> Iterator[tuple[str, str, ComponentSettings, Form]]:
+    """Yield the components and rules of a robot: section, name, settings and form of each."""
+    for section, form in SECTIONS.items():
+        for name, settings in getattr(robot, section).items():
+            yield section, name, settings, registry.find(form, settings.kind)
+
+
+def field_findings(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield settings of which no state follows, and components that need what it does not have.
+
+    Robots whose state is that of their model are checked with the file; of these, the files must have been given.
+    """
+    for name, robot in spec.robots.items():
+        model, place = registry.model_of(robot), ("robots", name)
+        if model.declared is not None:
+            continue
+        try:
+            having = model.fields_of(robot, spec)
+        except BadValue as bad:
+            value = robot.model if bad.value is ABSENT else bad.value
+            yield Finding((*place, "model"), bad.problem, value, bad.nearest)
+            continue
+        for problem in model_problems(model, spec.kits, having):
+            yield Finding((*place, "model"), problem, robot.model)
+        for section, label, its, form in components_of(robot):
+            for problem in component_problems(form, model, having):
+                yield Finding((*place, section, label, "kind"), problem, its.kind)
+
+
+def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield components whose settings their robots or the world do not fit: a joint that is not there, for one."""
+    checked = [
+        (name, *component)
+        for name, robot in spec.robots.items()
+        for component in components_of(robot)
+        if hasattr(component[-1].made, "check")
+    ]
+    layout = build_layout(spec) if checked else None
+    for name, section, channel, settings, form in checked:
+        assert layout is not None
+        key = draw_key(spec.seed, form.form, name, channel)
+        at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
+        made: Any = form.made
+        try:
+            made.check(settings, at)
+        except Misfit as error:
+            place: Location = ("robots", name, section, channel, *error.path)
+            yield Finding(place, error.problem, error.value, error.nearest)
