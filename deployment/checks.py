@@ -21,7 +21,6 @@ from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
 from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
-from foosim.world.assembly.used_forms import OWN
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
@@ -97,7 +96,7 @@ def _kits(view: View) -> Iterator[Finding]:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: a kit may do anything
-            if kit.module.startswith(OWN):
+            if kit.is_own:
                 raise
             yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", key, at="key")
         for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):

@@ -16,12 +16,12 @@ from jsonschema import Draft202012Validator
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
+from tests.frames import Frames
 from tests.kinematic_yard import yard_text
 from tests.own_forms import TABLE, folder_on_path, problems, written
 

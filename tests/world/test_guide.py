@@ -17,12 +17,12 @@ import pytest
 from yaml import safe_load
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.assembly.world import WorldMarks
 from tests.conftest import Command, Typed
+from tests.frames import Frames
 from tests.own_forms import folder_on_path, forget_modules
 
 ROOT: Final = Path(__file__).parents[2]

@@ -165,6 +165,11 @@ class Form:
         return self.made.__module__
 
     @property
+    def is_own(self) -> bool:
+        """Whether it is foosim's own, and not of another package."""
+        return self.module.startswith("foosim.")
+
+    @property
     def summary(self) -> str:
         """The first line of its docstring."""
         return (self.made.__doc__ or "").strip().partition("\n")[0]
