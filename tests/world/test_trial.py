@@ -257,7 +257,7 @@ BROKEN: Final = {
         "        view.write(self.ticks, 5.0)",
         "        view.write(self.ticks, 5.0)\n        view.numbers[0] = 0.125",
         "rule counts of the world failed",
-        "it writes mover position directly: numbers of a frame are written by view.write alone (own_forms.py:",
+        "TypeError: numbers of a frame are written by view.write alone (own_forms.py:",
     ),
     "a rule that writes nothing": (
         "[0] + 1.0)\n\n    def status",

@@ -35,7 +35,7 @@ from foosim.world.components.view import (
     component_error,
     has_together,
 )
-from foosim.world.components.watching import Watched, places_of, watched_actuator
+from foosim.world.components.watching import watched, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult, failure_of
@@ -93,20 +93,6 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     return rules
 
 
-def _watched_rules(spec: WorldSpec, layout: Layout, rules: Mapping[str, Rule]) -> dict[str, Any]:
-    """Return the rules of a world, each with what compares frames around it."""
-    watched: dict[str, Any] = {}
-    for label, settings in world_rules(spec).items():
-        writes = find_rule(settings).writes
-        places = [
-            place
-            for entity in layout.entities
-            for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
-        ]
-        watched[label] = Watched(rules[label], layout, places)
-    return watched
-
-
 def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies in the deployment's world. Raises ComponentError."""
     bodies: dict[str, Body] = {}
@@ -138,12 +124,12 @@ def initial_numbers(
         if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
             for label, own in _entity_rules_of(spec, layout, robot):
                 if hasattr(own, "place"):
-                    watched = _watched_entity_rule(spec, layout, robot, label, own) if is_watched else own
-                    called(f"rule {label}", robot.name, 0, watched.place, view)
-    rules = rules_of(spec, layout)
-    for label, rule in (_watched_rules(spec, layout, rules) if is_watched else rules).items():
+                    placed = watched(own) if is_watched else own
+                    called(f"rule {label}", robot.name, 0, placed.place, view)
+    for label, rule in rules_of(spec, layout).items():
         if hasattr(rule, "place"):
-            called(f"rule {label}", WORLD, 0, rule.place, view)
+            placed = watched(rule) if is_watched else rule
+            called(f"rule {label}", WORLD, 0, placed.place, view)
     return numbers
 
 
@@ -301,27 +287,15 @@ class World:
         }
 
     def _watch(self) -> None:
-        """Put what compares frames around all forms."""
-        spec, layout = self._spec, self._layout
-        entities = layout.entities
-        self.models = {
-            index: Watched(model, layout, places_of(entities[index], *entities[index].offsets))
-            for index, model in self.models.items()
-        }
-        self._rules = _watched_rules(spec, layout, self._rules)
-        self.actuators = {
-            index: tuple(watched_actuator(one, layout) for one in its) for index, its in self.actuators.items()
-        }
+        """Give all forms numbers of the frame that they can only read."""
+        self.models = {index: watched(model) for index, model in self.models.items()}
+        self._rules = {label: watched(rule) for label, rule in self._rules.items()}
+        self.actuators = {index: tuple(map(watched_actuator, its)) for index, its in self.actuators.items()}
         self._only = {index: self.actuators[index][0] for index in self._only}
-        for name, motion in self._motions.items():
-            moved = [entity for entity in entities if self._motion_of.get(entity.index) == name]
-            writes = find_motion(moved[0].kind).writes
-            places = [place for entity in moved for place in places_of(entity, *writes, component="motion")]
-            self._motions[name] = Watched(motion, layout, places)
-        for index, its in self._entity_rules.items():
-            self._entity_rules[index] = tuple(
-                (label, _watched_entity_rule(spec, layout, entities[index], label, rule)) for label, rule in its
-            )
+        self._motions = {name: watched(motion) for name, motion in self._motions.items()}
+        self._entity_rules = {
+            index: tuple((label, watched(rule)) for label, rule in its) for index, its in self._entity_rules.items()
+        }
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
@@ -557,12 +531,6 @@ def _without_power(one: FittedActuator, view: View) -> Motors:
     unpowered = getattr(one.actuator, "unpowered", None)
     asked: Motors = tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if unpowered is None else unpowered()
     return asked
-
-
-def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: str, rule: EntityRule) -> Any:
-    """Return a rule of a robot with what compares frames around it."""
-    written = find_entity_rule(spec.robots[robot.name].rules[label]).written
-    return Watched(rule, layout, places_of(robot, *written, component=label))
 
 
 def are_motors(asked: object, count: int | None) -> bool:
