@@ -13,7 +13,7 @@ class PlayerError(Failed):
     """A player that cannot be loaded, or that did something that players must not do."""
 
 
-class Unanswered(BaseException):
+class Unanswered(KeyboardInterrupt):
     """Raised in a player that does not return, to end it; the text says how long it was waited for."""
 
 

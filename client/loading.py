@@ -9,21 +9,17 @@ from __future__ import annotations
 import faulthandler
 import importlib
 import inspect
-import pkgutil
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stdout
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
-from foosim.client.errors import PlayerError, Unanswered
+from foosim.client.errors import PlayerError
 from foosim.client.player import Player
-from foosim.common.errors import CHOICES_MAX
+from foosim.common.errors import BadValue
 from foosim.common.finding import Finding
-from foosim.common.names import class_path_of, nearest_name
-from foosim.common.plain_data import quoted
-from foosim.world.forms.failures import failure_of, in_library, place_of_code
+from foosim.world.forms.failures import place_of_code
+from foosim.world.forms.registry import class_at
 
 if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment
@@ -38,7 +34,7 @@ class ClassPathError(PlayerError):
     """A class path that leads to no player: `problem` is the reason, `nearest` a path that might be meant."""
 
     def __init__(self, path: str, problem: str, nearest: str | None = None) -> None:
-        super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest!r}" if nearest else ""))
+        super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest}" if nearest else ""))
         self.problem, self.nearest = problem, nearest
 
 
@@ -51,22 +47,14 @@ def look_in(folder: str) -> None:
 
 def load_player(path: str) -> Callable[..., Any]:
     """Import the class that `module:Class` names and return it. Raises ClassPathError."""
-    module_name, colon, class_name = path.partition(":")
-    if not (module_name and colon and class_name):
-        raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
-    module = _import(path, module_name)
-    made: Any = getattr(module, class_name, None)
-    if made is None:
-        classes = sorted(name for name, value in vars(module).items() if _may_be_player(value))
-        nearest = nearest_name(class_name, classes)
-        shown = ", ".join(classes[:CHOICES_MAX]) + (", ..." if len(classes) > CHOICES_MAX else "")
-        problem = f"there is no class {class_name} in {module_name} (there are: {shown or 'none'})"
-        raise ClassPathError(path, problem, None if nearest is None else f"{module_name}:{nearest}")
-    problem = _unfit(made, class_name)
+    try:
+        made: Callable[..., Any] = class_at(path)
+    except BadValue as error:
+        raise ClassPathError(path, error.problem, error.nearest) from error.__cause__
+    problem = _unfit(made, path.partition(":")[2])
     if problem:
         raise ClassPathError(path, problem)
-    found: Callable[..., Any] = made
-    return found
+    return made
 
 
 def player_findings(deployment: Deployment, names: Iterable[str]) -> list[Finding]:
@@ -77,7 +65,7 @@ def player_findings(deployment: Deployment, names: Iterable[str]) -> list[Findin
     paths = {name: deployment.players[name].class_ for name in sorted(names)}
     faults = class_faults(paths.values(), deployment.deadlines.start_ns / 1e9)
     return [
-        Finding(("players", name, "class"), faults[path].problem, path, quoted(faults[path].nearest))
+        Finding(("players", name, "class"), faults[path].problem, path, faults[path].nearest)
         for name, path in paths.items()
         if path in faults
     ]
@@ -99,35 +87,6 @@ def class_faults(paths: Iterable[str], limit_s: float) -> dict[str, ClassPathErr
     finally:
         faulthandler.cancel_dump_traceback_later()
     return found
-
-
-def _import(path: str, name: str) -> ModuleType:
-    try:
-        return import_module(name)
-    except (KeyboardInterrupt, Unanswered):
-        raise
-    except BaseException as error:  # SystemExit, too: a module may do anything
-        if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
-            raise _not_found(path, error.name) from error
-        raise ClassPathError(path, f"importing {name} failed: {failure_of(error, name)}") from error
-
-
-def _not_found(path: str, missing: str) -> ClassPathError:
-    """Return the error for a path whose module, or a package of it, cannot be found."""
-    parent, dot, last = missing.rpartition(".")
-    if dot:
-        folders: Iterable[str] | None = getattr(sys.modules.get(parent), "__path__", None)
-        hint = "" if folders is not None else f" ({parent} is a module, not a package)"
-    else:
-        folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
-        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
-    nearest = nearest_name(last, [module.name for module in pkgutil.iter_modules(folders)] if folders else ())
-    found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
-    return ClassPathError(path, f"there is no module {missing}{hint}", found)
-
-
-def _may_be_player(value: object) -> bool:
-    return inspect.isclass(value) and hasattr(value, "act") and value is not Player
 
 
 def _unfit(made: Any, name: str) -> str:

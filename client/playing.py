@@ -84,7 +84,7 @@ class Acting:
             return factory(self._deployment, self.declared.parameters)
         except Refused as error:
             raise PlayerError(f"player {self.name}: {error}") from error
-        except (KeyboardInterrupt, Unanswered):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:
             when = f"at tick {tick}" if tick >= 0 else "before its first tick"
@@ -98,7 +98,7 @@ class Acting:
         where = f"{self.name} failed at tick {tick}"
         try:
             turn = self.player.act(tick, self.newest.samples)
-        except (KeyboardInterrupt, Unanswered):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: the run cannot continue without the player
             raise PlayerError(f"{where}: {failure_of(error, _module_of(self.declared))}") from error

@@ -23,6 +23,7 @@ from foosim.world.assembly.misfits import (
     rule_problems,
 )
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     JOINTS,
     JOINTS_MAX,
@@ -357,7 +358,7 @@ def _unfit(
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001  # of whoever wrote the modifier
-        yield Finding(place, f"its check failed: {type(error).__name__}: {error}", settings.kind)
+        yield Finding(place, f"its check failed: {failure_of(error)}", settings.kind)
     else:
         yield from _unknown_slots(component, settings, carrier, place)
 

@@ -224,9 +224,8 @@ WRONG: Final = {
     "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
-    "foosim.world.models.rod:Rot": "foosim.world.models.rod registers no such class (there are: Rod), 'Rot'",
-    "own_gone:Own": "cannot be imported: ModuleNotFoundError: No module named 'own_gone' (is the folder "
-    "that it is in on PYTHONPATH?), 'own_gone:Own'",
+    "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
+    "own_gone:Own": "no module own_gone (it is neither beside the deployment nor on PYTHONPATH), 'own_gone:Own'",
 }
 
 

@@ -119,8 +119,8 @@ SLOTS: Final = {
     "lambda settings, on: {'kept': 100_000}": "its slots are wrong: kept has 1 to 65536 numbers, or ENTITY, not "
     "100000, 'own'",
     "lambda settings, on: {'samples': 1}": "its slots are wrong: each sensor has a slot samples already, 'own'",
-    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero, "
-    "'own'",
+    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero "
+    "(own_form.py:LINE), 'own'",
     "lambda settings: {}": "its slots are not known: TypeError: <lambda>() takes 1 positional argument but 2 were "
     "given, 'own'",
     "refuse": "more than can be kept, '3 s'",
@@ -130,18 +130,20 @@ SLOTS: Final = {
 @pytest.mark.parametrize("slots", SLOTS)
 def test_slots_that_do_not_follow_from_settings_are_a_problem_of_the_component(site: Path, slots: str) -> None:
     refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)")
+    line = len(written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)").read_text().splitlines())
+    told = SLOTS[slots].replace("LINE", str(line))
     assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}") == (
-        [f"{PLACE}: {SLOTS[slots]}"] if SLOTS[slots] else []
+        [f"{PLACE}: {told}"] if told else []
     )
 
 
 @pytest.mark.parametrize("slots", [slots for slots in SLOTS if "samples" not in slots])
 def test_slots_of_modifiers_are_a_problem_of_the_modifier(site: Path, slots: str) -> None:
     refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    written(site, *refuse, f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)")
+    own = f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)"
+    told = SLOTS[slots].replace("LINE", str(len(written(site, *refuse, own).read_text().splitlines())))
     place = "robots.red.goal.sensors.encoder.modifiers"
-    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {SLOTS[slots]}"] if SLOTS[slots] else [])
+    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {told}"] if told else [])
 
 
 def test_a_sensor_whose_slots_follow_from_its_settings_has_them(site: Path) -> None:
@@ -155,8 +157,9 @@ def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
         site, "Own.check = staticmethod(lambda settings, numbers: 1 // 0)", "modifier('own', ModifierSettings)(Own)"
     )
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
-    assert problem.endswith("modifiers[0]: its check failed: ZeroDivisionError: integer division or modulo by zero, "
-                            "'own_form:Own'")  # fmt: skip
+    line = len((site / "own_form.py").read_text().splitlines()) - 1
+    why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
+    assert problem.endswith(f"modifiers[0]: its check failed: {why}, 'own_form:Own'")
 
 
 @pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),

@@ -5,7 +5,7 @@ A problem is a text without a place: a deployment names the robot, rule or kit t
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
@@ -27,7 +27,17 @@ from foosim.world.forms.forms import (
     word_of,
 )
 from foosim.world.forms.settings import ComponentSettings, RobotSettings
-from foosim.world.layout import build_layout
+from foosim.world.layout import (
+    Declaring,
+    Layout,
+    build_layout,
+    declaring,
+    find_rule,
+    kits_named,
+    of_motion,
+    slot_that_speaks,
+    world_rules,
+)
 from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
@@ -119,7 +129,7 @@ def _having(fields: Collection[str]) -> Iterator[str]:
 
 
 def _speaks_by_model(sensor: Component) -> bool:
-    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`layout.unheard`)."""
+    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`unheard`)."""
     is_own = callable(sensor.slots) or sensor.speaks in sensor.slots
     return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
 
@@ -238,3 +248,52 @@ def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
         except Misfit as error:
             place: Location = ("robots", name, section, channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)
+
+
+def unheard(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the sensors that speak by a slot that their robot does not have."""
+    layout: Layout | None = None
+    for name, robot in spec.robots.items():
+        for channel, settings in robot.sensors.items():
+            speaks = registry.find_component("sensor", settings.kind).speaks
+            if not speaks:
+                continue
+            layout = layout or build_layout(spec)
+            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
+                valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
+                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
+                yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
+
+
+def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield what declares a slot of an entity that something else has declared: it would be in one place for both."""
+    of_rules: list[tuple[str, Declaring]] = []
+    for label, settings in world_rules(spec).items():
+        kits = tuple(kit.name for kit in kits_named(spec) if label in kit.rules)
+        place: Location = ("rules", label) if label in spec.rules else kits
+        for model, slots in find_rule(settings).each.items():
+            named = {f"{label}.{slot}": count for slot, count in slots.items()}
+            of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
+    seen: set[tuple[int, tuple[tuple[str, int], ...]]] = set()
+    for name, robot in spec.robots.items():
+        parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
+        alike = id(registry.model_of(robot)), tuple([(label, id(settings)) for label, settings in parts])
+        if alike not in seen:  # many robots of a fleet are
+            seen.add(alike)
+            remembered = [one for model, one in of_rules if model in (registry.model_of(robot).name, ROBOTS)]
+            yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
+    for kit in kits_named(spec):
+        for name, model in kit.entities.items():
+            kind = registry.find_model(model)
+            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
+            yield from _doubled([motion, *(one for its, one in of_rules if its == kind.name)], name)
+
+
+def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
+    first: dict[str, Declaring] = {}
+    for one in all_of_it:
+        for slot in one.slots:
+            other = first.setdefault(slot, one)
+            if other is not one:
+                what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
+                yield Finding(one.location, what, slot.partition(".")[2], at="key")

@@ -58,9 +58,7 @@ def _place_of(error: BaseException, module: str) -> str:
     if own:
         frame, line = own[-1]
         return f" ({_shown(frame.f_code.co_filename)}:{line})"
-    top = module.partition(".")[0]
-    is_missing = isinstance(error, ModuleNotFoundError) and error.name == top
-    return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
+    return ""
 
 
 def place_of_code(made: Any) -> str:

@@ -18,8 +18,9 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from foosim.common.errors import BadValue, Refused, UnknownName
-from foosim.common.names import CLASS_PATTERN
-from foosim.world.forms.failures import failure_of
+from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name
+from foosim.common.plain_data import quoted
+from foosim.world.forms.failures import failure_of, in_library
 from foosim.world.forms.forms import (
     NO_SETTINGS,
     NO_SLOTS,
@@ -358,9 +359,12 @@ def _own_modules(form: str) -> Mapping[str, str]:
 
 
 def class_at(path: str) -> Any:
-    """Return what `module:Class` is. Raises BadValue for a module that cannot be imported, or has no such name."""
+    """Return what `module:Class` is, of a form or a player.
+
+    Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
+    """
     if not re.fullmatch(CLASS_PATTERN, path):
-        raise BadValue(f"not a class ({BY_CLASS})", path)
+        raise BadValue(f"not of the form {BY_CLASS}", path, quoted(class_path_of(path)))
     module_name, _, class_name = path.partition(":")
     known = dict(_known)
     try:
@@ -369,11 +373,31 @@ def class_at(path: str) -> Any:
         raise
     except BaseException as error:  # SystemExit, too: a module may do anything
         _forget_new(known)
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            raise _not_found(path, missing) from error
         raise BadValue(f"cannot be imported: {failure_of(error, module_name)}", path) from error
     if not hasattr(module, class_name):
-        there = [component.made.__qualname__ for component in _known.values() if component.module == module_name]
-        raise UnknownName(f"{module_name} registers no such class", class_name, there)
+        own = (one for one, its in vars(module).items() if getattr(its, "__module__", "") == module_name)
+        there = [one for one in own if not one.startswith("_")]
+        refused = UnknownName(f"there is no {class_name} in {module_name}", class_name, there)
+        nearest = nearest_name(class_name, there)
+        raise BadValue(refused.problem, path, quoted(nearest and f"{module_name}:{nearest}"))
     return getattr(module, class_name)
+
+
+def _not_found(path: str, missing: str) -> BadValue:
+    """Return the error for a path whose module, or a package of it, cannot be found."""
+    parent, dot, last = missing.rpartition(".")
+    if dot:
+        folders: Iterable[str] = getattr(sys.modules.get(parent), "__path__", ())
+        hint = "" if folders else f" ({parent} is a module, not a package)"
+    else:
+        folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
+        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
+    nearest = nearest_name(last, [module.name for module in iter_modules(folders)] if folders else ())
+    found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
+    return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
 
 
 def _of_class(form: str, path: str) -> Form:
