@@ -1,9 +1,11 @@
-"""The frames of a rehearsal, for tests that compare them."""
+"""What tests of laws have in common: the frames of a rehearsal, and the check of components."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from foosim.rehearsal.check.component_check import ComponentCheck
 from foosim.world.frame import Frame
 
 
@@ -15,3 +17,8 @@ class Frames:
 
     def __call__(self, frame: Frame) -> None:
         self.frames.append(frame)
+
+
+def broken_laws(text: str, name: str, ticks: int, seed: int = 1) -> Iterator[str]:
+    """Yield which laws a deployment's forms break, in words, as each is found."""
+    yield from ComponentCheck(text, name, ticks, seed).broken()

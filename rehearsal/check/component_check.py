@@ -138,11 +138,6 @@ class ComponentCheck:
         return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames
 
 
-def broken_laws(text: str, name: str, ticks: int, seed: int = 1) -> Iterator[str]:
-    """Yield which laws a deployment's forms break, in words, as each is found."""
-    yield from ComponentCheck(text, name, ticks, seed).broken()
-
-
 def _shuffle(system: System, *, seed: int, ticks: int) -> None:
     """Move random robots to random nodes, and make all objects of random nodes anew, at drawn ticks."""
     robots, nodes = sorted(system.supervisor.state.owners), sorted(system.solvers)

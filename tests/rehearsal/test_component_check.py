@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, used_form
+from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.components.view import View
 from foosim.world.moving.asked import MotionsAsked
 from tests.conftest import Command, Typed
-from tests.frames import Frames
+from tests.frames import Frames, broken_laws
 from tests.kinematic_yard import yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
