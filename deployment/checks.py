@@ -13,17 +13,16 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from foosim.common import limits, names
-from foosim.common.errors import Refused, UnknownName
+from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_quoted
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
-from foosim.world.assembly.used_forms import OWN
+from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
-from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.layout import WORLD
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scenery import SceneryMesh
@@ -90,7 +89,7 @@ def _kits(deployment: Deployment) -> Iterator[Finding]:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: a kit may do anything
-            if kit.module.startswith(OWN):
+            if kit.is_own:
                 raise
             yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", at="key")
         for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
@@ -111,10 +110,8 @@ def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]
         try:
             rule = registry.find("rule", settings["kind"])
             rule.settings.model_validate(dict(settings))
-        except UnknownName as error:
-            yield f"its rule {label}: {error.what}"
-        except Refused as error:
-            yield f"its rule {label}: {error.what}, {settings['kind']!r}"
+        except BadValue as error:
+            yield f"its rule {label}: {error}"
         except ValidationError as error:
             yield from (f"its rule {label}: {finding.text}" for finding in settings_findings(error, rule.settings, ()))
         else:

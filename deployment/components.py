@@ -9,12 +9,21 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, BadValue
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
+from foosim.world.assembly.misfits import (
+    SECTIONS,
+    component_problems,
+    model_problems,
+    models_of,
+    needs_kit,
+    rule_problems,
+)
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     JOINTS,
     JOINTS_MAX,
@@ -24,13 +33,6 @@ from foosim.world.forms.forms import (
     Model,
     WorldRule,
     with_article,
-)
-from foosim.world.forms.misfits import (
-    component_problems,
-    model_problems,
-    models_of,
-    needs_kit,
-    rule_problems,
 )
 from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
 from foosim.world.forms.settings import (
@@ -43,8 +45,6 @@ from foosim.world.forms.settings import (
 )
 from foosim.world.spec import KITS, schedule_of
 
-SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
-"""The sections of a robot that have components, and their form."""
 ROBOTS: Final = "robots"
 JOINT_POSITIONS: Final = JOINTS[0]
 OF_MODEL: Final = ("actuators", "rules")
@@ -88,10 +88,8 @@ def _unknown_engine(kind: Any) -> Iterator[Finding]:
         return
     try:
         registry.find("engine", kind)
-    except UnknownName as error:
+    except BadValue as error:
         yield Finding(("engine",), error.problem, kind, error.nearest)
-    except Refused as error:
-        yield Finding(("engine",), error.what, kind)
 
 
 class _Reader:
@@ -109,10 +107,8 @@ class _Reader:
             return False
         try:
             return registry.lookup("kit", key) is not None
-        except UnknownName as error:
+        except BadValue as error:
             self.findings.append(Finding((key,), error.problem, key, error.nearest, at="key"))
-        except Refused as error:
-            self.findings.append(Finding((key,), error.what, key, at="key"))
         return False
 
     def kit(self, name: str, section: Any) -> Any:
@@ -136,12 +132,10 @@ class _Reader:
             return RobotSettings.model_construct(model="")
         try:
             model = registry.find_model(name)
-        except UnknownName as error:
+        except BadValue as error:
             choices = [other.name for other in models_of(robots=location[0] == ROBOTS)]
             refused = error if ":" in name else registry.unknown("model", name, choices)
             self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "model"), error.what, name))
         else:
             return self._entity_of(model.variant(robot.get("dynamics")), location, robot)
         self._components_of(None, location, robot)
@@ -200,10 +194,8 @@ class _Reader:
             if isinstance(modifiers, list):
                 settings = {**settings, "modifiers": [*self._modifiers((*location, "modifiers"), modifiers)]}
             return component.settings.model_validate(settings)
-        except UnknownName as error:
+        except BadValue as error:
             self.findings.append(Finding((*location, "kind"), error.problem, kind, error.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "kind"), error.what, kind))
         except ValidationError as error:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
         return BASES[form].model_construct(kind=kind)
@@ -329,7 +321,7 @@ def _unfit(
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001  # of whoever wrote the modifier
-        yield Finding(place, f"its check failed: {type(error).__name__}: {error}", settings.kind)
+        yield Finding(place, f"its check failed: {failure_of(error)}", settings.kind)
     else:
         yield from _unknown_slots(component, settings, carrier, place)
 

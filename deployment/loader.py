@@ -51,13 +51,11 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
+from foosim.world.assembly.misfits import doubled_slots, field_findings, unfit_components, unheard
 from foosim.world.assembly.sections import findings_of
-from foosim.world.assembly.state_fields import field_findings
-from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Engine, Model
-from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32

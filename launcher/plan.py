@@ -118,8 +118,7 @@ def check_players_here(plan: Plan) -> None:
 
     Other machines have their own classes.
     """
-    from foosim.client.class_check import player_findings
-    from foosim.client.loading import look_in
+    from foosim.client.loading import look_in, player_findings
 
     look_in(str(plan.options.file.parent.absolute()))
     deployment, elsewhere = plan.deployment, places(plan.deployment)

@@ -52,7 +52,7 @@ ONLY_IN = {
 # which is why rehearsal can run all of them in one process on virtual time.
 SHELLS = {
     "client/asking.py",
-    "client/class_check.py",
+    "client/loading.py",
     "client/client.py",
     "client/main.py",
     "client/replay_listener.py",

@@ -20,7 +20,7 @@ from typing import Final, Literal
 
 from packaging.requirements import Requirement
 
-from foosim.client.class_check import player_findings
+from foosim.client.loading import player_findings
 from foosim.common import limits, wall_clock
 from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import Refused, describe

@@ -68,7 +68,7 @@ def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Pat
     deployment = load_deployment(text, "table.yaml")
     here, there = Case(deployment, "127.0.0.1"), Case(deployment, "127.0.0.1", host="arm")
     (finding,) = [finding for finding in examine(here) if finding.check == "players"]
-    assert (finding.subject, finding.state) == ("player-blue", "problem") and "class Teem" in finding.text
+    assert (finding.subject, finding.state) == ("player-blue", "problem") and "no Teem" in finding.text
     assert finding.remedy.startswith("correct players.player-blue.class, or put the module's folder on PYTHONPATH")
     (finding,) = [finding for finding in examine(there) if finding.check == "players"]
     assert (finding.subject, finding.state, finding.host) == ("player-red", "problem", "arm")

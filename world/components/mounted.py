@@ -8,8 +8,7 @@ import numpy as np
 
 from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats
