@@ -111,7 +111,7 @@ class Link:
         settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
         self._version = version
         setup = self._setup(settings)
-        self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
+        self._stages = [stage for _, make, _ in STAGES if (stage := make(setup)) is not None]
         self._at_sending, self._at_arrival = at_sending(self._stages), at_arrival(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0

@@ -6,13 +6,9 @@ journal, and a sender of little loses nothing to a sender of much.
 
 from __future__ import annotations
 
-from typing import Final
-
 from foosim.common import limits
 from foosim.common.limits import FLIGHT_HEAD_BYTES
 from foosim.vhub.network.packet import Flight
-
-TRANSIT_FULL: Final = "transit_full"
 
 
 class InFlightLimit:
