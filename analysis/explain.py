@@ -15,9 +15,8 @@ from typing import Any, Final, Literal
 
 from foosim.capture.reader import CaptureData, TickMark
 from foosim.capture.rows import CLIENTS, PACKETS, TICK, PacketRow, TickRow
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, no_such
 from foosim.common.keyed_random import Slot
-from foosim.common.names import nearest_name
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages import STAGES
@@ -86,9 +85,7 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
         if (row.source, row.sequence) == (which.source, which.sequence):
             found[row.destination, row.copy] = row
     if which.source not in sources:
-        nearest = nearest_name(which.source, sources)
-        hint = None if nearest is None else repr(nearest)
-        raise BadValue(f"{capture.path}: no packet from this source", which.source, hint)
+        raise no_such(f"{capture.path}: no packet from this source", which.source, sources)
     if not found:
         raise BadValue(f"{capture.path}: {which.source} sent no packet of this number", which.sequence)
     chosen = {key: row for key, row in found.items() if key[0] == which.destination or not which.destination}

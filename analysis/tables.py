@@ -19,9 +19,8 @@ from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.format import Message
 from foosim.capture.rows import PACKETS, ROW_TYPES, PacketRow, Row
-from foosim.common.errors import BadValue, Malformed, UnknownName, show
+from foosim.common.errors import Malformed, UnknownName, no_such
 from foosim.common.json_text import encode_json
-from foosim.common.names import nearest_name
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.world.forms.payloads import PayloadCodec, as_mapping
@@ -93,9 +92,7 @@ def table_names() -> list[str]:
 def table_of(name: str, deployment: Deployment) -> Table:
     """Return a table by name; raises BadValue."""
     if name not in table_names():
-        nearest = nearest_name(name, table_names())
-        what = f"--what: not one of {', '.join(table_names())}"
-        raise BadValue(what, name, None if nearest is None else show(nearest))
+        raise no_such(f"--what: not one of {', '.join(table_names())}", name, table_names())
     if name == POSES_TABLE:
         return Table(name, POSES, _POSE_COLUMNS, _pose_rows)
     if name == COMMANDS_TABLE:

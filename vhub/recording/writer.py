@@ -250,10 +250,7 @@ class CaptureWriter:
         if self.state.level is Level.OUT:
             return
         try:
-            if self._syncer.error is not None:
-                raise self._syncer.error
-            self._file.end_chunk()
-            self._note_written()
+            self._end_chunk()
             room = self._file.room()
         except OSError as error:
             self._give_up(str(self._file.disk_error(error)))
@@ -263,7 +260,10 @@ class CaptureWriter:
         elif room.level > self.state.level:
             self._come_to(CaptureState(room.level, f"{self.path}: {room}"))
 
-    def _note_written(self) -> None:
+    def _end_chunk(self) -> None:
+        if self._syncer.error is not None:
+            raise self._syncer.error
+        self._file.end_chunk()
         self._written += self._pending
         self._pending = 0
         self._syncer.written(self._file.done.tick)
@@ -288,10 +288,7 @@ class CaptureWriter:
     def _finish(self, ending: Mapping[str, str]) -> None:
         try:
             self._syncer.end()
-            if self._syncer.error is not None:
-                raise self._syncer.error
-            self._file.end_chunk()
-            self._note_written()
+            self._end_chunk()
             self._file.finish(ending)
             self._syncer.tick = self._file.done.tick
         except OSError as error:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from foosim.common.keyed_random import Slot, chance_threshold
-from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
+from foosim.vhub.network.jitter import interpolate_ns
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
@@ -28,7 +28,7 @@ class Delay(Stage):
         self._memory = setup.memory
         self._delay_ns = settings.delay_ns
         self._fifo = settings.order == "fifo"
-        self._quantiles_ns = () if settings.jitter is None else quantiles_ns(settings.jitter, setup.table)
+        self._quantiles_ns = setup.jitter_ns
         self._holds = setup.holds
         self._bad_ns = 0 if settings.burst is None else settings.burst.bad_extra_delay_ns
         reorder = settings.reorder

@@ -307,7 +307,7 @@ class HubState:
             is_under_way = link.send(flight)
             if is_under_way and not self._transit.takes(flight):
                 is_under_way = False
-                link.turn_away(flight, TRANSIT_FULL)
+                link.drop(flight, TRANSIT_FULL)
             if not is_under_way:
                 self.packets.dropped += is_offered
                 fates.append(flight)
