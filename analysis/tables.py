@@ -23,7 +23,7 @@ from foosim.common.errors import Malformed, UnknownName, no_such
 from foosim.common.json_text import encode_json
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import PayloadCodec, as_mapping
+from foosim.world.forms.payloads import PayloadCodec, as_mapping, plain_type
 from foosim.world.forms.per_field import codec_of
 
 Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
@@ -119,15 +119,9 @@ def _columns(kind: type[Row]) -> tuple[Column, ...]:
     info = inspect.type_info(kind)
     assert isinstance(info, inspect.StructType)
     return tuple(
-        Column(field.name, _KINDS.get(type(_plain(field.type)), "json"), unit_of(field.name)) for field in info.fields
+        Column(field.name, _KINDS.get(type(plain_type(field.type)), "json"), unit_of(field.name))
+        for field in info.fields
     )
-
-
-def _plain(kind: inspect.Type) -> inspect.Type:
-    """Return a type without its annotations."""
-    while isinstance(kind, inspect.Metadata):
-        kind = kind.type
-    return kind
 
 
 def _values(row: Row, json: Iterable[int]) -> list[Any]:

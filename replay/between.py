@@ -9,13 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from foosim.capture.reader import About, CapturedTick
-from foosim.deployment.loader import load_deployment
-from foosim.node.physics.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.run import with_nodes
+from foosim.replay.verify import replica_of
 from foosim.world.assembly.initial_state import added_to, start_with
 from foosim.world.frame import CHAIN_START, Frame
-from foosim.world.start import Start
 
 
 class Between:
@@ -45,11 +42,8 @@ class Between:
                 self._replica.set_back(frame)
             return self._replica
         about = self._about
-        text = with_nodes(about.deployment_text, about.deployment_name, 1)
-        deployment = load_deployment(text, about.deployment_name).with_assets(about.files)
-        check_models(deployment, about.deployment_name, text)
-        start: Start = start_with(frame, about.path.name, CHAIN_START, added_to(frame.layout))
-        self._replica = Replica(text, about.deployment_name, deployment, start=start)
+        start = start_with(frame, about.path.name, CHAIN_START, added_to(frame.layout))
+        self._replica = replica_of(about.deployment_text, about.deployment_name, about.files, start)
         return self._replica
 
     def close(self) -> None:

@@ -91,10 +91,7 @@ def verify(
 
     `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
     """
-    text = with_nodes(text, name, nodes)
-    deployment = load_deployment(text, name).with_assets(files or {})
-    check_models(deployment, name, text)
-    replica = Replica(text, name, deployment, start=start)
+    replica = replica_of(text, name, files or {}, start, nodes)
     chain = first_chain(None if start is None else start.origin)
     try:
         first = replica.frame.tick
@@ -102,6 +99,14 @@ def verify(
         return replace(found, arithmetic=replica.arithmetic.hex(), first_tick=first)
     finally:
         replica.close()
+
+
+def replica_of(text: str, name: str, files: Mapping[str, bytes], start: Start | None, nodes: int = 1) -> Replica:
+    """Return a deployment's world on so many nodes, at its start. Raises AssetError for a file of an unfit model."""
+    text = with_nodes(text, name, nodes)
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
+    return Replica(text, name, deployment, start=start)
 
 
 def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:

@@ -50,7 +50,6 @@ class CaptureStatistics:
     refused: int
     queued_rows: int
     waits: int
-    written_tick: int
     synced_tick: int
 
 
@@ -171,7 +170,7 @@ class CaptureWriter:
 
     def statistics(self) -> CaptureStatistics:
         counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
-        return CaptureStatistics(self._file.total_bytes, *counts, self._file.done.tick, self.synced_tick)
+        return CaptureStatistics(self._file.total_bytes, *counts, self.synced_tick)
 
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)

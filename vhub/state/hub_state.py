@@ -341,7 +341,7 @@ class HubState:
                 link = self.fabric.link(flight.source, flight.destination, flight.channel)
                 on_links.setdefault(link, []).append(flight)
             else:
-                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                self._put(flight, flight.arrival_tick)
         for link, those in on_links.items():
             due_ns = [flight.due_ns for flight in those]
             link.retime(those, now_ns)
@@ -354,8 +354,10 @@ class HubState:
         """Schedule a packet's arrival at its due time, at that tick at the earliest."""
         member = self.members.get(flight.destination)
         arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
-        if member is not None:
-            arrival = member.release_tick(arrival)
+        self._put(flight, arrival if member is None else member.release_tick(arrival))
+
+    def _put(self, flight: Flight, arrival: int) -> None:
+        """Add a packet to those that arrive at a tick."""
         flight.arrival_tick = arrival
         flights = self._flights.get(arrival)
         if flights is None:
@@ -406,13 +408,11 @@ class HubState:
         for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
-                flight.arrival_tick = member.release_tick(tick)
-                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                self._put(flight, member.release_tick(tick))
                 continue
             is_call = flight.destination in turns and self._here.calls(flight)
             if flight.destination in turns and not is_call and turns[flight.destination].called_tick != tick:
-                flight.arrival_tick = tick + 1
-                self._flights.setdefault(tick + 1, []).append(flight)
+                self._put(flight, tick + 1)
                 continue
             down = member is None or not member.active or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
@@ -494,7 +494,7 @@ class HubState:
                 raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
             state.fabric.restore_flight(flight)
             state._transit.restored(flight)
-            state._flights.setdefault(flight.arrival_tick, []).append(flight)
+            state._put(flight, flight.arrival_tick)
         return state
 
 
