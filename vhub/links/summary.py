@@ -19,8 +19,7 @@ from foosim.deployment.network.rules import Network
 from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.radio_checks import unheeded
 from foosim.deployment.schema import Deployment
-from foosim.vhub.links.offered_load import flows_of, offered_hz, used_links
-from foosim.vhub.links.packet_sizes import long_packets
+from foosim.vhub.links.offered_load import flows_of, long_packets, offered_hz, used_links
 from foosim.vhub.links.phase import phase_warnings
 from foosim.vhub.network.jitter import interpolate_ns, jitter_ns, moments_ns
 from foosim.vhub.radio import errors

@@ -24,9 +24,8 @@ from foosim.vhub.network.draw_address import counts_within_channels, robot_numbe
 from foosim.vhub.network.memory import Age, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL
-from foosim.vhub.state.in_flight_limit import InFlightLimit
+from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
 from foosim.vhub.state.members import Here, Member
-from foosim.vhub.state.receive_limit import ReceiveBudget
 from foosim.vhub.state.send_order import SendOrder
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import Frame
