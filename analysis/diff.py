@@ -135,7 +135,8 @@ def _closings(scan: Scan) -> Iterator[list[Message]]:
 
 def _about(a: About, b: About) -> tuple[str, ...]:
     """Return the names of metadata and files in which two captures differ."""
-    differing = [f"metadata {key}" for key in sorted({*a.metadata, *b.metadata}) if _differs(a, b, key)]
+    keys = sorted({*a.metadata, *b.metadata})
+    differing = [f"metadata {key}" for key in keys if a.metadata.get(key) != b.metadata.get(key)]
     if a.deployment_text != b.deployment_text:
         differing.append("the deployment")
     if a.files != b.files:
@@ -145,10 +146,6 @@ def _about(a: About, b: About) -> tuple[str, ...]:
     if a.end != b.end:
         differing.append("how they ended")
     return tuple(differing)
-
-
-def _differs(a: About, b: About, key: str) -> bool:
-    return a.metadata.get(key) != b.metadata.get(key)
 
 
 class _Comparison:

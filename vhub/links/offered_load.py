@@ -92,7 +92,12 @@ def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str
         for channel, size in _sizes(deployment, flow):
             if size > limit:
                 found.setdefault(flow.key, {})[channel] = size
-    return {key: _warning(channels, limits[key]) for key, channels in found.items()}
+    texts = {}
+    for key, channels in found.items():
+        named = ", ".join(f"{channel} ({size} B)" for channel, size in sorted(channels.items()))
+        what = f"all packets longer than the mtu of {limits[key]} B are dropped: {named}"
+        texts[key] = f"{what}; fewer numbers or a greater mtu help"
+    return texts
 
 
 def warnings_of(deployment: Deployment) -> list[str]:
@@ -118,8 +123,3 @@ def _sizes(deployment: Deployment, flow: Flow) -> Iterator[tuple[str, int]]:
             size = payload_bytes(component, settings, counts)
             if size is not None:
                 yield f"{name} {channel}", size
-
-
-def _warning(channels: dict[str, int], limit: int) -> str:
-    named = ", ".join(f"{channel} ({size} B)" for channel, size in sorted(channels.items()))
-    return f"all packets longer than the mtu of {limit} B are dropped: {named}; fewer numbers or a greater mtu help"

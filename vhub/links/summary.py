@@ -425,7 +425,7 @@ def _queue_ns(settings: Radio, carried: Sequence[Throughput]) -> int | None:
 
 
 def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
-    settings = use.settings
+    settings, has_queue = use.settings, "queue" in use.settings.model_fields_set
     if summary.loss > 0.5:
         yield f"more than half of all packets is lost: {100.0 * summary.loss:.1f} %"
     if settings.ttl_ns is not None and summary.delay_mean_ns > settings.ttl_ns:
@@ -444,14 +444,10 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
             yield f"{key} {what}"
     if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
         yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
-    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):
+    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and has_queue:
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
         yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
-
-
-def _has_queue(settings: Radio) -> bool:
-    return "queue" in settings.model_fields_set
 
 
 def _capacity_hz(summary: LinkSummary) -> float | None:
