@@ -36,7 +36,7 @@ def check(
     """
     from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan
-    from foosim.vhub.links.packet_sizes import warnings_of
+    from foosim.vhub.links.offered_load import warnings_of
 
     plan = make_plan(options)
     check_players_here(plan)

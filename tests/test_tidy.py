@@ -167,7 +167,6 @@ SHELLS = {
     "vhub/recording/recovery.py",
     "vhub/recording/split.py",
     "vhub/recording/writer.py",
-    "vhub/recording/disk_progress.py",
     "capture/mcap/earlier_crc.py",
     "capture/mcap/scan.py",
     "capture/state_at.py",

@@ -18,8 +18,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from foosim.common.errors import BadValue, Refused, UnknownName
-from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name, quoted
 from foosim.world.forms.failures import failure_of, in_library
 from foosim.world.forms.forms import (
     NO_SETTINGS,
