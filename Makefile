@@ -55,7 +55,7 @@ machines: environment
 # Compiling takes as long as some hundred seeds: it pays for more.
 MANY := $(shell [ $(SEEDS) -ge 1000 ] && echo many)
 swarm: $(if $(MANY),compiled,environment)
-	@.venv$(if $(MANY),-compiled)/bin/foosim rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
+	@.venv$(if $(MANY),-compiled)/bin/python -m tests.swarm deploy/table.yaml --seeds $(SEEDS) $(ARGS)
 
 faults: environment
 	@$(PYTHON) -m tests.faults.campaign --count $(or $(N),20) $(ARGS)

@@ -19,12 +19,10 @@ import numpy as np
 
 from foosim.capture.foxglove import LOG, POSES, VIEW_TYPES
 from foosim.capture.foxglove_reader import read_poses
-from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.reader import DECODERS, About, Scan, deployment_of
-from foosim.capture.rows import ROW_TYPES, TICK, FrameRow, Row
-from foosim.common.errors import BadValue, show
-from foosim.common.names import nearest_name
+from foosim.capture.reader import DECODERS, About, Scan, deployment_of, row_of
+from foosim.capture.rows import ROW_TYPES, TICK, FrameRow
+from foosim.common.errors import no_such
 
 WALL: Final = "wall_"
 LOG_TIME, SEQUENCE = "log_time", "sequence"
@@ -95,9 +93,8 @@ def check_ignored(ignored: Iterable[str]) -> tuple[frozenset[str], frozenset[str
     for name in ignored:
         known = topics if name.startswith("/") else fields
         if name not in known:
-            nearest = nearest_name(name, known)
             what = "channel" if name.startswith("/") else "field of a row"
-            raise BadValue(f"--ignore: no {what}", name, None if nearest is None else show(nearest))
+            raise no_such(f"--ignore: no {what}", name, known)
     names = frozenset(ignored)
     return names - topics, (names & topics) | {LOG}
 
@@ -138,7 +135,8 @@ def _closings(scan: Scan) -> Iterator[list[Message]]:
 
 def _about(a: About, b: About) -> tuple[str, ...]:
     """Return the names of metadata and files in which two captures differ."""
-    differing = [f"metadata {key}" for key in sorted({*a.metadata, *b.metadata}) if _differs(a, b, key)]
+    keys = sorted({*a.metadata, *b.metadata})
+    differing = [f"metadata {key}" for key in keys if a.metadata.get(key) != b.metadata.get(key)]
     if a.deployment_text != b.deployment_text:
         differing.append("the deployment")
     if a.files != b.files:
@@ -148,10 +146,6 @@ def _about(a: About, b: About) -> tuple[str, ...]:
     if a.end != b.end:
         differing.append("how they ended")
     return tuple(differing)
-
-
-def _differs(a: About, b: About, key: str) -> bool:
-    return a.metadata.get(key) != b.metadata.get(key)
 
 
 class _Comparison:
@@ -217,7 +211,9 @@ def _differ_in_walls(one: Message, other: Message) -> bool:
     unwalled = _UNWALLED.get(one.topic)
     if not unwalled:
         return False
-    return bool(msgspec.structs.replace(_row(one), **unwalled) == msgspec.structs.replace(_row(other), **unwalled))
+    rows = (row_of(DECODERS[message.topic], message) for message in (one, other))
+    a, b = (msgspec.structs.replace(row, **unwalled) for row in rows)
+    return bool(a == b)
 
 
 _UNWALLED: Final = {
@@ -227,24 +223,14 @@ _UNWALLED: Final = {
 """What a topic's rows have in place of those fields."""
 
 
-def _row(message: Message) -> Row:
-    try:
-        row: Row = DECODERS[message.topic].decode(message.data)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise CaptureError(f"{message.topic} at {message.log_ns} ns: {error}") from None
-    return row
-
-
 def _content(message: Message) -> Any:
     """Return a message as plain values by name."""
     if message.topic == POSES:
         poses = read_poses(message.data)
         return {pose.link: {"position": [*pose.position], "orientation": [*pose.orientation]} for pose in poses}
-    if message.topic in VIEW_TYPES:
+    if message.topic in VIEW_TYPES or message.topic not in DECODERS:
         return {"content": message.data.hex()}
-    if message.topic not in DECODERS:
-        return {"content": message.data.hex()}
-    row = _row(message)
+    row = row_of(DECODERS[message.topic], message)
     content = _plain(row)
     if isinstance(row, FrameRow) and len(row.values) % 8 == 0:
         content["values"] = np.frombuffer(row.values, dtype="<f8").tolist()

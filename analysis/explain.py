@@ -7,16 +7,22 @@ they have to agree with the row's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, Final
+from functools import partial
+from itertools import takewhile
+from typing import Any, Final, Literal
 
-from foosim.analysis.explain_stages import STAGE_NAMES, Evidence, Stages
 from foosim.capture.reader import CaptureData, TickMark
-from foosim.capture.rows import CLIENTS, PACKETS, TICK, ClientRow, PacketRow, TickRow
-from foosim.common.errors import BadValue
-from foosim.common.format import EXACT, time_text
-from foosim.common.names import nearest_name
+from foosim.capture.rows import CLIENTS, PACKETS, TICK, PacketRow, TickRow
+from foosim.common.errors import BadValue, no_such
+from foosim.common.keyed_random import Slot
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.admission import Admit
+from foosim.vhub.stages.policy import EXPIRED
+from foosim.vhub.stages.told import Evidence, Seen, Told, exact
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.world.frame import Frame
 
@@ -52,7 +58,7 @@ class Step:
     """One stage: whether it is on the link, let the packet pass, dropped it, or was not reached; what it looked at."""
 
     stage: str
-    outcome: str
+    outcome: Literal["passed", "dropped", "not on this link", "not reached"]
     text: str
     facts: dict[str, Any] = field(default_factory=dict)
 
@@ -69,9 +75,6 @@ class Explained:
     agrees: bool
 
 
-PASSED, DROPPED, ABSENT, UNREACHED = "passed", "dropped", "not on this link", "not reached"
-
-
 def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
     """Return the row of a packet; raises BadValue, with those that there are, when there is no such one."""
     found: dict[tuple[str, int], PacketRow] = {}
@@ -82,9 +85,7 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
         if (row.source, row.sequence) == (which.source, which.sequence):
             found[row.destination, row.copy] = row
     if which.source not in sources:
-        nearest = nearest_name(which.source, sources)
-        hint = None if nearest is None else repr(nearest)
-        raise BadValue(f"{capture.path}: no packet from this source", which.source, hint)
+        raise no_such(f"{capture.path}: no packet from this source", which.source, sources)
     if not found:
         raise BadValue(f"{capture.path}: {which.source} sent no packet of this number", which.sequence)
     chosen = {key: row for key, row in found.items() if key[0] == which.destination or not which.destination}
@@ -99,40 +100,68 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
 
 def explain_packet(capture: CaptureData, which: PacketName) -> Explained:
     """Return what became of a captured packet. Raises BadValue for one that is not there, CaptureError."""
-    return explain_row(_Captured(capture), find_packet(capture, which))
+    return explain_row(evidence_of(capture), find_packet(capture, which))
+
+
+def evidence_of(capture: CaptureData) -> Evidence:
+    """Return what a capture has beside the row of a packet."""
+
+    def frame(tick: int) -> Frame | None:
+        frames = takewhile(lambda frame: frame.tick <= tick, capture.each_frame())
+        return next(iter(deque(frames, maxlen=1)), None)
+
+    asked = [event for row in capture.rows(TICK) if isinstance(row, TickRow) for event in network_events(row)]
+    clients = partial(capture.rows, CLIENTS)
+    return Evidence(capture.deployment, capture.about.versions, asked, frame, clients)
 
 
 def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
     """Return the explanation of a packet's fate, by its row and its run. Raises CaptureError."""
-    return _told(Stages(evidence, row))
+    seen, dropped_by, ended = _seen(evidence, row), _dropped_by(row), False
+    steps = []
+    for name, make, _ in STAGES:
+        # A body's link is made anew when it goes out of service; here it is the one that it had in service.
+        stage = make(seen.setup) or (Admit(seen.setup) if name == dropped_by == "admission" else None)
+        if stage is None:
+            steps.append(Step(name, "not on this link", "nothing to do on this link"))
+        elif ended:
+            steps.append(Step(name, "not reached", "not reached"))
+        else:
+            told = Told()
+            stage.explain(seen, told)
+            is_drop = name == dropped_by
+            text = f"{told.text}: {row.cause}" if is_drop else told.text
+            steps.append(Step(name, "dropped" if is_drop else "passed", text, told.facts))
+            ended = is_drop and row.arrival_tick < 0
+    words = seen.flight.words
+    drawn = ((Slot.LOSS, row.loss_word), (Slot.JITTER, row.jitter_word), (Slot.ERROR, row.error_word))
+    agrees = all(not word or word == f"{words[slot]:016x}" for slot, word in drawn)
+    verdict = _verdict(row, dropped_by) + ("" if agrees else "; its draws are NOT those of the address in its row")
+    return Explained(_head(seen), tuple(steps), verdict, row.fate, row.cause, agrees)
 
 
-class _Captured:
-    """What a capture has beside the row of a packet."""
+def _dropped_by(row: PacketRow) -> str:
+    """Return the stage that has dropped a packet; empty for none."""
+    if row.fate != "dropped":
+        return ""
+    names = [name for name, _, causes in STAGES if row.cause in causes] or ["receiver"]
+    is_first = row.arrival_tick >= 0 if row.cause == EXPIRED else row.decided_by.collision == "contention"
+    return names[0 if is_first else -1]
 
-    def __init__(self, capture: CaptureData) -> None:
-        self.deployment = capture.deployment
-        self.versions = capture.about.versions
-        self._capture = capture
 
-    def asked(self, until: int) -> Iterator[tuple[int, str]]:
-        for row in self._capture.rows(TICK):
-            assert isinstance(row, TickRow)
-            if row.tick <= until:
-                yield from network_events(row)
-
-    def frame(self, tick: int) -> Frame | None:
-        found = None
-        for frame in self._capture.each_frame():
-            if frame.tick > tick:
-                break
-            found = frame
-        return found
-
-    def clients(self) -> Iterator[ClientRow]:
-        for row in self._capture.rows(CLIENTS):
-            assert isinstance(row, ClientRow)
-            yield row
+def _seen(evidence: Evidence, row: PacketRow) -> Seen:
+    """Return a packet with its link at its time of sending, and all that was known of events when it arrived."""
+    tick_ns = evidence.deployment.tick_ns
+    fabric, tick = Fabric(evidence.deployment), row.sent_ns // tick_ns
+    for at, event in evidence.asked:
+        if at <= max(tick, row.arrival_tick):
+            fabric.take(at, at * tick_ns, event)
+    setup = fabric.link(row.source, row.destination, row.channel).setup_at(row.sent_ns)
+    what = row.sequence, row.sent_ns, row.stamp_ns, row.payload, row.published, row.copy
+    flight = Flight(row.source, row.destination, row.channel, *what)
+    flight.draw = setup.draws.number(row.sequence, tick, row.count)
+    flight.words = setup.words(flight, 0)
+    return Seen(row, flight, setup, fabric.timeline, evidence)
 
 
 def network_events(row: TickMark | TickRow) -> list[tuple[int, str]]:
@@ -140,28 +169,9 @@ def network_events(row: TickMark | TickRow) -> list[tuple[int, str]]:
     return [(row.tick, edit.event) for edit in row.edits if edit.kind == "network"]
 
 
-def _told(stages: Stages) -> Explained:
-    row, ended = stages.row, False
-    steps = []
-    at_sending = row.arrival_tick < 0
-    for name in STAGE_NAMES:
-        if not stages.has(name):
-            steps.append(Step(name, ABSENT, "nothing to do on this link"))
-            continue
-        if ended:
-            steps.append(Step(name, UNREACHED, "not reached"))
-            continue
-        text, facts = stages.tell(name)
-        is_drop = name == stages.dropped_by
-        text += f": {row.cause}" if is_drop else ""
-        steps.append(Step(name, DROPPED if is_drop else PASSED, text, facts))
-        ended = is_drop and at_sending
-    return Explained(_head(stages), tuple(steps), _verdict(stages), row.fate, row.cause, stages.agrees)
-
-
-def _head(stages: Stages) -> str:
-    row = stages.row
-    is_robot = row.source in stages.evidence.deployment.robots
+def _head(seen: Seen) -> str:
+    row = seen.row
+    is_robot = row.source in seen.evidence.deployment.robots
     number = f"tick {row.sequence >> OUTBOX_SHIFT}, place {row.sequence & 0xFFFF}" if is_robot else "its own count"
     number += f", count {row.count} on its channel" if is_robot else ""
     via = f" via {row.radio}" if row.radio and row.radio != row.rule else ""
@@ -169,23 +179,15 @@ def _head(stages: Stages) -> str:
     how = "published" if row.published else "sent"
     return (
         f"{row.source} to {row.destination} on {row.channel}: number {row.sequence} ({number}){copy}, "
-        f"{row.size} B, {how} at {_time(row.sent_ns)} (tick {stages.tick}); rule {row.rule}{via}, "
-        f"medium {stages.settings.medium}"
+        f"{row.size} B, {how} at {exact(row.sent_ns)} (tick {seen.tick}); rule {row.rule}{via}, "
+        f"medium {seen.settings.medium}"
     )
 
 
-def _verdict(stages: Stages) -> str:
-    row = stages.row
+def _verdict(row: PacketRow, dropped_by: str) -> str:
     if row.fate == "dropped":
         when = "at sending" if row.arrival_tick < 0 else f"at arrival, tick {row.arrival_tick}"
-        text = f"dropped {when}: {row.cause} ({stages.dropped_by})"
-    elif row.fate == "in_flight":
-        text = f"in flight when the run ended: due {_time(row.due_ns)}, tick {row.arrival_tick}"
-    else:
-        later_ns = row.due_ns - row.sent_ns
-        text = f"delivered at tick {row.arrival_tick}: due {_time(later_ns)} after it was sent"
-    return text if stages.agrees else f"{text}; its draws are NOT those of the address in its row"
-
-
-def _time(ns: int) -> str:
-    return time_text(ns, EXACT)
+        return f"dropped {when}: {row.cause} ({dropped_by})"
+    if row.fate == "in_flight":
+        return f"in flight when the run ended: due {exact(row.due_ns)}, tick {row.arrival_tick}"
+    return f"delivered at tick {row.arrival_tick}: due {exact(row.due_ns - row.sent_ns)} after it was sent"

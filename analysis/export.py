@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol, TextIO
+from typing import Any, Final, Literal, TextIO
 
 from foosim.analysis.new_file import check_name, new_file
 from foosim.analysis.tables import Column, Kind, Table, table_of
@@ -38,14 +38,6 @@ class Exported:
     path: Path
     columns: tuple[Column, ...]
     rows: int
-
-
-class Sink(Protocol):
-    """Takes the rows of a table, in order."""
-
-    def write(self, rows: list[tuple[Any, ...]]) -> None: ...
-
-    def close(self) -> None: ...
 
 
 def export_capture(path: Path, what: str, out: Path, form: Format | None = None) -> Exported:
@@ -86,7 +78,7 @@ def export_capture(path: Path, what: str, out: Path, form: Format | None = None)
 
 
 @contextmanager
-def _sink(table: Table, out: Path, form: Format) -> Iterator[Sink]:
+def _sink(table: Table, out: Path, form: Format) -> Iterator[CsvSink | ParquetSink]:
     """Open what takes the rows; a file gets its name when it is whole."""
     if out == STANDARD_OUTPUT:
         yield CsvSink(sys.stdout, table.columns)
@@ -94,7 +86,7 @@ def _sink(table: Table, out: Path, form: Format) -> Iterator[Sink]:
         return
     with new_file(out) as part:
         if form == "parquet":
-            sink: Sink = ParquetSink(part, table)
+            sink: CsvSink | ParquetSink = ParquetSink(part, table)
         else:
             sink = CsvSink(part.open("w", encoding="utf-8", newline=""), table.columns)
         try:

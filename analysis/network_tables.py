@@ -17,11 +17,11 @@ from foosim.vhub.links.summary_text import burst_text, delay_text, loss_text
 
 def summary_tables(summaries: Sequence[LinkSummary]) -> list[Table]:
     """Return tables for a terminal: what happens to packets, how media carry them, how far radios reach."""
-    losses = Table(title="links", title_justify="left", box=None, pad_edge=False)
-    for column in ("rule", "medium", "links in use", "mean loss", "bursts", "delay beside the medium"):
-        losses.add_column(column, justify="right" if column == "links in use" else "left")
-    media = _table("media", "rule", "rate", "bytes", "airtime", "1 station", f"{MANY} stations", "full queue")
-    reach = _table("radios", "rule", "range in sight", "range behind walls", f"packets of {SMALL_BYTES} B an hour")
+    losses = _table("links", ("rule", "medium"), ("links in use",), ("mean loss", "bursts", "delay beside the medium"))
+    stations = "1 station", f"{MANY} stations"
+    media = _table("media", ("rule",), ("rate", "bytes", "airtime", *stations, "full queue"))
+    ranges = "range in sight", "range behind walls"
+    reach = _table("radios", ("rule",), (*ranges, f"packets of {SMALL_BYTES} B an hour"))
     for summary in summaries:
         links = "?" if summary.links is None else f"{summary.used} of {summary.links}"
         losses.add_row(
@@ -44,11 +44,11 @@ def summary_tables(summaries: Sequence[LinkSummary]) -> list[Table]:
     return [table for table in (losses, media, reach) if table.row_count]
 
 
-def _table(title: str, first: str, *columns: str) -> Table:
+def _table(title: str, texts: tuple[str, ...], numbers: Sequence[str], more: Sequence[str] = ()) -> Table:
+    """Return an empty table with columns of texts, of numbers, and of `more` texts; a single text is not wrapped."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column(first, no_wrap=True)
-    for column in columns:
-        table.add_column(column, justify="right")
+    for column in (*texts, *numbers, *more):
+        table.add_column(column, justify="right" if column in numbers else "left", no_wrap=(column,) == texts)
     return table
 
 
@@ -78,12 +78,8 @@ def age_text(age: dict[str, Any]) -> str:
 
 def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
     """Return the links of `foosim net top` as a table."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for column in ("from", "to", "rule"):
-        table.add_column(column)
-    for column in ("offered/s", "offered", "delivered", "dropped", "mean delay", "queue", "age at use"):
-        table.add_column(column, justify="right")
-    table.add_column("causes")
+    counts = "offered/s", "offered", "delivered", "dropped", "mean delay", "queue", "age at use"
+    table = _table(title, ("from", "to", "rule"), counts, ("causes",))
     for link in links:
         table.add_row(
             link["from"],

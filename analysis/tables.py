@@ -19,12 +19,11 @@ from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.format import Message
 from foosim.capture.rows import PACKETS, ROW_TYPES, PacketRow, Row
-from foosim.common.errors import BadValue, Malformed, UnknownName, show
+from foosim.common.errors import Malformed, UnknownName, no_such
 from foosim.common.json_text import encode_json
-from foosim.common.names import nearest_name
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import PayloadCodec, as_mapping
+from foosim.world.forms.payloads import PayloadCodec, as_mapping, plain_type
 from foosim.world.forms.per_field import codec_of
 
 Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
@@ -93,9 +92,7 @@ def table_names() -> list[str]:
 def table_of(name: str, deployment: Deployment) -> Table:
     """Return a table by name; raises BadValue."""
     if name not in table_names():
-        nearest = nearest_name(name, table_names())
-        what = f"--what: not one of {', '.join(table_names())}"
-        raise BadValue(what, name, None if nearest is None else show(nearest))
+        raise no_such(f"--what: not one of {', '.join(table_names())}", name, table_names())
     if name == POSES_TABLE:
         return Table(name, POSES, _POSE_COLUMNS, _pose_rows)
     if name == COMMANDS_TABLE:
@@ -122,15 +119,9 @@ def _columns(kind: type[Row]) -> tuple[Column, ...]:
     info = inspect.type_info(kind)
     assert isinstance(info, inspect.StructType)
     return tuple(
-        Column(field.name, _KINDS.get(type(_plain(field.type)), "json"), unit_of(field.name)) for field in info.fields
+        Column(field.name, _KINDS.get(type(plain_type(field.type)), "json"), unit_of(field.name))
+        for field in info.fields
     )
-
-
-def _plain(kind: inspect.Type) -> inspect.Type:
-    """Return a type without its annotations."""
-    while isinstance(kind, inspect.Metadata):
-        kind = kind.type
-    return kind
 
 
 def _values(row: Row, json: Iterable[int]) -> list[Any]:

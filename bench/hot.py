@@ -28,10 +28,10 @@ from bench.runs import ROOT, TABLE
 from foosim.capture.reader import open_capture
 from foosim.protocol.fingerprint import is_compiled
 from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings
 from foosim.replay.what_if import what_if
 from foosim.world.frame import Frame
+from tests.swarm.campaign import fly
 
 PYPROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES: Final = tuple(PYPROJECT["tool"]["setuptools"]["package-dir"].values())

@@ -25,7 +25,7 @@ import yaml
 from bench.runs import ROOT, TABLE
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.runtime.roles.loop import GC_THRESHOLDS
+from foosim.runtime import GC_THRESHOLDS
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row

@@ -12,6 +12,7 @@ import re
 import struct
 from array import array
 from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -76,18 +77,24 @@ def first_there(path: Path) -> Path:
     return next(iter(parts_at(path).values()), path)
 
 
-def head_of(path: Path) -> dict[str, str]:
-    """Return the metadata at a file's beginning; empty without it. Raises CaptureError."""
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[BinaryIO, int]]:
+    """Give a file to read, and its size in bytes. Raises CaptureError where it cannot be read."""
     try:
         with path.open("rb") as stream:
-            size = path.stat().st_size
-            for content in McapFile(stream, size, str(path)).contents() if size >= len(MAGIC) else ():
-                if isinstance(content, records.Metadata) and content.name == METADATA:
-                    return content.metadata
-                if isinstance(content, Message):
-                    break
+            yield stream, path.stat().st_size
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+
+
+def head_of(path: Path) -> dict[str, str]:
+    """Return the metadata at a file's beginning; empty without it. Raises CaptureError."""
+    with opened(path) as (stream, size):
+        for content in McapFile(stream, size, str(path)).contents() if size >= len(MAGIC) else ():
+            if isinstance(content, records.Metadata) and content.name == METADATA:
+                return content.metadata
+            if isinstance(content, Message):
+                break
     return {}
 
 
@@ -138,8 +145,7 @@ def files_from(path: Path) -> list[Path]:
 def end_of(path: Path) -> dict[str, str] | None:
     """Return the metadata at a file's end, by its summary; None for an unfinished file. Raises CaptureError."""
     try:
-        with path.open("rb") as stream:
-            size = path.stat().st_size
+        with opened(path) as (stream, size):
             footer = size - FOOTER.size
             stream.seek(max(0, footer))
             tail = stream.read(FOOTER.size)
@@ -152,8 +158,6 @@ def end_of(path: Path) -> dict[str, str] | None:
             summary = stream.read(footer - start) if start else b""
             compare("all of it", crc32(tail[:-_BEHIND_FOOTER], crc32(summary)), told)
             return _end_in(stream, summary, size)
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
     except (EndOfFile, struct.error, ValueError) as error:
         raise Damaged(f"{path}: a damaged summary, {error}") from None
 
@@ -239,18 +243,14 @@ class Joined:
             yield end
 
     def _read(self, path: Path) -> Iterator[Content]:
-        try:
-            with path.open("rb") as stream:
-                is_behind = self._first is not None
-                size = path.stat().st_size
-                file = McapFile(stream, size, str(path), self._since_ns, self._topics)
-                file.repeats = is_behind
-                file.chunk_starts = self.chunk_starts
-                self._first = self._first or file
-                yield from file.contents()
-                if is_behind and file.chunk_starts and not file.is_checked:
-                    raise CaptureError(f"{path}: it lacks its metadata {CHECKS!r}")
-        except OSError as error:
-            raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+        with opened(path) as (stream, size):
+            is_behind = self._first is not None
+            file = McapFile(stream, size, str(path), self._since_ns, self._topics)
+            file.repeats = is_behind
+            file.chunk_starts = self.chunk_starts
+            self._first = self._first or file
+            yield from file.contents()
+            if is_behind and file.chunk_starts and not file.is_checked:
+                raise CaptureError(f"{path}: it lacks its metadata {CHECKS!r}")
         self.finished, self.unfinished_bytes = file.finished, file.unfinished_bytes
         self.end_ns = max(self.end_ns, file.end_ns)

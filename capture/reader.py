@@ -106,6 +106,14 @@ TICK_MARKS: Final = msgspec.json.Decoder(TickMark)
 FRAME_MARKS: Final = msgspec.json.Decoder(FrameMark)
 
 
+def row_of(decoder: msgspec.json.Decoder[Any], message: Message, place: str = "") -> Any:
+    """Return the row of a message. Raises CaptureError, whose text begins with `place`, for one that is damaged."""
+    try:
+        return decoder.decode(message.data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise CaptureError(f"{place}{message.topic} at {message.log_ns} ns: {error}") from None
+
+
 @dataclass(frozen=True, slots=True)
 class CapturedTick:
     """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
@@ -179,11 +187,8 @@ class Scan:
             yield message.topic, self.decode(DECODERS[message.topic], message)
 
     def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
-        """Return the row of a message."""
-        try:
-            return decoder.decode(message.data)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
+        """Return the row of a message. Raises CaptureError."""
+        return row_of(decoder, message, f"{self._path}: ")
 
     def _check(self, file: Joined) -> None:
         """Refuse a file that is no capture, or one of another format, before its rows are read."""

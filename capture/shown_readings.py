@@ -18,7 +18,6 @@ from foosim.capture.rows import json_schema
 from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
-from foosim.world.assembly.used_forms import OWN
 from foosim.world.assembly.world import build_scene
 from foosim.world.components.mounted import link_index
 from foosim.world.forms.payloads import PayloadCodec
@@ -112,7 +111,7 @@ def _shown(deployment: Deployment) -> dict[tuple[str, str], str]:
     for robot, its in sorted(deployment.robots.items()):
         for channel, settings in sorted(its.sensors.items()):
             sensor = find_component("sensor", settings.kind)
-            if sensor.shown_as or not sensor.module.startswith(OWN):
+            if sensor.shown_as or not sensor.is_own:
                 found[robot, channel] = sensor.shown_as
     return found
 

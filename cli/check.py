@@ -30,12 +30,13 @@ def check(
 ) -> None:
     """Check a deployment file, with settings if there are any.
 
-    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. When there are none, the
-    classes of the players on this machine are imported.
+    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. What is wrong between fields
+    is found when each field is right by itself. When there are no problems, the classes of the players on this machine
+    are imported.
     """
     from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan
-    from foosim.vhub.links.packet_sizes import warnings_of
+    from foosim.vhub.links.offered_load import warnings_of
 
     plan = make_plan(options)
     check_players_here(plan)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.common.errors import UnknownName
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ROBOTS, Component, Form, Model, References
 from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.registration import VALUES
 from foosim.world.forms.registry import FORMS
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
 
-CARRIES: Final = {"sensor": "reading", "actuator": "command"}
-"""What the values of a form are called."""
 OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
     "motion": ("writes",),
@@ -45,12 +44,7 @@ def chosen(form: str | None, name: str | None) -> list[Form]:
     forms = FORMS if form is None else (form,)
     if name is None:
         return [registry.find(one, kind) for one in forms for kind in registry.names(one)]
-    try:
-        return [registry.find(one, name) for one in forms]
-    except UnknownName:
-        raise
-    except Refused as error:
-        raise BadValue(error.what, name) from None
+    return [registry.find(one, name) for one in forms]
 
 
 def as_json(component: Form) -> dict[str, Any]:
@@ -75,7 +69,7 @@ def as_json(component: Form) -> dict[str, Any]:
         }
     if isinstance(component, Component) and component.value is not None:
         fields = PayloadCodec(component.value, component.name).fields
-        about[CARRIES[component.form]] = [
+        about[VALUES[component.form]] = [
             {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
         ]
     return about
@@ -102,10 +96,10 @@ def lines(component: Form) -> Iterator[str]:
     for setting in about["settings"]:
         default = "required" if setting["default"] is None else f"default {setting['default']}"
         yield f"    {setting['key']}: {setting['value']} ({default})"
-    if component.form in CARRIES:
-        fields = about[CARRIES[component.form]]
+    if component.form in VALUES:
+        fields = about[VALUES[component.form]]
         units = [f"{field['field']}{'[]' if field['several'] else ''} {field['unit']}".rstrip() for field in fields]
-        yield f"  {CARRIES[component.form]}: {', '.join(units)}"
+        yield f"  {VALUES[component.form]}: {', '.join(units)}"
     if about["slots"]:
         yield f"  slots: {_counted(about['slots'])}"
     elif about["slots"] is None:

@@ -16,10 +16,9 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from hashlib import blake2b
 from importlib.metadata import version
 from pathlib import Path
-from typing import IO, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -29,7 +28,6 @@ from foosim.runtime.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, ch
 from foosim.runtime.command import DONE, new_app
 from foosim.runtime.run_folder import hosted_folder
 
-BLOCK_BYTES: Final = 1 << 20
 TAKE_OVER_S: Final = 10.0
 
 Run = Annotated[str, typer.Argument(help="Which run.", show_default=False)]
@@ -44,129 +42,78 @@ def run_folder(run: str) -> Path:
     return hosted_folder() / run
 
 
-class Guard:
-    """One process of a run, and the end of the connection that it depends on."""
+def guard(run: str, name: str, command: list[str]) -> int:
+    """Run a command to its end, or to that of the connection; return its exit code, 128 + N for signal N."""
+    if not is_name(name):
+        raise BadValue("not a name for a process", name)
+    folder = run_folder(run)
+    path = folder / f"{name}.guard"
+    lock = _take_over(path)
+    end, hold = os.pipe()
+    process = subprocess.Popen(
+        [script(command[0]), *command[1:]],
+        stdin=subprocess.DEVNULL,
+        cwd=folder,
+        env=child_environment(end),
+        pass_fds=(end,),
+        process_group=0,
+    )
 
-    def __init__(self, run: str, name: str) -> None:
-        if not is_name(name):
-            raise BadValue("not a name for a process", name)
-        self.folder = run_folder(run)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock_path = self.folder / f"{name}.guard"
-        self._lock = self._take_over()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._is_over = threading.Event()
+    def send(number: int) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
 
-    def _take_over(self) -> int:
-        """Be the one guard of this process: an earlier one, whose connection is gone unnoticed, is killed."""
-        deadline_s = time.monotonic() + TAKE_OVER_S
-        while True:
-            lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                earlier = os.pread(lock, 32, 0).decode("ascii", "replace").strip()
-                if time.monotonic() > deadline_s:
-                    raise Failed(f"{self._lock_path} is held by guard {earlier}, which does not end") from None
-                if earlier.isdigit():
-                    with suppress(ProcessLookupError):
-                        os.kill(int(earlier), signal.SIGKILL)  # it holds the lock, so the number is its own
-            else:
-                if self._is_there(lock):
-                    os.ftruncate(lock, 0)
-                    os.pwrite(lock, str(os.getpid()).encode(), 0)
-                    return lock
-            os.close(lock)
-            time.sleep(0.05)
-
-    def _is_there(self, lock: int) -> bool:
-        """Whether the lock is still the one in the folder: who had it before may have removed it with the folder."""
+    def end_process() -> None:
+        """End it: it has some time to do so in order."""
+        send(signal.SIGTERM)
         try:
-            return os.path.samestat(os.fstat(lock), self._lock_path.stat())
-        except FileNotFoundError:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            return False
+            process.wait(GRACE_S)
+        except subprocess.TimeoutExpired:
+            send(signal.SIGKILL)
 
-    def run(self, command: list[str]) -> int:
-        """Run the command to its end, or to that of the connection; return its exit code, 128 + N for signal N."""
-        end, hold = os.pipe()
-        self._process = subprocess.Popen(
-            [script(command[0]), *command[1:]],
-            stdin=subprocess.DEVNULL,
-            cwd=self.folder,
-            env=child_environment(end),
-            pass_fds=(end,),
-            process_group=0,
-        )
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-            signal.signal(number, lambda number, frame: self._end_soon())
-        threading.Thread(target=self._watch, name="connection", daemon=True).start()
-        code = self._process.wait()
-        self._is_over.set()
-        self._signal(signal.SIGKILL)  # whatever it has started
-        os.close(hold)
-        os.close(end)
-        self._leave()
-        return BY_SIGNAL - code if code < 0 else code
-
-    def _leave(self) -> None:
-        """Leave nothing behind but what the process wrote."""
-        self._lock_path.unlink(missing_ok=True)
-        os.close(self._lock)
-        with suppress(OSError):  # others work there, or left something
-            self.folder.rmdir()
-
-    def _watch(self) -> None:
+    def watch() -> None:
         """Wait for the end of the connection, which nobody writes to."""
         while os.read(sys.stdin.fileno(), 4096):
             pass
-        self._end()
+        end_process()
 
-    def _end_soon(self) -> None:
-        threading.Thread(target=self._end, name="end", daemon=True).start()
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda number, frame: threading.Thread(target=end_process, daemon=True).start())
+    threading.Thread(target=watch, name="connection", daemon=True).start()
+    code = process.wait()
+    send(signal.SIGKILL)  # whatever it has started
+    os.close(hold)
+    os.close(end)
+    path.unlink(missing_ok=True)
+    os.close(lock)
+    with suppress(OSError):  # others work there, or what it has written is there
+        folder.rmdir()
+    return BY_SIGNAL - code if code < 0 else code
 
-    def _end(self) -> None:
-        """End the process: it has some time to do so in order."""
-        self._signal(signal.SIGTERM)
-        if not self._is_over.wait(GRACE_S):
-            self._signal(signal.SIGKILL)
 
-    def _signal(self, number: signal.Signals) -> None:
-        assert self._process is not None
+def _take_over(path: Path) -> int:
+    """Be the one guard of a process: an earlier one, whose connection is gone unnoticed, is killed."""
+    deadline_s = time.monotonic() + TAKE_OVER_S
+    while True:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
-            os.killpg(self._process.pid, number)
-        except ProcessLookupError:
-            return
-
-
-def send(run: str, file: str) -> None:
-    """Write a capture of the run, with the files that it goes on in, to standard output.
-
-    For each a line with its number and size, its bytes, a line with their digest; at the end a line that says so.
-    """
-    from foosim.capture.parts import parts_at  # a guard of a process starts quickly
-
-    whole = run_folder(run) / file
-    out = sys.stdout.buffer
-    for number, path in (parts_at(whole) or {0: whole}).items():
-        try:
-            _send_file(number, path, out)
-        except OSError as error:
-            raise Failed(f"{path}: {error.strerror}") from None
-    out.write(b"end\n")
-    out.flush()
-
-
-def _send_file(number: int, path: Path, out: IO[bytes]) -> None:
-    digest = blake2b(digest_size=32)
-    with path.open("rb") as content:
-        left = os.fstat(content.fileno()).st_size
-        out.write(f"{number} {left}\n".encode())
-        while left > 0 and (block := content.read(min(left, BLOCK_BYTES))):
-            left -= len(block)
-            digest.update(block)
-            out.write(block)
-    out.write(f"{digest.hexdigest()}\n".encode())
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            earlier = os.pread(lock, 32, 0).decode("ascii", "replace").strip()
+            if time.monotonic() > deadline_s:
+                raise Failed(f"{path} is held by guard {earlier}, which does not end") from None
+            if earlier.isdigit():
+                with suppress(ProcessLookupError):
+                    os.kill(int(earlier), signal.SIGKILL)  # it holds the lock, so the number is its own
+        else:
+            with suppress(FileNotFoundError):  # who had the lock before may have removed it with the folder
+                if os.path.samestat(os.fstat(lock), path.stat()):
+                    os.ftruncate(lock, 0)
+                    os.pwrite(lock, str(os.getpid()).encode(), 0)
+                    return lock
+        os.close(lock)
+        time.sleep(0.05)
 
 
 def _check_version(version_of_launcher: str) -> None:
@@ -194,7 +141,7 @@ def run_command(
 ) -> None:
     """Run a process of a run until standard input ends."""
     _check_version(version_of_launcher)
-    raise typer.Exit(Guard(run, name).run(command))
+    raise typer.Exit(guard(run, name, command))
 
 
 @app.command("examine")
@@ -209,9 +156,22 @@ def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
 
 @app.command("send")
 def send_command(run: Run, file: File) -> None:
-    """Write a capture in a run's folder to standard output, with the files that it goes on in and their digests."""
-    send(run, file)
-    raise typer.Exit(DONE)
+    """Write a capture in a run's folder to standard output: a tar file of its files, by number, with checksums."""
+    import gzip  # a guard of a process starts quickly
+    import tarfile
+
+    from foosim.capture.parts import parts_at
+
+    whole = run_folder(run) / file
+    with (
+        gzip.GzipFile(fileobj=sys.stdout.buffer, mode="wb", compresslevel=1) as packed,
+        tarfile.open(fileobj=packed, mode="w|") as sent,
+    ):
+        for number, path in (parts_at(whole) or {0: whole}).items():
+            try:
+                sent.add(path, str(number))
+            except OSError as error:
+                raise Failed(f"{path}: {error.strerror}") from None
 
 
 @app.command("forget")

@@ -22,8 +22,7 @@ from foosim.analysis.sources import parameters_of
 from foosim.capture.reader import open_capture
 from foosim.cli.control import show_answer
 from foosim.client import control
-from foosim.common.errors import BadValue
-from foosim.common.names import nearest_name
+from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
 from foosim.deployment.network.presets import PRESETS, provenance
@@ -131,10 +130,7 @@ def presets(
     such, [R] recalled from a standard that was not at hand: unverified, [J] judgement.
     """
     if name is not None and name not in PRESETS:
-        nearest = nearest_name(name, PRESETS)
-        raise BadValue(
-            f"no such preset, there are {', '.join(PRESETS)}", name, None if nearest is None else repr(nearest)
-        )
+        raise UnknownName("no such preset", name, PRESETS)
     chosen = {one: [*provenance(one), *parameters_of(one)] for one in ([name] if name is not None else PRESETS)}
     if json:
         content = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -14,10 +15,10 @@ from foosim.common.names import is_name
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.text.files import read_source_file
+from foosim.launcher import pki
+from foosim.launcher.hosts.prepare import send_files
 from foosim.launcher.hosts.ssh import Remote
-from foosim.launcher.pki import certificates
-from foosim.launcher.pki.certificates import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
-from foosim.launcher.pki.hosts import files_for, send_files
+from foosim.launcher.pki import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
 from foosim.protocol import identity
 from foosim.protocol.identity import identities_of
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
@@ -69,7 +70,7 @@ def init(
     deployment = load_deployment(read_source_file(file), str(file))
     if send and not places(deployment):
         raise BadValue("--send: the deployment places nothing on a host", deployment.world)
-    for path in certificates.provide(folder, identities_of(deployment), host or (), days, within):
+    for path in pki.provide(folder, identities_of(deployment), host or (), days, within):
         print(path)
     if send and not _is_sent(deployment, folder):
         raise typer.Exit(FAILED)
@@ -80,7 +81,8 @@ def _is_sent(deployment: Deployment, folder: Path) -> bool:
     failures = []
     for name in sorted(set(places(deployment).values())):
         try:
-            print(*send_files(Remote(name, deployment.hosts[name]), folder, files_for(deployment, name)), sep="\n")
+            contents = pki.files_for(deployment, name, folder)
+            print(*send_files(Remote(name, deployment.hosts[name]), contents), sep="\n")
         except Refused as failure:
             failures.append(str(failure))
             print(failure, file=sys.stderr)
@@ -103,37 +105,31 @@ def client(
     for one in name:
         if not is_name(one):
             raise BadValue("not a name for a client", one)
-    for path in certificates.issue(folder, [identity.client(one) for one in name], days=days):
+    for path in pki.issue(folder, [identity.client(one) for one in name], days=days):
         print(path)
 
 
 @app.command()
 def show(folder: Folder, json: JsonOption = False) -> None:
     """Show whose certificates a folder has, until when, and what is wrong with them."""
-    shown = certificates.show_folder(folder)
+    shown = pki.show_folder(folder)
     if json:
-        print_json({"certificates": [_as_json(its) for its in shown]})
+        print_json(
+            {
+                "certificates": [
+                    {**asdict(its), "begins": its.begins.isoformat(), "ends": its.ends.isoformat()} for its in shown
+                ]
+            }
+        )
     else:
         for its in shown:
             print(_line(its))
     raise typer.Exit(FAILED if any(its.problem for its in shown) else DONE)
 
 
-def _as_json(its: Shown) -> dict[str, object]:
-    return {
-        "identity": its.identity,
-        "path": its.path,
-        "begins": its.begins.isoformat(),
-        "ends": its.ends.isoformat(),
-        "hosts": list(its.hosts),
-        "fingerprint": its.fingerprint,
-        "problem": its.problem,
-    }
-
-
 def _line(its: Shown) -> str:
     if its.problem:
         return f"{its.identity:24} {its.problem}"
-    days = its.days_left(wall_clock.now_utc())
+    days = (its.ends - wall_clock.now_utc()).total_seconds() / 86_400
     hosts = ", ".join(its.hosts) or "issues certificates"
     return f"{its.identity:24} until {its.ends:%Y-%m-%d} ({days:.0f} days), {hosts}"

@@ -6,10 +6,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, redirect_stdout
-from dataclasses import asdict, replace
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,18 +23,13 @@ from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue
 from foosim.common.json_text import decode_json
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.text.files import read_source_file
+from foosim.deployment.loader import load_deployment
 from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.interrupts import Interrupts
-from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.swarm.campaign import Flown
-from foosim.rehearsal.swarm.faults import TICKS
-from foosim.rehearsal.swarm.workers import fly_seeds
 from foosim.rehearsal.system import Settings
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.vhub.links.summary import summaries
@@ -49,11 +43,6 @@ app = new_app()
 def rehearse_command(
     options: RunOptions,
     nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN, each with its own engine.")] = 1,
-    swarm: Annotated[bool, typer.Option("--swarm", help="Inject random faults, drawn from --seed.")] = False,
-    seeds: Annotated[int, typer.Option(help="With --swarm: the number of seeds, from --seed (or 1) on.", min=1)] = 1,
-    jobs: Annotated[
-        int | None, typer.Option(help="With --swarm: number of processes; by default that of the processors.", min=1)
-    ] = None,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -66,18 +55,9 @@ def rehearse_command(
     run waited for the longest. Ctrl-C ends the rehearsal in order, a second Ctrl-C at once; the last line has the last
     tick and the capture's path. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
-    With --swarm the seed draws 3 to 5 nodes, their clocks, delay, loss and duplication of messages, and 8 to 20 faults
-    of at least three kinds in 208 ticks, on the pure engine if it has the bodies; --for simulates longer, with more
-    faults. Faults are: killed, interrupted, paused, slow and stopped processes; partitions in one or both
-    directions and clogs; jumps of memory and clocks; old messages; lost players (every eighth seed); moved robots;
-    added, removed and pushed bodies; pauses of the run. Every record, message and committed tick is checked against
-    the laws. At the end all faults heal, and every process has to take part again.
-
     Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its disk is full, 130
     second Ctrl-C.
     """
-    if swarm:
-        raise typer.Exit(_swarm(options, seeds, jobs or os.cpu_count() or 1, json))
     if options.duration is None:
         raise BadValue("--for is missing: the simulated time, e.g. --for 20s")
     if not 1 <= nodes <= limits.NODES_MAX:
@@ -155,45 +135,6 @@ def _told(result: dict[str, Any]) -> str:
         + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
         + (f"\ncapture {result['capture']}" if result["capture"] else "")
     )
-
-
-def _swarm(options: RunOptions, count: int, jobs: int, json: bool) -> int:
-    """Rehearse under the faults of some seeds; return the exit code."""
-    file, duration, first = options.file, options.duration, 1 if options.seed is None else options.seed
-    text, files = pin_assets(apply_sets(read_source_file(file), str(file), ()), str(file), file.parent)
-    ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration)).ticks
-    if ticks < TICKS:
-        raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
-    longer = "" if duration is None else f" --for {duration}"
-    flown: list[Flown] = []
-    told_s = time.monotonic()
-    seeds = range(first, first + count)
-    with closing(fly_seeds(text, str(file), seeds, ticks, min(jobs, count), tuple(files.items()))) as flights:
-        try:
-            for flight in flights:
-                flown.append(flight)
-                if flight.broken:
-                    typer.echo(f"seed {flight.seed}: {flight.broken}", err=True)
-                    typer.echo(f"  foosim rehearse {file} --swarm{longer} --seed {flight.seed}", err=True)
-                    for fault in flight.faults:
-                        typer.echo(f"  {fault}", err=True)
-                if time.monotonic() >= told_s + LINE_S:
-                    told_s = time.monotonic()
-                    _note(f"{len(flown)} of {count} seeds, {sum(bool(flight.broken) for flight in flown)} broke a law")
-        except KeyboardInterrupt:
-            _note(f"interrupted at seed {first + len(flown)}, after {len(flown)} of {count} seeds")
-            raise
-    broken = [flight.seed for flight in flown if flight.broken]
-    if json:
-        print_json({"seeds": [asdict(flight) for flight in flown], "broken": broken})
-    else:
-        faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
-        done, seen = sum(flight.ticks for flight in flown), sum(flight.seen for flight in flown)
-        typer.echo(
-            f"{count} seeds: {done} ticks, {faults} faults, {losses} nodes lost, {seen} messages and records, "
-            f"{len(broken)} seeds broke a law"
-        )
-    return FAILED if broken else DONE
 
 
 # --- for check-component ---------------------------------------------------------------------------------------------

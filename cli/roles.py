@@ -11,7 +11,7 @@ from foosim.common.addresses import check_listen
 from foosim.common.errors import BadValue
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import launched_options
-from foosim.process.roles import Roles, run_roles
+from foosim.process.roles import run_roles
 from foosim.runtime.command import PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import die_with_parent, end_with_stack
@@ -68,5 +68,6 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     if vhub_listen is not None:
         address = check_listen(vhub_listen, insecure, secured=pki is not None)
         hub = read_options(capture, no_capture, run_folder), address
-    given = tuple(node or ()), tuple(player or ())
-    raise typer.Exit(run_roles(Roles(name, supervisor, hub, *given, connect, radio, pki, progress_file)))
+    given = supervisor, hub, node or (), player or ()
+    code = run_roles(name, *given, connect=connect, radio=radio, pki=pki, progress=progress_file)
+    raise typer.Exit(code)

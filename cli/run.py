@@ -26,23 +26,20 @@ def run_supervisor(
 
     The vHub, nodes and players are started separately. The run's folder has the run file, logs and journals.
     """
-    from foosim.launcher.journal_check import supervisor_records
     from foosim.launcher.plan import make_plan
+    from foosim.launcher.resume import supervisor_records
     from foosim.runtime.process import has_launcher
-    from foosim.runtime.run_folder import create_run, open_run, run_exists
+    from foosim.runtime.run_folder import create_run, open_run, run_exists, runs_folder
     from foosim.supervisor.main import serve
 
     plan = make_plan(options)
     is_launched = has_launcher()
     if not is_launched:  # a launcher has checked, and watches the disks
-        from foosim.launcher.begin import look_for_room
-        from foosim.launcher.display import Display
-        from foosim.runtime.run_folder import runs_folder
+        from foosim.launcher.begin import check_room
 
-        look_for_room(plan, None, runs_folder(), Display(sys.stderr))
+        for warning in check_room(plan, None, runs_folder()):
+            print(warning, file=sys.stderr)
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
-    settings, records = (
-        plan.settings(folder.name, is_launched=is_launched),
-        partial(supervisor_records, folder, plan.options),
-    )
+    settings = plan.settings(folder.name, is_launched=is_launched)
+    records = partial(supervisor_records, folder, plan.options)
     raise typer.Exit(serve(settings, plan.address, plan.options.pki, folder, records, progress_file))

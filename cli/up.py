@@ -6,7 +6,8 @@ It imports what it calls once signals are noted, so that it leaves a result what
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -72,7 +73,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         from foosim.launcher.begin import begin, go_on
         from foosim.launcher.console_child import page_of
         from foosim.launcher.display import Display, unfailing_output
-        from foosim.launcher.up import Killed, Up
+        from foosim.launcher.outcome import Outcome
         from foosim.runtime.run_folder import open_run
 
         context.with_resource(unfailing_output())
@@ -88,38 +89,23 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
             begun = begin(options, capture, not no_capture, run, detached, display, page)
-        outcome = begun.run() if isinstance(begun, Up) else begun
+        outcome = begun if isinstance(begun, Outcome) else begun.run()
     except (Refused, MemoryError, KeyboardInterrupt) as error:
-        _print_unended(error, begun, resumed, run, json)
+        from foosim.launcher.outcome import Outcome, refused_result
+
+        reason = "too little memory" if isinstance(error, MemoryError) else str(error)
+        if begun is None or isinstance(begun, Outcome):
+            _print_result(refused_result(resumed, run, reason), json)
+        else:
+            _print_result(begun.unended(reason), json)
+        if isinstance(error, KeyboardInterrupt):
+            raise Failed(reason) from None  # a signal before the run began
         raise
-    except Killed as killed:
-        print(killed, file=sys.stderr)
-        _print_result(killed.result, json)
-        raise typer.Exit(INTERRUPTED) from None
+    say = partial(print, file=sys.stderr) if outcome.is_killed else display.say
     for line in outcome.lines:
-        display.say(line)
+        say(line)
     _print_result(outcome.result, json)
-    raise typer.Exit(FAILED if outcome.failed else DONE)
-
-
-class BeforeRun(Failed):
-    """A signal has ended `up` before its run began."""
-
-
-def _print_unended(
-    error: BaseException, begun: Up | Outcome | None, resumed: str | None, run: str | None, json: bool
-) -> None:
-    """Print the result of a run that an error has ended. Raises BeforeRun where that was a signal."""
-    from foosim.launcher.outcome import Outcome, refused_result
-
-    reason = "too little memory" if isinstance(error, MemoryError) else str(error)
-    if begun is None or isinstance(begun, Outcome):
-        result = refused_result(resumed, run, reason)
-    else:
-        result = begun.unended(reason)
-    _print_result(result, json)
-    if isinstance(error, KeyboardInterrupt):
-        raise BeforeRun(reason) from None
+    raise typer.Exit(INTERRUPTED if outcome.is_killed else FAILED if outcome.failed else DONE)
 
 
 def _given(context: typer.Context, but: Collection[str]) -> list[str]:
@@ -132,6 +118,6 @@ def _given(context: typer.Context, but: Collection[str]) -> list[str]:
     ]
 
 
-def _print_result(result: Mapping[str, Any], json: bool) -> None:
+def _print_result(result: dict[str, Any], json: bool) -> None:
     if json:
-        print_json(dict(result))
+        print_json(result)

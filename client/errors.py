@@ -1,4 +1,4 @@
-"""Errors of a client, whose text names the valid choices."""
+"""Errors of a client, whose text names the valid choices, and of players."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ class PacketError(Refused):
 
 class PlayerError(Failed):
     """A player that cannot be loaded, or that did something that players must not do."""
+
+
+class Unanswered(KeyboardInterrupt):
+    """Raised in a player that does not return, to end it; the text says how long it was waited for."""
 
 
 class ConnectionRefused(Refused):

@@ -1,21 +1,28 @@
-"""Finds the class that a deployment names as `module:Class`, and checks it without calling it."""
+"""Finds the class that a deployment names as `module:Class`, and checks it without calling it.
+
+A user's module may print, raise, exit, crash or hang when it is imported. What it prints goes to standard error. One
+that crashes ends this process, and so does one that hangs, at a limit: its stack is written to standard error first.
+"""
 
 from __future__ import annotations
 
+import faulthandler
 import importlib
 import inspect
-import pkgutil
 import sys
 from collections.abc import Callable, Iterable
-from importlib import import_module
-from types import ModuleType
-from typing import Any, Final
+from contextlib import redirect_stdout
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.client.errors import PlayerError
-from foosim.client.failing import Unanswered, describe, in_library, place_of
 from foosim.client.player import Player
-from foosim.common.errors import CHOICES_MAX
-from foosim.common.names import class_path_of, nearest_name
+from foosim.common.errors import BadValue
+from foosim.common.finding import Finding
+from foosim.world.forms.failures import place_of_code
+from foosim.world.forms.registry import class_at
+
+if TYPE_CHECKING:
+    from foosim.deployment.schema import Deployment
 
 MADE_WITH: Final = ("deployment", "parameters")
 CALLED_WITH: Final = ("tick", "samples")
@@ -27,7 +34,7 @@ class ClassPathError(PlayerError):
     """A class path that leads to no player: `problem` is the reason, `nearest` a path that might be meant."""
 
     def __init__(self, path: str, problem: str, nearest: str | None = None) -> None:
-        super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest!r}" if nearest else ""))
+        super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest}" if nearest else ""))
         self.problem, self.nearest = problem, nearest
 
 
@@ -40,52 +47,46 @@ def look_in(folder: str) -> None:
 
 def load_player(path: str) -> Callable[..., Any]:
     """Import the class that `module:Class` names and return it. Raises ClassPathError."""
-    module_name, colon, class_name = path.partition(":")
-    if not (module_name and colon and class_name):
-        raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
-    module = _import(path, module_name)
-    made: Any = getattr(module, class_name, None)
-    if made is None:
-        classes = sorted(name for name, value in vars(module).items() if _may_be_player(value))
-        nearest = nearest_name(class_name, classes)
-        shown = ", ".join(classes[:CHOICES_MAX]) + (", ..." if len(classes) > CHOICES_MAX else "")
-        problem = f"there is no class {class_name} in {module_name} (there are: {shown or 'none'})"
-        raise ClassPathError(path, problem, None if nearest is None else f"{module_name}:{nearest}")
-    problem = _unfit(made, class_name)
+    try:
+        made: Callable[..., Any] = class_at(path)
+    except BadValue as error:
+        raise ClassPathError(path, error.problem, error.nearest) from error.__cause__
+    problem = _unfit(made, path.partition(":")[2])
     if problem:
         raise ClassPathError(path, problem)
-    found: Callable[..., Any] = made
-    return found
+    return made
 
 
-def _import(path: str, name: str) -> ModuleType:
+def player_findings(deployment: Deployment, names: Iterable[str]) -> list[Finding]:
+    """Return the problems of these players' classes, each at its place in the deployment.
+
+    All modules together may take as long as `deadlines.start`.
+    """
+    paths = {name: deployment.players[name].class_ for name in sorted(names)}
+    faults = class_faults(paths.values(), deployment.deadlines.start_ns / 1e9)
+    return [
+        Finding(("players", name, "class"), faults[path].problem, path, faults[path].nearest)
+        for name, path in paths.items()
+        if path in faults
+    ]
+
+
+def class_faults(paths: Iterable[str], limit_s: float) -> dict[str, ClassPathError]:
+    """Return the problems of class paths, by path; valid paths are left out."""
+    found: dict[str, ClassPathError] = {}
+    if not faulthandler.is_enabled():
+        faulthandler.enable(2)
+    faulthandler.dump_traceback_later(limit_s, exit=True, file=2)
     try:
-        return import_module(name)
-    except (KeyboardInterrupt, Unanswered):
-        raise
-    except BaseException as error:  # SystemExit, too: a module may do anything
-        if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
-            raise _not_found(path, error.name) from error
-        what = f"importing {name} failed: {describe(error)}{place_of(error, name)}"
-        raise ClassPathError(path, what) from error
-
-
-def _not_found(path: str, missing: str) -> ClassPathError:
-    """Return the error for a path whose module, or a package of it, cannot be found."""
-    parent, dot, last = missing.rpartition(".")
-    if dot:
-        folders: Iterable[str] | None = getattr(sys.modules.get(parent), "__path__", None)
-        hint = "" if folders is not None else f" ({parent} is a module, not a package)"
-    else:
-        folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
-        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
-    nearest = nearest_name(last, [module.name for module in pkgutil.iter_modules(folders)] if folders else ())
-    found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
-    return ClassPathError(path, f"there is no module {missing}{hint}", found)
-
-
-def _may_be_player(value: object) -> bool:
-    return inspect.isclass(value) and hasattr(value, "act") and value is not Player
+        with redirect_stdout(sys.stderr):
+            for path in sorted(set(paths)):
+                try:
+                    load_player(path)
+                except ClassPathError as error:
+                    found[path] = error
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    return found
 
 
 def _unfit(made: Any, name: str) -> str:
@@ -93,7 +94,7 @@ def _unfit(made: Any, name: str) -> str:
     if not inspect.isclass(made):
         return f"{name} is no class, {made!r:.{SHOWN_MAX}}"
     if not issubclass(made, Player):
-        return f"{name} is no Player{_place_of_class(made)}; write: from foosim import Player, class {name}(Player):"
+        return f"{name} is no Player{place_of_code(made)}; write: from foosim import Player, class {name}(Player):"
     if inspect.isabstract(made):
         return f"{name} is abstract: none can be made of it"
     taken = _other_arguments(made, *MADE_WITH)
@@ -105,15 +106,6 @@ def _unfit(made: Any, name: str) -> str:
     elif isinstance(method, staticmethod | classmethod):
         taken = _other_arguments(made.act, *CALLED_WITH)
     return f"{name}.act cannot be called with ({', '.join(CALLED_WITH)}): it takes {taken}" if taken else ""
-
-
-def _place_of_class(made: type) -> str:
-    """Return ` (file:line: code)` of a class; empty where its source is not there."""
-    try:
-        lines, line = inspect.getsourcelines(made)
-        return f" ({inspect.getsourcefile(made)}:{line}: {lines[0].strip()})"
-    except (OSError, TypeError):
-        return ""
 
 
 def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:

@@ -16,9 +16,8 @@ import typer
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.failing import report_failure
 from foosim.client.loading import load_player, look_in
-from foosim.client.playing import PlayerLoop
+from foosim.client.playing import PlayerLoop, report_failure
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.protocol import channels, identity

@@ -6,12 +6,12 @@ The process `foosim role player` and the rehearsal run this same loop.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from traceback import format_exception
 from typing import Any, Final
 
 from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore
-from foosim.client.errors import PacketError, PlayerError
-from foosim.client.failing import Unanswered, failed
+from foosim.client.errors import PacketError, PlayerError, Unanswered
 from foosim.client.loading import load_player
 from foosim.client.packets import check_packet
 from foosim.client.player import Packet, Player, Sample, Turn
@@ -20,7 +20,7 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
-from foosim.world.forms.failures import place_of_method
+from foosim.world.forms.failures import failure_of, place_of_code
 from foosim.world.forms.payloads import PayloadCodec
 
 NS_PER_S: Final = 1_000_000_000
@@ -84,11 +84,11 @@ class Acting:
             return factory(self._deployment, self.declared.parameters)
         except Refused as error:
             raise PlayerError(f"player {self.name}: {error}") from error
-        except (KeyboardInterrupt, Unanswered):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:
             when = f"at tick {tick}" if tick >= 0 else "before its first tick"
-            raise failed(f"{self.name} failed {when}", error, _module_of(self.declared)) from error
+            raise PlayerError(f"{self.name} failed {when}: {failure_of(error, _module_of(self.declared))}") from error
 
     def act(self, tick: int) -> list[Packet]:
         """Call the player and check its packets and commands; commands are last, in the robots' name order.
@@ -98,10 +98,10 @@ class Acting:
         where = f"{self.name} failed at tick {tick}"
         try:
             turn = self.player.act(tick, self.newest.samples)
-        except (KeyboardInterrupt, Unanswered):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: the run cannot continue without the player
-            raise failed(where, error, _module_of(self.declared)) from error
+            raise PlayerError(f"{where}: {failure_of(error, _module_of(self.declared))}") from error
         if not isinstance(turn, Turn):
             turn = Turn(turn)
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
@@ -136,8 +136,15 @@ class Acting:
             try:
                 packets += [Packet(robot, *one) for one in encoder.encode(robot, command)]
             except Refused as error:
-                raise PlayerError(f"{where}: {error}{place_of_method(self.player.act)}") from error
+                raise PlayerError(f"{where}: {error}{place_of_code(self.player.act)}") from error
         return packets
+
+
+def report_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
+    """Make a player's core report why its process ends; of the player's own error, with its traceback."""
+    cause = error if isinstance(error, Unanswered) else error.__cause__
+    is_own = cause is not None and not isinstance(cause, Refused)
+    core.fail(str(error), "".join(format_exception(cause)).rstrip() if is_own else "")
 
 
 class PlayerLoop:

@@ -87,6 +87,12 @@ def show(value: object, length: int = 48) -> str:
     return text if len(text) <= length else text[: length - 4] + "..." + text[-1]
 
 
+def no_such(what: str, value: str, choices: Iterable[str]) -> BadValue:
+    """Return the error for a name that is none of the choices, with the nearest of them."""
+    nearest = nearest_name(value, choices)
+    return BadValue(what, value, None if nearest is None else show(nearest))
+
+
 class Malformed(Refused):
     """Bytes, or a message made of them, that do not fit the schema or the world they claim to be about."""
 
@@ -97,7 +103,7 @@ class UnknownName(BadValue):
 
     def __init__(self, what: str, value: str, choices: Iterable[str], also: str = "") -> None:
         names = sorted(set(choices))
-        nearest = nearest_name(value, names)
         shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
         shown = f"{shown or 'none'}, or {also}" if also else shown
-        super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))
+        nearest = no_such(what, value, names).nearest
+        super().__init__(f"{what} (there are: {shown or 'none'})", value, nearest)

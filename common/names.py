@@ -77,6 +77,16 @@ def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR
     return best
 
 
+def nearest_quoted(value: object, choices: Iterable[str]) -> str | None:
+    """The choice most similar to the value in quotes, as messages have it; None when none is."""
+    return quoted(nearest_name(value, choices))
+
+
+def quoted(name: str | None) -> str | None:
+    """A name in quotes, None without one."""
+    return None if name is None else repr(name)
+
+
 def _common_start(one: str, other: str) -> int:
     """Length of the common prefix of two texts."""
     pairs = zip(one, other, strict=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from foosim.deployment.loader import apply_sets, check_open_meshes, check_state_fields, load_deployment
+from foosim.deployment.loader import apply_sets, check_complete, load_deployment
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
 from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
@@ -62,8 +62,7 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
     if not files:
         return text, {}
     complete = deployment.with_assets(files)
-    check_open_meshes(text, name, complete)
-    check_state_fields(text, name, complete)
+    check_complete(text, name, complete)
     robots = deployment.robot_files(files)
     sets = ["digests={}"] if robots else []
     sets += [f'digests."{path}"="{digest_of(files[path])}"' for path in robots]

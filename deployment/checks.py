@@ -1,60 +1,48 @@
 """Checks between the fields of a deployment: references to names, and numbers that depend on each other.
 
-It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
-one go: whatever is missing or malformed is passed over here, since the schema reports it. loader.py turns findings into
-lines with places; what concerns the network is in network_checks.py and radio_checks.py, rates and offsets are in
-timing_checks.py.
+They read the typed deployment, when each of its fields is right by itself. A finding's value is what is written at its
+location; loader.py turns findings into lines with places. What concerns the network is in network_checks.py and
+radio_checks.py, rates and offsets are in timing_checks.py.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import translate
 from typing import Any, Final
 
 from pydantic import ValidationError
 
-from foosim.common import limits, names, units
-from foosim.common.errors import BadValue, Refused, UnknownName, describe
-from foosim.common.finding import Finding, Location, path_text
-from foosim.common.plain_data import PlainData
+from foosim.common import limits, names
+from foosim.common.errors import BadValue
+from foosim.common.finding import Finding, Location
+from foosim.common.names import nearest_quoted
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
-from foosim.world.assembly.used_forms import OWN
+from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
-from foosim.world.forms.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.layout import WORLD
+from foosim.world.matter.materials import RadioMaterial
+from foosim.world.scenery import SceneryMesh
 from foosim.world.spec import KITS
 
 DEPLOYMENT_KEYS: Final = frozenset(
     field.alias or name for name, field in Deployment.model_fields.items() if name != KITS
 )
 """The keys of a deployment that are no kit's."""
+NEAREST_MAX: Final = 128
+"""How often a nearest name is looked for: among thousands of names that takes 20 ms, and not all problems are shown."""
 
 
-def check_references(data: object) -> Iterator[Finding]:
-    """All problems between the parts of a deployment's plain data, found lazily."""
-    view = View(data)
-    between = (_names, _people, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
-    for check in (_kits, *between, _scenery):
-        yield from check(view)
+class Names:
+    """The names of a deployment's endpoints, and the comparisons with them, which are bounded."""
 
-
-class View(PlainData):
-    """The plain data of a deployment, with its endpoints."""
-
-    def __init__(self, data: object, endpoints: Sequence[str] | None = None) -> None:
-        super().__init__(data)
-        self.robots = self.mapping("robots")
-        self.hosts = self.mapping("hosts")
-        self.nodes = self.mapping("nodes")
-        self.players = self.mapping("players")
-        self.clients = self.mapping("clients")
-        self.endpoints = [*self.robots, *self.players, *self.clients] if endpoints is None else endpoints
+    def __init__(self, endpoints: Sequence[str]) -> None:
+        self.endpoints = endpoints
         self._matched: dict[str, list[str]] = {}
-        self._compared = 0
+        self._compared = self._nearest = 0
 
     def matched(self, glob: str) -> Sequence[str]:
         """The endpoints that a selector matches, with which it is compared once. Raises TooManyComparisons."""
@@ -67,46 +55,50 @@ class View(PlainData):
             found = self._matched[glob] = [name for name in self.endpoints if match(name)]
         return found
 
-    def tick_ns(self) -> int | None:
-        try:
-            return units.parse_ns(self.get("tick")) or None
-        except BadValue:
-            return None
+    def nearest(self, value: str, choices: Iterable[str]) -> str | None:
+        """The valid name most similar to a wrong one, in quotes."""
+        self._nearest += 1
+        return nearest_quoted(value, choices) if self._nearest <= NEAREST_MAX else None
 
 
-def kits_of(view: PlainData) -> Iterator[tuple[str, Kit]]:
-    """Yield the kits whose sections a deployment has."""
-    for key in view.mapping():
-        if view.get(key) is not None and key not in DEPLOYMENT_KEYS:
-            try:
-                kit = registry.lookup("kit", key)
-            except Refused:
-                continue
-            if kit is not None:
-                assert isinstance(kit, Kit), kit
-                yield key, kit
+def check_references(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """All problems between the parts of a deployment, found lazily."""
+    yield from _kits(deployment)
+    yield from _names(deployment)
+    yield from _processes(deployment)
+    yield from _hosts(deployment, ends)
+    yield from _nodes(deployment, ends)
+    yield from _players(deployment, ends)
+    yield from _hears(deployment, ends)
+    yield from _settings(deployment, ends)
+    yield from _scenery(deployment)
 
 
-def _kits(view: View) -> Iterator[Finding]:
+def _kit_forms(deployment: Deployment) -> dict[str, Kit]:
+    """Return the kits whose sections a deployment has."""
+    return {name: kit for name in deployment.kits if isinstance(kit := registry.find("kit", name), Kit)}
+
+
+def _kits(deployment: Deployment) -> Iterator[Finding]:
     """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
-    kits = dict(kits_of(view))
+    kits = _kit_forms(deployment)
     for key, kit in kits.items():
         check = getattr(kit.made, "check", None)
         try:
-            yield from [*check(view)] if check is not None else []
+            yield from [*check(deployment.kits[key], deployment)] if check is not None else []
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: a kit may do anything
-            if kit.module.startswith(OWN):
+            if kit.is_own:
                 raise
-            yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", key, at="key")
+            yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", at="key")
         for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
-            yield Finding((key,), f"kit {key}: {problem}", key, at="key")
-    for label in view.mapping("rules"):
+            yield Finding((key,), f"kit {key}: {problem}", at="key")
+    for label in deployment.rules:
         others = [key for key, kit in kits.items() if label in kit.rules]
         if others:
             what = f"a rule that the kit {others[0]} has already: each world with a {others[0]} has it"
-            yield Finding(("rules", label), what, label, at="key")
+            yield Finding(("rules", label), what, at="key")
 
 
 def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]:
@@ -118,287 +110,199 @@ def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]
         try:
             rule = registry.find("rule", settings["kind"])
             rule.settings.model_validate(dict(settings))
-        except UnknownName as error:
-            yield f"its rule {label}: {error.what}"
-        except Refused as error:
-            yield f"its rule {label}: {error.what}, {settings['kind']!r}"
+        except BadValue as error:
+            yield f"its rule {label}: {error}"
         except ValidationError as error:
-            for finding in settings_findings(error, rule.settings, ()):
-                path = path_text(finding.location if finding.at == "value" else finding.location[:-1])
-                text = describe(finding.what, finding.value, finding.nearest)
-                yield f"its rule {label}: {path}{': ' if path else ''}{text}"
+            yield from (f"its rule {label}: {finding.text}" for finding in settings_findings(error, rule.settings, ()))
         else:
             assert isinstance(rule, WorldRule), rule
             for problem in (*needs_kit(rule, kits), *rule_problems(rule)):
                 yield f"its rule {label}: {problem}"
 
 
-def _names(view: View) -> Iterator[Finding]:
-    """Entities, endpoints, and the processes that a run starts, have names of their own."""
+def _names(deployment: Deployment) -> Iterator[Finding]:
+    """Entities, endpoints, processes that a run starts, and the channels of a robot, have names of their own."""
     entities: dict[str, str] = {}
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
-    for section, scopes, reserved in (
-        ("robots", (entities, endpoints), reserved_entities(view)),
-        ("objects", (entities,), reserved_entities(view)),
+    reserved = (WORLD, *(name for kit in _kit_forms(deployment).values() for name in kit.entities))
+    for section, scopes, refused in (
+        ("robots", (entities, endpoints), reserved),
+        ("objects", (entities,), reserved),
         ("nodes", (processes,), names.PROCESS_NAMES_RESERVED),
         ("players", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
         ("clients", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
     ):
-        for name in view.mapping(section):
-            if name in reserved:
-                yield Finding((section, name), "a reserved name", name, at="key")
+        for name in getattr(deployment, section):
+            if name in refused:
+                yield Finding((section, name), "a reserved name", at="key")
             other = next((scope[name] for scope in scopes if name in scope), None)
             if other is not None:
-                yield Finding((section, name), f"a name that is also one of {other}", name, at="key")
+                yield Finding((section, name), f"a name that is also one of {other}", at="key")
             for scope in scopes:
                 scope.setdefault(name, section)
-    yield from _processes(view, processes)
+    for name, robot in deployment.robots.items():
+        for section, others in (("sensors", robot.actuators), ("actuators", {})):
+            for channel in getattr(robot, section):
+                location = ("robots", name, section, channel)
+                if channel == names.CHANNEL_ECHO:
+                    yield Finding(location, "a reserved name", at="key")
+                elif channel in others:
+                    yield Finding(location, f"a name that is also one of {name}'s actuators", at="key")
 
 
-def reserved_entities(view: PlainData) -> tuple[str, ...]:
-    """Return names that no robot and no object can have: the world itself, and what its kits put into it."""
-    return (WORLD, *(name for _, kit in kits_of(view) for name in kit.entities))
-
-
-def _people(view: View) -> Iterator[Finding]:
-    """An operator and a viewer of one name would receive each other's answers."""
-    operators = view.get("access", "operators")
-    known = operators if isinstance(operators, list) else ["admin"]
-    for index, name in view.texts("access", "viewers"):
-        if name in known:
-            yield Finding(("access", "viewers", index), "a viewer who is an operator, too", name)
-
-
-def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:
+def _processes(deployment: Deployment) -> Iterator[Finding]:
     """A process that roles share has a name of its own, is in one place, and is started by `up`."""
+    sections = {name: section for section in ("clients", "players", "nodes") for name in getattr(deployment, section)}
     places: dict[str, tuple[Any, Any]] = {}
-    roles: list[Location] = [("supervisor",), ("vhub",)]
-    roles += [("nodes", node) for node in view.mapping("nodes")]
-    roles += [("players", player) for player in view.players]
-    for role in roles:
-        process, location = view.get(*role, "process"), (*role, "process")
-        if not isinstance(process, str):
+    for role, about in (("supervisor",), deployment.supervisor), *_placed(deployment):
+        process, location = about.process, (*role, "process")
+        if process is None:
             continue
         if process in names.PROCESS_NAMES_RESERVED:
-            yield Finding(location, "a reserved name", process)
-        elif process in taken:
-            yield Finding(location, f"a name that is also one of {taken[process]}", process)
-        place = view.get(*role, "host"), view.get(*role, "label")
+            yield Finding(location, "a reserved name")
+        elif process in sections:
+            yield Finding(location, f"a name that is also one of {sections[process]}")
+        place = getattr(about, "host", None), getattr(about, "label", None)
         if places.setdefault(process, place) != place:
-            yield Finding(location, "a process whose roles are not all on the same host", process)
-        launch = view.get(*role, "launch")
-        if role[0] in ("nodes", "players") and launch in ("manual", "systemd"):
-            what = f"a process for a {role[0][:-1]} with `launch: {launch}`, which has its own"
-            yield Finding(location, what, process)
-        is_apart = process == view.get("supervisor", "process") != view.get("vhub", "process")
+            yield Finding(location, "a process whose roles are not all on the same host")
+        launch = getattr(about, "launch", "local")
+        if launch != "local":
+            yield Finding(location, f"a process for a {role[0][:-1]} with `launch: {launch}`, which has its own")
+        is_apart = process == deployment.supervisor.process != deployment.vhub.process
         if role[0] == "players" and is_apart:  # it would start before it is known where to connect
-            yield Finding(location, "a player shares the supervisor's process only together with the vHub", process)
+            yield Finding(location, "a player shares the supervisor's process only together with the vHub")
 
 
-def _hosts(view: View) -> Iterator[Finding]:
+def _placed(deployment: Deployment) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the roles whose processes are placed on hosts, by location."""
+    yield ("vhub",), deployment.vhub
+    for section in ("nodes", "players"):
+        yield from (((section, name), about) for name, about in getattr(deployment, section).items())
+
+
+def _hosts(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """Processes are placed on hosts that exist, by name or by label; a unit of systemd needs such a place."""
-    labels = {label for host in view.hosts for _, label in view.texts("hosts", host, "labels")}
-    places: list[Location] = [(section, name) for section in ("nodes", "players") for name in view.mapping(section)]
-    for place in (*places, ("vhub",)):
-        host, label = view.get(*place, "host"), view.get(*place, "label")
-        if isinstance(host, str) and host not in view.hosts:
-            yield Finding((*place, "host"), "unknown host", host, view.nearest(host, view.hosts))
-        if isinstance(label, str) and host is not None:
-            yield Finding((*place, "label"), "a label beside a host: one of them says where", label)
-        elif isinstance(label, str) and label not in labels:
-            nearest = view.nearest(label, labels)
-            yield Finding((*place, "label"), "a label that no host has", label, nearest)
-        if host is None and label is None and view.get(*place, "launch") == "systemd":
-            yield Finding((*place, "launch"), "a unit of systemd needs a host or a label", "systemd")
+    hosts = deployment.hosts
+    labels = {label for host in hosts.values() for label in host.labels}
+    for role, about in _placed(deployment):
+        if about.host is not None and about.host not in hosts:
+            yield Finding((*role, "host"), "unknown host", nearest=ends.nearest(about.host, hosts))
+        if about.label is not None and about.host is not None:
+            yield Finding((*role, "label"), "a label beside a host: one of them says where")
+        elif about.label is not None and about.label not in labels:
+            yield Finding((*role, "label"), "a label that no host has", nearest=ends.nearest(about.label, labels))
+        if about.host is None and about.label is None and getattr(about, "launch", "") == "systemd":
+            yield Finding((*role, "launch"), "a unit of systemd needs a host or a label")
 
 
-def _robots(view: View) -> Iterator[Finding]:
-    """Channels have names of their own."""
-    for name in view.robots:
-        yield from _channels(view, name)
-
-
-def _channels(view: View, robot: str) -> Iterator[Finding]:
-    """The components of a robot have names of their own, and none is called like the channel that every robot has."""
-    model = view.get("robots", robot, "model")
-    actuators = view.mapping("robots", robot, "actuators")
-    if view.get("robots", robot, "actuators") is None and isinstance(model, str):
-        actuators = _usual_actuators(model, view.get("robots", robot, "dynamics"))
-    for section, others in (("sensors", actuators), ("actuators", {})):
-        for channel in view.mapping("robots", robot, section):
-            location = ("robots", robot, section, channel)
-            if channel == names.CHANNEL_ECHO:
-                yield Finding(location, "a reserved name", channel, at="key")
-            elif channel in others:
-                yield Finding(location, f"a name that is also one of {robot}'s actuators", channel, at="key")
-
-
-def has_body(view: PlainData, model: object) -> bool:
-    """Whether robots of a model are somewhere; of one that is not known, or not for this world, it is taken so."""
-    try:
-        found = registry.find_model(model) if isinstance(model, str) else None
-    except Refused:
-        return True
-    return found is None or found.has_body or bool(found.kit and view.get(found.kit) is None)
-
-
-def _usual_actuators(model: str, dynamics: object) -> Mapping[str, Any]:
-    """Return the actuators of robots of a model, with these dynamics, that say nothing of theirs."""
-    try:
-        return registry.find_model(model).variant(dynamics).actuators
-    except Refused:
-        return {}
-
-
-def _nodes(view: View) -> Iterator[Finding]:
+def _nodes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """Every robot has exactly one owner."""
     owner: dict[str, str] = {}
-    if not view.robots:
-        return
-    for node in view.nodes:
-        for index, robot in view.texts("nodes", node, "robots"):
+    for node, about in deployment.nodes.items():
+        for index, robot in enumerate(about.robots):
             location = ("nodes", node, "robots", index)
-            if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, view.nearest(robot, view.robots))
+            if robot not in deployment.robots:
+                yield Finding(location, "unknown robot", robot, ends.nearest(robot, deployment.robots))
             elif robot in owner:
-                what = (
-                    "listed twice" if owner[robot] == node else f"a robot with two owners, also of node {owner[robot]}"
-                )
+                other = owner[robot]
+                what = "listed twice" if other == node else f"a robot with two owners, also of node {other}"
                 yield Finding(location, what, robot)
             owner.setdefault(robot, node)
-    for robot in view.robots:
-        if robot not in owner and view.nodes:
-            yield Finding(("robots", robot), "a robot that no node owns", robot, at="key")
+    for robot in deployment.robots:
+        if robot not in owner:
+            yield Finding(("robots", robot), "a robot that no node owns", at="key")
 
 
-def _players(view: View) -> Iterator[Finding]:
+def _players(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """Players name robots that exist, and channels that those have."""
-    for player in view.players if view.robots else ():
-        for robot in view.mapping("players", player, "robots"):
+    for player, about in deployment.players.items():
+        for robot, chosen in about.robots.items():
             location: Location = ("players", player, "robots", robot)
-            if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, view.nearest(robot, view.robots), at="key")
+            if robot not in deployment.robots:
+                yield Finding(location, "unknown robot", nearest=ends.nearest(robot, deployment.robots), at="key")
                 continue
-            sensors = view.get("robots", robot, "sensors")
-            if not isinstance(sensors, dict):
-                continue
-            channels = [*sensors, names.CHANNEL_ECHO]
-            seen = set()
-            for index, channel in view.texts(*location):
+            channels = [*deployment.robots[robot].sensors, names.CHANNEL_ECHO]
+            for index, channel in enumerate(chosen):
                 if channel not in channels:
-                    nearest = view.nearest(channel, channels)
-                    yield Finding((*location, index), f"{robot} has no such channel", channel, nearest)
-                elif channel in seen:
-                    yield Finding((*location, index), "a channel that is listed twice", channel)
-                seen.add(channel)
+                    nearest = ends.nearest(channel, channels)
+                    yield Finding((*location, index), f"{robot} has no such channel", nearest=nearest)
+                elif channel in chosen[:index]:
+                    yield Finding((*location, index), "a channel that is listed twice")
 
 
-def _hears(view: View) -> Iterator[Finding]:
+def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """A player's `hears`: selectors that match another endpoint, channels that one of these has."""
+    robots = deployment.robots
     said: dict[str, set[str]] = {}
-    for player in view.players if view.robots else ():
-        for glob in view.mapping("players", player, "hears"):
+    for player, about in deployment.players.items():
+        for glob, channels in about.hears.items():
             location: Location = ("players", player, "hears", glob)
-            if not names.is_selector(glob):
-                continue
-            matched = view.matched(glob)
+            matched = ends.matched(glob)
             if all(name == player for name in matched):
-                nearest = view.nearest(glob, [name for name in view.endpoints if name != player])
-                yield Finding(location, "a selector that matches no other endpoint", glob, nearest, at="key")
+                nearest = ends.nearest(glob, [name for name in ends.endpoints if name != player])
+                yield Finding(location, "a selector that matches no other endpoint", nearest=nearest, at="key")
                 continue
             if glob not in said:
-                said[glob] = {channel for name in matched for channel in view.mapping("robots", name, "sensors")}
-            if any(name not in view.robots and name != player for name in matched):
+                said[glob] = {channel for name in matched if name in robots for channel in robots[name].sensors}
+            if any(name not in robots and name != player for name in matched):
                 continue
-            sensors = said[glob]
-            for index, channel in view.texts(*location):
-                if channel not in (*sensors, names.CHANNEL_ECHO):
-                    nearest = view.nearest(channel, [*sensors, names.CHANNEL_ECHO])
-                    yield Finding((*location, index), f"{glob} has no such channel", channel, nearest)
+            valid = {*said[glob], names.CHANNEL_ECHO}
+            for index, channel in enumerate(channels):
+                if channel not in valid:
+                    nearest = ends.nearest(channel, valid)
+                    yield Finding((*location, index), f"{glob} has no such channel", nearest=nearest)
 
 
-def _on(view: View) -> Iterator[Finding]:
-    """Players and clients are on board of robots that exist."""
+def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """Settings that depend on one another: of players and clients on board, people, the capture, deadlines."""
     for section in ("players", "clients"):
-        for name in view.mapping(section) if view.robots else ():
-            robot = view.get(section, name, "on")
-            if isinstance(robot, str) and robot not in view.robots:
-                yield Finding((section, name, "on"), "unknown robot", robot, view.nearest(robot, view.robots))
+        for name, about in getattr(deployment, section).items():
+            if about.on is not None and about.on not in deployment.robots:
+                nearest = ends.nearest(about.on, deployment.robots)
+                yield Finding((section, name, "on"), "unknown robot", nearest=nearest)
+    for index, name in enumerate(deployment.access.viewers):  # who would receive each other's answers
+        if name in deployment.access.operators:
+            yield Finding(("access", "viewers", index), "a viewer who is an operator, too")
+    if deployment.capture.last_ns is not None and not deployment.capture.is_split:
+        yield Finding(("capture", "last"), "whole files are let go: needs split_size or split_time")
+    deadlines = deployment.deadlines
+    is_written = deadlines.model_fields_set >= {"tick_named_ns", "tick_lost_ns"}
+    if is_written and deadlines.tick_named_ns > deadlines.tick_lost_ns:
+        yield Finding(("deadlines", "tick_named"), "longer than tick_lost")
 
 
-def _capture(view: View) -> Iterator[Finding]:
-    """`keep_last` deletes whole files."""
-    last = view.get("capture", "last")
-    if last is not None and all(view.get("capture", key) is None for key in ("split_size", "split_time")):
-        what = "whole files are let go: needs split_size or split_time"
-        yield Finding(("capture", "last"), what, last)
-
-
-def _deadlines(view: View) -> Iterator[Finding]:
-    """The deadline that reports a late process is before the one that drops it."""
-    try:
-        named_ns = units.parse_ns(view.get("deadlines", "tick_named"))
-        lost_ns = units.parse_ns(view.get("deadlines", "tick_lost"))
-    except BadValue:
-        return
-    if named_ns > lost_ns:
-        yield Finding(("deadlines", "tick_named"), "longer than tick_lost", view.get("deadlines", "tick_named"))
-
-
-def _scenery(view: View) -> Iterator[Finding]:
+def _scenery(deployment: Deployment) -> Iterator[Finding]:
     """Some engines have no meshes, only free bodies feel surfaces; waves cross a material, or have a loss."""
-    engine = view.get("engine")
-    no_meshes = isinstance(engine, str) and _is_without_meshes(engine)
-    has_rigid = any(model.can_be_free for model in _models(view))
-    objects = view.mapping("objects")
-    for name in view.mapping("scenery"):
-        for owner, things in (("a robot's", view.robots), ("an object's", objects)):
+    engine = registry.find("engine", deployment.engine)
+    assert isinstance(engine, Engine), engine
+    has_rigid = any(model.can_be_free for model in _models(deployment))
+    for name, thing in deployment.scenery.items():
+        for owner, things in (("a robot's", deployment.robots), ("an object's", deployment.objects)):
             if name in things:
-                yield Finding(("scenery", name), f"a name that is also {owner}", name, at="key")
+                yield Finding(("scenery", name), f"a name that is also {owner}", at="key")
         if not has_rigid:
-            surface = view.get("scenery", name, "surface")
-            if surface is not None:
-                what = "a surface for free bodies, in a world without any"
-                yield Finding(("scenery", name, "surface"), what, surface)
-        elif no_meshes and view.get("scenery", name, "shape") == "mesh":
-            what = f"the engine {engine} has no meshes (boxes and cylinders it has; bullet and mujoco have all)"
-            yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
-        yield from _radio(view, ("scenery", name, "radio"))
+            if "surface" in thing.model_fields_set:
+                yield Finding(("scenery", name, "surface"), "a surface for free bodies, in a world without any")
+        elif not engine.meshes and isinstance(thing, SceneryMesh):
+            valid = "boxes and cylinders it has; bullet and mujoco have all"
+            what = f"the engine {deployment.engine} has no meshes ({valid})"
+            yield Finding(("scenery", name, "shape"), what, nearest="'box'")
+        if thing.radio is not None:
+            yield from _radio(thing.radio, ("scenery", name, "radio"))
 
 
-def _models(view: View) -> Iterator[Model]:
-    """Yield the models of robots and objects, of what kits put into the world, and of what can be added, where there
-    are such; each as the variant of it that is meant."""
-    named: set[tuple[str, Any]] = set()
-    for section in ("robots", "objects"):
-        for entity in view.mapping(section):
-            dynamics = view.get(section, entity, "dynamics")
-            for _, model in view.texts(section, entity, "model"):
-                named.add((model, dynamics if isinstance(dynamics, str) else ""))
-    for _, kit in kits_of(view):
-        named |= {(model, "") for model in (*kit.entities.values(), *kit.addable)}
-    for name, dynamics in sorted(named):
-        found = find_kit_model(name)
-        if found is not None:
-            yield found.variant(dynamics)
+def _models(deployment: Deployment) -> Iterator[Model]:
+    """Yield the models of robots and objects, of what kits put into the world, and of what can be added."""
+    yield from map(registry.model_of, (*deployment.robots.values(), *deployment.objects.values()))
+    for kit in _kit_forms(deployment).values():
+        yield from (model for name in (*kit.entities.values(), *kit.addable) if (model := find_kit_model(name)))
 
 
-def _is_without_meshes(engine: str) -> bool:
-    """Whether an engine is known to have no meshes; what is wrong with its name is found elsewhere."""
-    try:
-        found = registry.find("engine", engine)
-    except Refused:
-        return False
-    assert isinstance(found, Engine), found
-    return not found.meshes
-
-
-def _radio(view: View, radio: Location) -> Iterator[Finding]:
+def _radio(radio: RadioMaterial, location: Location) -> Iterator[Finding]:
     """Waves cross a material, or have a fixed loss: exactly one is given."""
-    given = {key: value for key, value in view.mapping(*radio).items() if value is not None}
-    if isinstance(view.get(*radio), dict) and not given.keys() & {"is", "loss"}:
-        yield Finding((*radio, "is"), "missing key of a material, unless it has a loss", "is", at="missing")
-    for key in ("is", "thickness"):
-        if key in given and "loss" in given:
-            yield Finding((*radio, key), "a loss holds whatever it is made of: not beside one", key, at="key")
+    if radio.is_ is None and radio.loss_db is None:
+        yield Finding((*location, "is"), "missing key of a material, unless it has a loss", at="missing")
+    for key, value in (("is", radio.is_), ("thickness", radio.thickness_m)):
+        if value is not None and radio.loss_db is not None:
+            yield Finding((*location, key), "a loss holds whatever it is made of: not beside one", at="key")

@@ -9,29 +9,30 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from foosim.common.errors import ABSENT, BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, BadValue
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
-from foosim.common.units import NS_PER_S, parse_ns
+from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
+from foosim.world.assembly.misfits import (
+    SECTIONS,
+    component_problems,
+    model_problems,
+    models_of,
+    needs_kit,
+    rule_problems,
+)
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     JOINTS,
     JOINTS_MAX,
-    NO_SLOTS,
     Carrier,
     Component,
     Form,
     Model,
     WorldRule,
     with_article,
-)
-from foosim.world.forms.misfits import (
-    component_problems,
-    model_problems,
-    models_of,
-    needs_kit,
-    rule_problems,
 )
 from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
 from foosim.world.forms.settings import (
@@ -44,8 +45,6 @@ from foosim.world.forms.settings import (
 )
 from foosim.world.spec import KITS, schedule_of
 
-SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
-"""The sections of a robot that have components, and their form."""
 ROBOTS: Final = "robots"
 JOINT_POSITIONS: Final = JOINTS[0]
 OF_MODEL: Final = ("actuators", "rules")
@@ -59,7 +58,7 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
     """
     if not isinstance(data, dict):
         return data, []
-    reader = _Reader(data)
+    reader = _Reader()
     reader.findings += _unknown_engine(data.get("engine"))
     read = {key: value for key, value in data.items() if key != KITS}
     kits = {key: read.pop(key) for key in data if key not in known and reader.is_kit(key)}
@@ -89,21 +88,16 @@ def _unknown_engine(kind: Any) -> Iterator[Finding]:
         return
     try:
         registry.find("engine", kind)
-    except UnknownName as error:
+    except BadValue as error:
         yield Finding(("engine",), error.problem, kind, error.nearest)
-    except Refused as error:
-        yield Finding(("engine",), error.what, kind)
 
 
 class _Reader:
     """Reads the forms of one deployment, and gathers what is wrong."""
 
-    def __init__(self, data: Mapping[str, Any]) -> None:
-        self._data = data
+    def __init__(self) -> None:
         self.kits: set[str] = set()
         self.findings: list[Finding] = []
-        self._refused: dict[int, Any] = {}
-        """What stands for settings that were refused, by its identity."""
         self._read: dict[tuple[str, int, int], Any] = {}
         """What was read without findings: by form and the identities of model and plain data, which live as long."""
 
@@ -113,10 +107,8 @@ class _Reader:
             return False
         try:
             return registry.lookup("kit", key) is not None
-        except UnknownName as error:
+        except BadValue as error:
             self.findings.append(Finding((key,), error.problem, key, error.nearest, at="key"))
-        except Refused as error:
-            self.findings.append(Finding((key,), error.what, key, at="key"))
         return False
 
     def kit(self, name: str, section: Any) -> Any:
@@ -140,12 +132,10 @@ class _Reader:
             return RobotSettings.model_construct(model="")
         try:
             model = registry.find_model(name)
-        except UnknownName as error:
+        except BadValue as error:
             choices = [other.name for other in models_of(robots=location[0] == ROBOTS)]
             refused = error if ":" in name else registry.unknown("model", name, choices)
             self.findings.append(Finding((*location, "model"), refused.problem, name, refused.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "model"), error.what, name))
         else:
             return self._entity_of(model.variant(robot.get("dynamics")), location, robot)
         self._components_of(None, location, robot)
@@ -179,7 +169,6 @@ class _Reader:
                     name: self.component(form, model, (*location, section, name), settings)
                     for name, settings in robot[section].items()
                 }
-        self.findings += self._competing(found.get("actuators"), (*location, "actuators"))
         return found
 
     def component(self, form: str, model: Model | None, location: Location, settings: Any) -> Any:
@@ -200,28 +189,16 @@ class _Reader:
             return settings
         try:
             component = registry.find(form, kind)
-            misfits = [*self._misfits(component, model, (*location, "kind"), kind)]
-            self.findings += misfits
+            self.findings += self._misfits(component, model, (*location, "kind"), kind)
             modifiers = settings.get("modifiers")
             if isinstance(modifiers, list):
                 settings = {**settings, "modifiers": [*self._modifiers((*location, "modifiers"), modifiers)]}
-            found = component.settings.model_validate(settings)
-            if isinstance(found, SensorSettings | ActuatorSettings) and not misfits:
-                assert isinstance(component, Component), component
-                counts = _counts(model)
-                self.findings += self._unfit_slots(component, found, counts, location)
-                if model is not None or not callable(component.several):
-                    self.findings += self._unfit_modifiers(component, found, counts, location)
-            return found
-        except UnknownName as error:
+            return component.settings.model_validate(settings)
+        except BadValue as error:
             self.findings.append(Finding((*location, "kind"), error.problem, kind, error.nearest))
-        except Refused as error:
-            self.findings.append(Finding((*location, "kind"), error.what, kind))
         except ValidationError as error:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
-        refused = BASES[form].model_construct(kind=kind)
-        self._refused[id(refused)] = refused
-        return refused
+        return BASES[form].model_construct(kind=kind)
 
     def _misfits(self, component: Form, model: Model | None, location: Location, kind: str) -> Iterator[Finding]:
         """Yield what the world or a model does not have that a component needs."""
@@ -237,81 +214,66 @@ class _Reader:
         for number, settings in enumerate(modifiers):
             yield self.component("modifier", None, (*location, number), settings)
 
-    def _unfit_slots(
-        self,
-        component: Component,
-        settings: SensorSettings | ActuatorSettings,
-        counts: Mapping[str, int],
-        location: Location,
-    ) -> Iterator[Finding]:
-        """Yield why the slots of a sensor or actuator do not follow from its settings."""
-        period_ns = self._period_ns(component, settings)
-        if period_ns is not None:
-            carrier = Carrier(0, period_ns, counts.get(JOINT_POSITIONS, 0))
-            yield from _unknown_slots(component, settings, carrier, location)
 
-    def _unfit_modifiers(
-        self,
-        component: Component,
-        settings: SensorSettings | ActuatorSettings,
-        counts: Mapping[str, int],
-        location: Location,
-    ) -> Iterator[Finding]:
-        """Yield the settings of modifiers that do not fit the readings or commands that these are on.
+def check_components(deployment: Deployment) -> Iterator[Finding]:
+    """Yield sensors and actuators whose slots or modifiers do not fit their settings, or that command the same motors.
 
-        `counts` are how many numbers the fields of the robot have.
-        """
-        numbers = numbers_of(component, settings, counts)
-        for number, modifier in enumerate(settings.modifiers):
-            place: Location = (*location, "modifiers", number)
-            if numbers is None:
-                what = f"a modifier of what is not numbers alone: {component.form} {component.name}"
-                yield Finding((*place, "kind"), what, modifier.kind)
-                continue
-            period_ns = self._period_ns(component, settings)
-            if id(modifier) not in self._refused and period_ns is not None:
-                yield from _unfit(
-                    registry.find_component("modifier", modifier.kind),
-                    modifier,
-                    Carrier(numbers.size, period_ns),
-                    numbers,
-                    place,
-                )
+    What many robots share, by a template, is checked once.
+    """
+    met: set[tuple[int, int]] = set()
+    for name, robot in deployment.robots.items():
+        model = registry.model_of(robot)
+        for section, form in ("sensors", "sensor"), ("actuators", "actuator"):
+            for channel, settings in getattr(robot, section).items():
+                if (id(model), id(settings)) not in met:
+                    met.add((id(model), id(settings)))
+                    component = registry.find_component(form, settings.kind)
+                    location = ("robots", name, section, channel)
+                    yield from _unfit_component(component, settings, model, deployment.tick_ns, location)
+        yield from _competing(robot.actuators, ("robots", name, "actuators"))
 
-    def _competing(self, actuators: Any, location: Location) -> Iterator[Finding]:
-        """Yield the actuators that command motors which another one commands already."""
-        before: dict[str, Sequence[str] | None] = {}
-        for name, settings in actuators.items() if isinstance(actuators, dict) else ():
-            if not isinstance(settings, ActuatorSettings) or id(settings) in self._refused:
-                continue
-            component = registry.find_component("actuator", settings.kind)
-            if not component.moves:
-                continue
-            try:
-                named = component.joints_named(settings)
-            except BadValue as error:
-                yield Finding((*location, name, component.joints), error.problem, error.value)
-                continue
-            clashes = (_clash(named, other, theirs) for other, theirs in before.items())
-            found = next((clash for clash in clashes if clash is not None), None)
-            if found is not None:
-                place, what = found
-                path = ("kind",) if named is None else (component.joints, place)
-                value = settings.kind if named is None else named[place]
-                yield Finding((*location, name, *path), what, value)
-            before[name] = named
 
-    def _period_ns(self, component: Component, settings: SensorSettings | ActuatorSettings) -> int | None:
-        """Return the least time between two values; None where it is wrong, which is found elsewhere."""
+def _unfit_component(
+    component: Component, settings: SensorSettings | ActuatorSettings, model: Model, tick_ns: int, location: Location
+) -> Iterator[Finding]:
+    """Yield why the slots of a sensor or actuator do not follow from its settings, and the settings of modifiers that
+    do not fit the readings or commands that these are on."""
+    period_ns = tick_ns
+    if isinstance(settings, SensorSettings) and not component.speaks:
+        period_ns *= schedule_of(settings, tick_ns).least_ticks
+    # Joints are as many as may be where that follows from a robot's file.
+    counts = dict.fromkeys(JOINTS, JOINTS_MAX) if model.declared is None else model.declared
+    yield from _unknown_slots(component, settings, Carrier(0, period_ns, counts.get(JOINT_POSITIONS, 0)), location)
+    numbers = numbers_of(component, settings, counts)
+    for number, modifier in enumerate(settings.modifiers):
+        place: Location = (*location, "modifiers", number)
+        if numbers is None:
+            what = f"a modifier of what is not numbers alone: {component.form} {component.name}"
+            yield Finding((*place, "kind"), what, modifier.kind)
+        else:
+            found = registry.find_component("modifier", modifier.kind)
+            yield from _unfit(found, modifier, Carrier(numbers.size, period_ns), numbers, place)
+
+
+def _competing(actuators: Mapping[str, ActuatorSettings], location: Location) -> Iterator[Finding]:
+    """Yield the actuators that command motors which another one commands already."""
+    before: dict[str, Sequence[str] | None] = {}
+    for name, settings in actuators.items():
+        component = registry.find_component("actuator", settings.kind)
+        if not component.moves:
+            continue
         try:
-            tick_ns = parse_ns(self._data.get("tick"))
-        except BadValue:
-            return None
-        if not isinstance(settings, SensorSettings) or component.speaks:
-            return tick_ns or None
-        if not 0 < tick_ns * settings.rate_hz <= NS_PER_S:
-            return None
-        return schedule_of(settings, tick_ns).least_ticks * tick_ns
+            named = component.joints_named(settings)
+        except BadValue as error:
+            yield Finding((*location, name, component.joints), error.problem, error.value)
+            continue
+        clashes = (_clash(named, other, theirs) for other, theirs in before.items())
+        found = next((clash for clash in clashes if clash is not None), None)
+        if found is not None:
+            place, what = found
+            path = ("kind",) if named is None else (component.joints, place)
+            yield Finding((*location, name, *path), what)
+        before[name] = named
 
 
 def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None) -> tuple[int, str] | None:
@@ -326,13 +288,6 @@ def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None
         if joint in theirs:
             return place, f"a joint that {other} commands already"
     return None
-
-
-def _counts(model: Model | None) -> Mapping[str, int]:
-    """Return how many numbers the fields of a robot have; joints as many as may be where that follows from its file."""
-    if model is None:
-        return NO_SLOTS
-    return dict.fromkeys(JOINTS, JOINTS_MAX) if model.declared is None else model.declared
 
 
 def _unfit(
@@ -366,7 +321,7 @@ def _unfit(
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # noqa: BLE001  # of whoever wrote the modifier
-        yield Finding(place, f"its check failed: {type(error).__name__}: {error}", settings.kind)
+        yield Finding(place, f"its check failed: {failure_of(error)}", settings.kind)
     else:
         yield from _unknown_slots(component, settings, carrier, place)
 

@@ -7,6 +7,7 @@ reported like those of a file, by path, value and nearest valid name.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from typing import Final
 
@@ -14,9 +15,9 @@ from pydantic import ValidationError
 
 from foosim.common import limits, units
 from foosim.common.errors import Refused, describe
-from foosim.common.finding import Finding, Location, path_text
+from foosim.common.finding import Finding, Location, with_written
 from foosim.common.json_text import encode_json
-from foosim.deployment.checks import View
+from foosim.deployment.checks import Names
 from foosim.deployment.network.impairments import Trace
 from foosim.deployment.network.rules import Event, Network
 from foosim.deployment.network.traces import file_settings
@@ -42,9 +43,9 @@ def event_text(deployment: Deployment, data: object, at_ns: int) -> str:
     """
     if not isinstance(data, dict):
         raise BadEvent(describe("not an event, which is a mapping", data))
-    findings = [*islice(_findings(deployment, data, at_ns), PROBLEMS_MAX)]
+    findings = [with_written(finding, data) for finding in islice(_findings(deployment, data, at_ns), PROBLEMS_MAX)]
     if findings:
-        raise BadEvent("\n".join(dict.fromkeys(map(_line, findings))))
+        raise BadEvent("\n".join(dict.fromkeys(finding.text for finding in findings)))
     text = encode_json(data).decode()
     if len(text.encode()) > limits.EVENT_BYTES_MAX:
         raise BadEvent(f"an event of {len(text.encode())} bytes, at most {limits.EVENT_BYTES_MAX} are allowed")
@@ -55,16 +56,17 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
     if "at" in data:
         return [Finding(("at",), "an event that is asked for happens at the next tick, it has no time", "at", at="key")]
     links = [rule.id for rule in deployment.network.links]
-    found = list(event_findings(View(data, deployment.endpoints()), (), data, links))
     try:
         event = Event.model_validate({**data, "at": f"{at_ns} ns"})
     except ValidationError as error:
-        return found + [_relative(finding) for finding in schema_findings(error, _UNDER)]
+        of_schema = schema_findings(error, _UNDER)
+        return [replace(finding, location=finding.location[len(_UNDER) :]) for finding in of_schema]
+    found = list(event_findings(Names(deployment.endpoints()), (), event, links))
     found += set_findings(deployment.network, event, (), deployment.endpoints(), deployment.carriers())
     found += _files(deployment, event)
     if event.until_ns is not None and event.until_ns <= at_ns:
         what = f"not after the present simulated time, {units.format_ns(at_ns)}"
-        found.append(Finding(("until",), what, data["until"]))
+        found.append(Finding(("until",), what))
     return found
 
 
@@ -76,14 +78,3 @@ def _files(deployment: Deployment, event: Event) -> Iterator[Finding]:
             key = "trace" if isinstance(setting, Trace) else "jitter"
             what = "not one of the files of its kind that this deployment's network names, or with a digest"
             yield Finding(("set", key, "file"), what, setting.file)
-
-
-def _relative(finding: Finding) -> Finding:
-    return Finding(finding.location[len(_UNDER) :], finding.what, finding.value, finding.nearest, finding.at)
-
-
-def _line(finding: Finding) -> str:
-    location = finding.location if finding.at == "value" else finding.location[:-1]
-    text = describe(finding.what, finding.value, finding.nearest)
-    path = path_text(location)
-    return f"{path}: {text}" if path else text

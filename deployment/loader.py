@@ -21,10 +21,10 @@ from pydantic import ValidationError
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
-from foosim.deployment.checks import DEPLOYMENT_KEYS, check_references
-from foosim.deployment.components import read_components
+from foosim.deployment.checks import DEPLOYMENT_KEYS, Names, check_references
+from foosim.deployment.components import check_components, read_components
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network_checks import check_network, check_network_alone
+from foosim.deployment.network_checks import check_network, check_phase
 from foosim.deployment.overrides import place_sets
 from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
@@ -51,13 +51,11 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
+from foosim.world.assembly.misfits import doubled_slots, field_findings, unfit_components, unheard
 from foosim.world.assembly.sections import findings_of
-from foosim.world.assembly.state_fields import field_findings
-from foosim.world.assembly.unfit_components import unfit_components
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Engine, Kit, with_article
-from foosim.world.layout import doubled_slots, unheard
 from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32
@@ -102,7 +100,7 @@ def apply_sets(text: Text, name: str, sets: Sequence[str]) -> str:
     travels in the handshake and is attached to the capture. Loading it gives the changed deployment, and its own
     canonical text is itself.
     """
-    return _applied(text, name, (), tuple(sets))
+    return _applied(text, name, tuple(sets))
 
 
 def with_owners(text: Text, name: str, owners: Mapping[str, Sequence[str]], sets: Sequence[str] = ()) -> str:
@@ -110,22 +108,43 @@ def with_owners(text: Text, name: str, owners: Mapping[str, Sequence[str]], sets
 
     What runs where its robot's node is (`$node`) runs anywhere: the nodes have other names. Raises DeploymentError.
     """
-    return _applied(text, name, tuple((node, tuple(robots)) for node, robots in owners.items()), tuple(sets))
+    return _applied(text, name, tuple(sets), tuple((node, tuple(robots)) for node, robots in owners.items()))
+
+
+def with_network(text: Text, name: str, other: tuple[Text, str] | None, sets: Sequence[str]) -> str:
+    """The canonical text of the deployment in `text` with another network, and after settings.
+
+    `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
+    Raises DeploymentError with all problems, each in its file.
+    """
+    return _applied(text, name, tuple(sets), network=other)
 
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
-def _applied(text: Text, name: str, owners: tuple[tuple[str, tuple[str, ...]], ...], sets: tuple[str, ...]) -> str:
-    """The result of `apply_sets` and `with_owners`, cached for repeated rehearsals."""
+def _applied(
+    text: Text,
+    name: str,
+    sets: tuple[str, ...],
+    owners: tuple[tuple[str, tuple[str, ...]], ...] = (),
+    network: tuple[Text, str] | None = None,
+) -> str:
+    """The result of `apply_sets`, `with_owners` and `with_network`, cached for repeated rehearsals."""
     tree, problems = read_source(text, name)
     if owners and isinstance(tree, Fields):
         without_places_by_node(tree)
         place = tree.keys.get("nodes", tree.place)
         nodes: dict[str, Tree] = {node: _listed(robots, place) for node, robots in owners}
         tree.values["nodes"], tree.keys["nodes"] = Fields(place, nodes, dict.fromkeys(nodes, place)), place
+    if network is not None and isinstance(tree, Fields):
+        there, there_problems = read_source(*network)
+        problems = [*problems, *there_problems]
+        if isinstance(there, Fields) and "network" in there.values:
+            tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
+        elif there is not None:
+            problems.append(Problem(there.place, describe("missing key", "network")))
     tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
-    deployment = _check(tree, problems)
-    _keep(canonical, name, deployment)
+    _keep(canonical, name, _check(tree, problems))
     return canonical
 
 
@@ -177,46 +196,41 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
     if not isinstance(tree, Fields) or set(tree.values) != {"network"}:
         return None
     tree, set_problems = place_sets(tree, sets)
-    data = plain(tree)
-    findings = list(islice(check_network_alone(data), PROBLEMS_MAX + 1))
-    network = None
+    data, network = plain(tree)["network"], None
+    findings: Iterator[Finding] = iter(())
     try:
-        network = Network.model_validate(data["network"])
+        network = Network.model_validate(data)
     except ValidationError as error:
-        findings += islice(schema_findings(error, ("network",)), PROBLEMS_MAX + 1)
-    if network is not None and not findings:
-        findings += islice(rule_findings(network, (), {}), PROBLEMS_MAX + 1)
+        findings = schema_findings(error, ("network",))
+    else:
+        of_itself = list(islice(check_network(network, Names(()), data.get("radios") or {}), PROBLEMS_MAX + 1))
+        findings = iter(of_itself) if of_itself else rule_findings(network, (), {})
     places = Places(tree, tree, {})
-    found = [*problems, *set_problems, *map(places.problem, findings)]
+    found = [*problems, *set_problems, *map(places.problem, islice(findings, PROBLEMS_MAX + 1))]
     if found or network is None:
         raise DeploymentError(_report(found))
     return network
 
 
-def check_open_meshes(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse walls without a thickness: meshes that are not closed, of a material of which it is not said how thick.
+def check_complete(text: Text, name: str, deployment: Deployment) -> None:
+    """Refuse what is known of a deployment with its files: walls without a thickness, robots whose files do not give
+    what their components need, and what starts in a mesh.
 
-    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
+    `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
     """
-    findings = []
+    parts = [_open_meshes(deployment), field_findings(deployment)]
+    states = _state_findings(deployment) if deployment.asset_files else ()
+    found = (list(islice(part, PROBLEMS_MAX + 1)) for part in chain(parts, states))
+    refuse_findings(text, name, next(filter(None, found), []))
+
+
+def _open_meshes(deployment: Deployment) -> Iterator[Finding]:
+    """Meshes that are not closed, of a material of which it is not said how thick."""
     for thing in deployment.open_meshes():
         radio = deployment.scenery[thing].radio
         material = "concrete" if radio is None or radio.is_ is None else radio.is_
         what = f"a wall without a thickness: the mesh is not closed, write {{is: {material}, thickness: 10 cm}}"
-        findings.append(Finding(("scenery", thing, "radio"), what, material))
-    refuse_findings(text, name, findings)
-
-
-def check_state_fields(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse robots whose models are made from files, where these do not give what the robots' components need; and
-    what starts in a mesh.
-
-    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
-    """
-    findings = list(islice(field_findings(deployment), PROBLEMS_MAX + 1))
-    for part in _state_findings(deployment) if deployment.asset_files else ():
-        findings = findings or list(islice(part, PROBLEMS_MAX + 1))
-    refuse_findings(text, name, findings)
+        yield Finding(("scenery", thing, "radio"), what, material)
 
 
 def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
@@ -231,26 +245,6 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
         assert expanded.tree is not None, "it was loaded"
         places = Places(tree, expanded.tree, {})
         raise DeploymentError(_report([places.problem(finding, is_made=True) for finding in findings]))
-
-
-def with_network(text: Text, name: str, other: tuple[Text, str] | None, sets: Sequence[str]) -> str:
-    """The canonical text of the deployment in `text` with another network, and after settings.
-
-    `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
-    Raises DeploymentError with all problems, each in its file.
-    """
-    tree, problems = read_source(text, name)
-    if other is not None and isinstance(tree, Fields):
-        there, there_problems = read_source(*other)
-        problems = [*problems, *there_problems]
-        if isinstance(there, Fields) and "network" in there.values:
-            tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
-        elif there is not None:
-            problems.append(Problem(there.place, describe("missing key", "network")))
-    tree, problems = _with_sets(tree, problems, sets)
-    canonical = _canonical(tree)
-    _check(tree, problems)
-    return canonical
 
 
 def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
@@ -272,25 +266,28 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
 
 
 def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, list[Problem]]:
-    """The deployment that a tree is, and the problems of what is in it. Raises TooManyComparisons."""
+    """The deployment that a tree is, and the problems of what is in it: those of fields by themselves, else between
+    fields, else of the world that they make. Raises TooManyComparisons."""
     assert expanded.tree is not None, "it can be examined"
     data = plain_shared(expanded.tree)
 
     def first(*findings: Iterable[Finding]) -> list[Finding]:
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))
 
-    between = first(check_references(data), check_network(data))
-    deployment, of_components, error = _validated(data)
-    of_schema = first(of_components, () if error is None else schema_findings(error))
-    within = [*first(check_timing(data)), *of_schema, *first(_unused_findings(data, expanded))]
-    if deployment is not None and not between and not within:
-        rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-        for part in () if deployment.lacks_files else _state_findings(deployment):
-            between = between or first(part)
-        findings = findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment)
-        between = between or first(*findings)
-    made = [places.problem(finding, is_made=True) for finding in between]
-    return deployment, [*made, *map(places.problem, within)]
+    deployment, of_fields = _validated(data)
+    within = [*first(of_fields), *first(_unused_findings(data, expanded))]
+    if deployment is None or within:
+        return deployment, [*map(places.problem, within)]
+    network, ends = deployment.network, Names(deployment.endpoints())
+    of_network = check_network(network, ends, (data.get("network") or {}).get("radios") or {})
+    between = first(check_references(deployment, ends), of_network, check_phase(network, deployment.tick_ns))
+    within = first(check_timing(deployment, ends)) or first(check_components(deployment))
+    if not between and not within:
+        states = () if deployment.lacks_files else _state_findings(deployment)
+        rules = rule_findings(network, ends.endpoints, deployment.carriers())
+        whole = chain(findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment))
+        between = next(filter(None, map(first, chain(states, [whole]))), [])
+    return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
 
 
 def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
@@ -368,14 +365,14 @@ def _start_findings(deployment: Deployment) -> Iterator[Finding]:
         yield from overlap_findings(deployment)
 
 
-def _validated(data: Any) -> tuple[Deployment | None, list[Finding], ValidationError | None]:
-    """The deployment that plain data is, or what the components of its robots and what the schema refuse."""
+def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
+    """The deployment that plain data is, and what the components of its robots and what the schema refuse."""
     data, findings = read_components(data, DEPLOYMENT_KEYS)
     try:
         deployment = Deployment.model_validate(data)
     except ValidationError as error:
-        return None, findings, error
-    return (None if findings else deployment), findings, None
+        return None, chain(findings, schema_findings(error))
+    return (None if findings else deployment), iter(findings)
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
@@ -384,13 +381,8 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
         section = next((of for key, of in SECTION_OF_KEY.items() if key in whole.values), None)
         if section is None:
             continue
-        alone = {**data, section: {name: plain(whole)}}
-        timing = (finding for finding in check_timing(alone) if finding.location[-1] in ("rate", "offset"))
-        _, of_components, error = _validated(alone)
-        details = () if error is None else error.errors(include_url=False, include_context=False)
-        is_wrong = any(each["loc"][:2] == (section, name) and each["type"] != "missing" for each in details)
-        of_schema = schema_findings(error) if error is not None and is_wrong else ()
-        for finding in chain(of_components, of_schema, timing):
+        _, findings = _validated({**data, section: {name: plain(whole)}})
+        for finding in findings:
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
 

@@ -18,8 +18,7 @@ from typing import Any, Final
 from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
-from foosim.deployment.text.expand import ENTRIES, Expansion
-from foosim.deployment.text.presets import with_preset
+from foosim.deployment.text.expand import Expansion
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import (
@@ -177,28 +176,19 @@ class _Taken:
     tree: Tree
     steps: list[str | int] = field(default_factory=list)
 
-    def names(self) -> Sequence[str]:
+    def names(self) -> Collection[str]:
         """The keys of the mapping at its end."""
-        if not self.steps or not isinstance(self.tree, Fields):
-            return ()
-        if len(self.steps) == 1 and self.steps[0] in (*ENTRIES, TEMPLATES):
-            with suppress(Stopped):
-                return Expansion(self.tree, Report()).names(str(self.steps[0]))
-            return ()
         there = self.at()
-        return list(there.values) if isinstance(there, Fields) else ()
+        return there.values if isinstance(there, Fields) else ()
 
     def at(self, *more: str) -> Tree | None:
         """The node at its end, or some steps further."""
         node: Tree | None = None
         way = [*self.steps, *more]
-        if isinstance(self.tree, Fields) and way[0] not in (*ENTRIES, TEMPLATES):
-            node = with_preset(str(way[0]), self.tree.values[str(way[0])], Report())
-            way.insert(1, "")
-        elif isinstance(self.tree, Fields):
+        if way and isinstance(self.tree, Fields):
             with suppress(Stopped):
-                node = Expansion(self.tree, Report()).entry(str(way[0]), str(way[1]))
-        for step in way[2:]:
+                node = Expansion(self.tree, Report()).section(str(way[0]))
+        for step in way[1:]:
             if isinstance(node, Fields) and isinstance(step, str):
                 node = node.values.get(step)
             elif isinstance(node, Items) and isinstance(step, int) and step < len(node.items):

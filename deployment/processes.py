@@ -9,12 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-from foosim.common.errors import BadValue, show
-from foosim.common.names import nearest_name
+from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import SUPERVISOR, VHUB, Deployment, places
 
 Shape = Literal["deployed", "one", "each"]
-SHAPES: Final[tuple[str, ...]] = get_args(Shape)
+SHAPES: Final[tuple[Shape, ...]] = get_args(Shape)
 ONE: Final = "one"
 """The process of `one` on the supervisor's machine; on a host `one-HOST`."""
 ONE_PLAYERS: Final = "one-players"
@@ -36,12 +35,10 @@ class Process:
 
 def parse_shape(text: str) -> Shape:
     """Return a shape: as the deployment declares, one process a host, or a process for each role. Raises BadValue."""
-    for shape in get_args(Shape):
+    for shape in SHAPES:
         if shape == text:
-            found: Shape = shape
-            return found
-    nearest = nearest_name(text, SHAPES)
-    raise BadValue(f"not one of {', '.join(SHAPES)}", text, None if nearest is None else show(nearest))
+            return shape
+    raise UnknownName("not a shape", text, SHAPES)
 
 
 def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str, Process]:

@@ -1,24 +1,22 @@
 """Checks for settings that a radio does not support: its own, those of rules over it, and of events on these.
 
-What a radio says by itself is checked as plain data, like all in `network_references`; what rules ask of radios is
-checked when the network is whole, for then it is known which radio the packets of a pair go by.
+What rules ask of radios is checked when no reference of the network is wrong, for then it is known which radio the
+packets of a pair go by.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from fnmatch import translate
+from fnmatch import fnmatchcase, translate
 from functools import cached_property
 from itertools import chain, islice, permutations
 from typing import Any, Final
 
 from foosim.common import units
-from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
-from foosim.deployment.checks import View
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.link_settings import Profiles
-from foosim.deployment.network.presets import PRESETS, preset_settings
-from foosim.deployment.network.radios import lora_longest
+from foosim.deployment.network.presets import preset_settings
+from foosim.deployment.network.radios import Radio, lora_longest
 from foosim.deployment.network.rules import Event, LinkRule, Network
 from foosim.deployment.schema import Deployment
 from foosim.world.forms import registry
@@ -67,75 +65,41 @@ def unheeded(key: str, medium: str) -> str | None:
 # --- a radio's own settings -------------------------------------------------------------------------------------------
 
 
-def inherited(view: View, location: Location) -> dict[str, Any]:
-    """Return the preset's settings of the radio at a location."""
-    preset = view.mapping(*location).get("preset", "perfect")
-    return preset_settings(preset) if isinstance(preset, str) and preset in PRESETS else {}
-
-
-def is_on_air(view: View, radio: str) -> bool:
-    """Return whether a radio, as it is written, sends by radio."""
-    settings = {**inherited(view, ("network", "radios", radio)), **view.mapping("network", "radios", radio)}
-    return settings.get("medium", "none") not in ("none", "wired")
-
-
-def radio_findings(view: View, location: Location) -> Iterator[Finding]:
-    """Return the settings of a radio that it does not support."""
-    written = view.mapping(*location)
-    settings = {**inherited(view, location), **written}
-    medium = settings.get("medium", "none")
-    if not isinstance(medium, str):
-        return
+def radio_findings(radio: Radio, written: Mapping[str, Any], location: Location) -> Iterator[Finding]:
+    """Return the settings of a radio that it does not support; `written` is what is written of it, as plain data."""
+    settings = {**preset_settings(radio.preset), **written}
     asked = [key for key in settings if settings[key] is not None and (key in written or key not in _OF_MEDIUM)]
     for key in asked:
-        what = unheeded(key, medium)
-        if what is None and key == "fixed_rate" and key in written and settings.get("rates", "ideal") != "fixed":
+        what = unheeded(key, radio.medium)
+        if what is None and key == "fixed_rate" and key in written and radio.rates != "fixed":
             what = "has no effect without `rates: fixed`"
         if what is not None:
             yield Finding((*location, key), what, settings[key])
-    if medium == "wifi":
-        yield from _bandwidth(location, settings)
-    yield from _duty(location, settings, medium)
-    longest = lora_longest(settings.get("spreading_factor", 7)) if medium == "lora" else None
-    try:
-        if longest is not None and units.parse(written.get("mtu"), units.SIZE) > longest:
-            yield Finding((*location, "mtu"), _too_long(settings.get("spreading_factor", 7), longest), written["mtu"])
-    except BadValue:
-        return
+    known = BANDWIDTHS[radio.standard]
+    if radio.medium == "wifi" and radio.bandwidth_hz not in [units.parse(text, units.FREQUENCY) for text in known]:
+        what = f"not a bandwidth of {radio.standard} here, which has {' or '.join(known)}"
+        yield Finding((*location, "bandwidth"), what, settings.get("bandwidth", "20 MHz"), repr(known[0]))
+    what = _unknown_airtime(radio)
+    if radio.duty_cycle < 1 and what is not None:
+        yield Finding((*location, "duty_cycle"), what, settings["duty_cycle"])
+    longest = lora_longest(radio.spreading_factor) if radio.medium == "lora" else None
+    if longest is not None and "mtu" in written and (radio.payload_max or 0) > longest:
+        yield Finding((*location, "mtu"), _too_long(radio.spreading_factor, longest))
 
 
 def _too_long(factor: int, longest: int) -> str:
     return f"more than the {longest} B of LoRaWAN at spreading factor {factor}"
 
 
-def _bandwidth(location: Location, settings: Mapping[str, Any]) -> Iterator[Finding]:
-    """Rates and sensitivities are those of some bandwidths."""
-    standard, bandwidth = settings.get("standard", "802.11a/g"), settings.get("bandwidth", "20 MHz")
-    known = BANDWIDTHS.get(standard, ()) if isinstance(standard, str) else ()
-    try:
-        hertz = units.parse(bandwidth, units.FREQUENCY)
-    except BadValue:
-        return
-    if known and hertz not in [units.parse(text, units.FREQUENCY) for text in known]:
-        what = f"not a bandwidth of {standard} here, which has {' or '.join(known)}"
-        yield Finding((*location, "bandwidth"), what, bandwidth, repr(known[0]))
-
-
-def _duty(location: Location, settings: Mapping[str, Any], medium: str) -> Iterator[Finding]:
-    """A duty cycle counts airtime that is known before it is used."""
-    try:
-        share = units.parse(settings.get("duty_cycle"), units.PROBABILITY)
-    except BadValue:
-        return
-    if share >= 1 or medium == "lora" or (medium == "radio" and settings.get("rate") is not None):
-        return
-    if medium == "radio":
-        what = "has no effect without `rate`: packets take no time"
-    elif medium in ("none", "wired"):
-        what = f"has no effect on {medium}, it is of lora, and of radio with a rate"
-    else:
-        what = f"not to be had on {medium}, whose airtime is not known before it is used; lora has it, and radio"
-    yield Finding((*location, "duty_cycle"), what, settings["duty_cycle"])
+def _unknown_airtime(radio: Radio) -> str | None:
+    """Return why a radio has no duty cycle, which counts airtime that is known before it is used; None if it may."""
+    if radio.medium == "lora" or (radio.medium == "radio" and radio.rate_bps is not None):
+        return None
+    if radio.medium == "radio":
+        return "has no effect without `rate`: packets take no time"
+    if not radio.is_on_air:
+        return f"has no effect on {radio.medium}, it is of lora, and of radio with a rate"
+    return f"not to be had on {radio.medium}, whose airtime is not known before it is used; lora has it, and radio"
 
 
 # --- settings of rules and events on radios ---------------------------------------------------------------------------
@@ -251,7 +215,7 @@ def _representatives(profiles: Profiles, kinds: Mapping[str, Kind]) -> list[str]
 
 
 def place_findings(deployment: Deployment) -> Iterator[Finding]:
-    """Return the endpoints without a place or a radio of their own that use one by a rule's `via` or the defaults."""
+    """Return the endpoints without a body or a place that use a radio: their own, that of a rule or of the defaults."""
     network, ends = deployment.network, deployment.endpoints()
     profiles = Profiles(network, deployment.carriers())
     on_air = {way for way in ("", *network.radios) if profiles.base(way).is_on_air}
@@ -260,6 +224,12 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
         robot = deployment.robots.get(profiles.body(end))
         has_body = robot is not None and registry.model_of(robot).has_body
         if has_body or network.place_of(end) is not None:
+            continue
+        where = f"is nowhere: write network.places.{end}{'' if end in deployment.robots else ' or its `on`'}"
+        glob = next((glob for glob in network.robots if fnmatchcase(end, glob)), "")
+        own = next((radio for radio in network.robots.get(glob, ()) if radio in on_air), None)
+        if own is not None:
+            yield Finding(("network", "robots", glob), f"carries the radio {own}, but {where}", end, at="key")
             continue
         others = others or _representatives(profiles, _kinds(profiles, ends))
         pairs = [pair for other in others if other != end for pair in ((end, other), (other, end))]
@@ -271,6 +241,5 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
             location: Location = ("network", "links", number, "via") if way and rule is not None else (
                 "network", "defaults", "preset"
             )  # fmt: skip
-            on_board = "" if end in deployment.robots else " or its `on`"
-            what = f"goes by radio to or from {end}, which is nowhere: write network.places.{end}{on_board}"
+            what = f"goes by radio to or from {end}, which {where}"
             yield Finding(location, what, way or network.defaults.preset)

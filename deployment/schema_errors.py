@@ -16,8 +16,7 @@ from pydantic_core import ErrorDetails
 from foosim.common import names
 from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import nearest_quoted, quoted
 from foosim.deployment import hosts
 from foosim.world.forms import registry
 
@@ -131,8 +130,7 @@ def _missing(location: Location, schema: Mapping[str, Any], value: object, conte
 
 def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
     key, valid = location[-1], tuple(parent.get("properties", ()))
-    nearest = nearest_name(key, valid)
-    return Finding(location, UNKNOWN, key, None if nearest is None else repr(nearest), "key", valid=valid)
+    return Finding(location, UNKNOWN, key, nearest_quoted(key, valid), "key", valid=valid)
 
 
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
@@ -154,8 +152,8 @@ def _no_tag(location: Location, schema: Mapping[str, Any], value: object, contex
 
 
 def _not_a_choice(location: Location, value: object, choices: Sequence[str]) -> Finding:
-    nearest = nearest_name(value, choices) if isinstance(value, str) else None
-    return Finding(location, f"not one of {', '.join(choices)}", value, None if nearest is None else repr(nearest))
+    nearest = nearest_quoted(value, choices) if isinstance(value, str) else None
+    return Finding(location, f"not one of {', '.join(choices)}", value, nearest)
 
 
 _TRANSLATIONS: Final[dict[str, Callable[[Location, Mapping[str, Any], object, Mapping[str, Any]], Finding]]] = {

@@ -12,10 +12,9 @@ from foosim.common.keyed_random import chance_threshold
 from foosim.common.spec_base import Force, Length, Mass, Rate, SpecBase, Speed, Spin, Torque, default
 from foosim.common.units import Quantity
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
-from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import ModifierMounting, Mounting, SolvingView, View, WritableView
+from foosim.world.components.view import Misfit, ModifierMounting, Mounting, SolvingView, View, WritableView
 from foosim.world.forms.forms import ROBOTS, Carrier
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.quantities import Amperes as A

@@ -18,8 +18,7 @@ from typing import Final
 import numpy as np
 
 from foosim.common import units
-from foosim.common.errors import BadValue, Refused, show
-from foosim.common.names import nearest_name
+from foosim.common.errors import BadValue, Refused, no_such, show
 from foosim.fitting.motion import Array, Field
 from foosim.world.parameters.table import Goal
 
@@ -133,9 +132,7 @@ def _factor(quantity: str, unit: str | None) -> float:
         example = _example(quantity)
         raise BadValue(f"{quantity} has no unit: write {quantity} [{example}] or {quantity}_{example}")
     if unit not in dimension.units:
-        nearest = nearest_name(unit, dimension.units)
-        valid = ", ".join(dimension.units)
-        raise BadValue(f"no unit of {quantity} (there are: {valid})", unit, nearest and repr(nearest))
+        raise no_such(f"no unit of {quantity} (there are: {', '.join(dimension.units)})", unit, dimension.units)
     size = dimension.units[unit]
     return float(size) / 1e9 if quantity == "time" else float(size)
 

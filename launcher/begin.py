@@ -1,16 +1,21 @@
 """Begins a run, or resumes one, after all checks of its options, its players and the disks.
 
-The modules that few starts need (the recovery of captures, detaching) are imported where they are called.
+`up --detach` starts a launcher in a session of its own, and waits until the run is up. What few starts need (the
+recovery of captures) is imported where it is called.
 """
 
 from __future__ import annotations
 
+import subprocess
+import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Final
 
+from foosim.common.errors import Failed
 from foosim.deployment.schema import places
-from foosim.launcher.console_child import Page
 from foosim.launcher.display import Display
-from foosim.launcher.hosts.port_check import check_free
+from foosim.launcher.hosts.prepare import check_free
 from foosim.launcher.new_capture import check_capture, check_rooms, check_texts, default_capture
 from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome
 from foosim.launcher.plan import (
@@ -20,12 +25,17 @@ from foosim.launcher.plan import (
     check_models_here,
     check_players_here,
     make_plan,
-    plan_again,
 )
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
 from foosim.protocol.channels import VHUB
-from foosim.runtime.run_folder import RunFolder, left_runs, runs_folder
+from foosim.runtime.children import FOOSIM, script
+from foosim.runtime.command import DONE
+from foosim.runtime.run_folder import RunFolder, create_run, left_runs, runs_folder
+
+POLL_S: Final = 0.05
+LINES: Final = 20
+"""Size of the log excerpt that is shown for a detached launcher that has ended."""
 
 
 def begin(
@@ -35,7 +45,7 @@ def begin(
     run: str | None,
     detached: bool,
     display: Display,
-    page: Page | None,
+    page: Sequence[str] | None,
 ) -> Up | Outcome:
     """Return a new run that the caller runs, or start it detached. Raises Refused.
 
@@ -48,43 +58,63 @@ def begin(
     check_models_here(plan)
     check_players_here(plan)
     path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
-    look_for_room(plan, path, runs_folder(), display)
-    _prepare(plan, display, None)
+    _prepare(check_room(plan, path, runs_folder()), plan, display)
     if detached:
-        from foosim.launcher.detach import detach
-
-        return detached_outcome(detach(plan, path, run), plan.deployment, path)
+        return detached_outcome(_detach(plan, path, run), plan.deployment, path)
     return Up(plan, path, display, run, console=page)
 
 
-def go_on(folder: RunFolder, display: Display, page: Page | None) -> Up | Outcome:
+def go_on(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
     """Return a run to be resumed, or the outcome of one that has ended. Raises Refused."""
     if folder.result() is not None:
-        _recover_leftovers(display, None)
+        _prepare((), None, display)
         return ended_outcome(folder)
+    from foosim.launcher.resume import plan_again
+
     plan, path = plan_again(folder)
     check_players_here(plan)
-    look_for_room(plan, path, folder.path, display)
-    _prepare(plan, display, folder.name)
+    _prepare(check_room(plan, path, folder.path), plan, display, folder.name)
     return Up(plan, path, display, None, folder, page)
 
 
-def look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
-    """Raise Refused where a disk is too full to begin, or files are too few; warn where a disk is nearly full."""
+def check_room(plan: Plan, capture: Path | None, runs: Path) -> list[str]:
+    """Return warnings of disks that are nearly full; raises Refused where one is too full, or files are too few."""
     check_descriptors(plan)
     captured_here = None if VHUB in places(plan.deployment) else capture
-    for warning in check_rooms(plan.deployment.capture, captured_here, runs):
+    return check_rooms(plan.deployment.capture, captured_here, runs)
+
+
+def _prepare(warnings: Iterable[str], plan: Plan | None, display: Display, resumed: str | None = None) -> None:
+    """Show all warnings, and recover captures of other runs."""
+    for warning in (*warnings, *([] if plan is None else check_certificates(plan))):
         display.say(warning)
-
-
-def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
-    for warning in check_certificates(plan):
-        display.say(warning)
-    _recover_leftovers(display, resumed)
-
-
-def _recover_leftovers(display: Display, resumed: str | None) -> None:
     if left_runs():
-        from foosim.launcher.crash_recovery import recover_leftovers
+        from foosim.launcher.resume import recover_leftovers
 
         recover_leftovers(display.say, but=resumed)
+
+
+def _detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
+    """Launch a run in the background; return its folder when clients can find it. Raises Failed if it ends before."""
+    folder = create_run(plan.deployment.world, run, plan.stamp)
+    path = folder.log("up")
+    written = ["--no-capture"] if capture is None else ["--capture", str(capture)]
+    with path.open("ab") as file:
+        process = subprocess.Popen(
+            [script(FOOSIM), "up", *plan.options.arguments(), "--run", folder.name, *written],
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # it outlives the terminal
+        )
+    try:
+        while (code := process.poll()) is None and ((info := folder.info()) is None or not info.radio):
+            time.sleep(POLL_S)
+    except KeyboardInterrupt:  # then the command says that the run has not begun
+        process.terminate()
+        process.wait()
+        raise
+    if code not in (None, DONE):
+        end = "".join(f"\n    {line}" for line in path.read_text("utf-8", "replace").splitlines()[-LINES:])
+        raise Failed(f"run {folder.name} has ended with exit code {code}; the end of {path}:{end}")
+    return folder

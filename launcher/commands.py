@@ -5,6 +5,7 @@ A process with one role runs that role's command, one with several runs `foosim 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,49 +34,36 @@ class Commands:
     def of(self, process: Process, info: RunInfo | None, remote: Remote | None = None) -> list[str]:
         """Return the command line of a process.
 
-        Without `info`, the run's addresses, a process on this machine waits for them (`run:NAME`).
+        Without `info`, the run's addresses, a process on this machine waits for them (`run:NAME`). The folder of
+        certificates is that of the machine that the process runs on. Players' modules are found in the deployment's
+        folder, too, which another machine has not.
         """
-        if process.is_shared:
-            return self._shared(process, info, remote)
-        role, pki = process.name, self._pki(remote)
-        if role == SUPERVISOR:
-            return [FOOSIM, "run", *self._plan.options.arguments(), "--run", self._folder.name]
-        simulation, radio = self._addresses(info)
-        if role == VHUB:
-            insecure = ["--insecure"] if self._plan.options.insecure else []
-            address = ["--listen", self._radio_address(info, remote)]
-            return [*ROLE, "vhub", "--connect", simulation, *address, *insecure, *pki, *self._records(remote)]
-        if role in self._plan.deployment.nodes:
-            return [*ROLE, "node", "--name", role, "--connect", simulation, *pki]
-        return [*ROLE, "player", "--name", role, "--connect", radio, *self._path(remote), *pki]
-
-    def _shared(self, process: Process, info: RunInfo | None, remote: Remote | None) -> list[str]:
-        deployment, roles = self._plan.deployment, process.roles
-        simulation, radio = self._addresses(info)
-        if all(role in deployment.players for role in roles):
-            words = [word for role in roles for word in ("--name", role)]
-            return [*ROLE, "player", *words, "--connect", radio, *self._path(remote), *self._pki(remote)]
+        options, deployment, roles = self._plan.options, self._plan.deployment, process.roles
+        run = RUN + self._folder.name
+        simulation, radio = (run, run) if info is None else (info.simulation, info.radio)
+        pki = options.pki_arguments()
+        pki = remote.pki_arguments() if pki and remote is not None else pki
+        nodes = [role for role in roles if role in deployment.nodes]
+        players = [role for role in roles if role in deployment.players]
+        path = ["--path", str(options.file.parent.absolute())] if players and remote is None else []
+        insecure = ["--insecure"] if options.insecure else []
+        if players == [*roles]:
+            return [*ROLE, "player", *_each("--name", players), "--connect", radio, *path, *pki]
+        if not process.is_shared:
+            if SUPERVISOR in roles:
+                return [FOOSIM, "run", *options.arguments(), "--run", self._folder.name]
+            if nodes:
+                return [*ROLE, "node", *_each("--name", nodes), "--connect", simulation, *pki]
+            listen = ["--listen", self._radio_address(info, remote)]
+            return [*ROLE, "vhub", "--connect", simulation, *listen, *insecure, *pki, *self._records(remote)]
         command = [*ROLE, "roles", process.name]
         if SUPERVISOR in roles:
             command += ["--run", self._folder.name]
         else:
-            command += ["--connect", simulation, *self._pki(remote)]
-            command += ["--radio", radio] if self.needs_radio(process) else []
+            command += ["--connect", simulation, *pki, *(["--radio", radio] if self.needs_radio(process) else [])]
         if VHUB in roles:
-            command += ["--vhub-listen", self._radio_address(info, remote), *self._records(remote)]
-            command += ["--insecure"] if self._plan.options.insecure else []
-        for option, declared in (("--node", set(deployment.nodes)), ("--player", set(deployment.players))):
-            command += [word for role in roles if role in declared for word in (option, role)]
-        has_players = any(role in deployment.players for role in roles)
-        return command + self._path(remote) if has_players else command
-
-    def _path(self, remote: Remote | None) -> list[str]:
-        """Return where players' modules are found, too: in the deployment's folder, which another machine has not."""
-        return ["--path", str(self._plan.options.file.parent.absolute())] if remote is None else []
-
-    def _addresses(self, info: RunInfo | None) -> tuple[str, str]:
-        """Return where the routers of both planes listen."""
-        return (RUN + self._folder.name,) * 2 if info is None else (info.simulation, info.radio)
+            command += ["--vhub-listen", self._radio_address(info, remote), *self._records(remote), *insecure]
+        return [*command, *_each("--node", nodes), *_each("--player", players), *path]
 
     def _radio_address(self, info: RunInfo | None, remote: Remote | None) -> str:
         """Return where the vHub listens: at the address that clients know, once it has listened."""
@@ -90,7 +78,7 @@ class Commands:
         written = ["--no-capture"] if self._capture is None else ["--capture", str(capture)]
         return ["--run-folder", str(folder), *written]
 
-    def _pki(self, remote: Remote | None) -> list[str]:
-        """Return the folder of a process's certificate: of this machine, or of the one that it runs on."""
-        given = self._plan.options.pki_arguments()
-        return remote.pki_arguments() if given and remote is not None else given
+
+def _each(option: str, names: Iterable[str]) -> list[str]:
+    """Return an option for each name."""
+    return [word for name in names for word in (option, name)]

@@ -6,7 +6,7 @@ the run's folder, where only the owner can read them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -26,27 +26,12 @@ LEAVE_S: Final = 3.0
 """Time for a console to report the end of the run to its pages."""
 
 
-@dataclass(frozen=True, slots=True)
-class Page:
-    """A page that shows the run."""
+def page_of(console: bool, opens: bool, second: Path | None, offset: str | None, detached: bool) -> list[str] | None:
+    """Return the options of `foosim view` for a page that `up` serves, None without one.
 
-    open: bool = False
-    """Whether to open it in this machine's browser."""
-    second: Path | None = None
-    """The recording that follows the run."""
-    offset: str | None = None
-    """The recording's time at which the run has time 0."""
-
-    def options(self) -> list[str]:
-        """Return the options of the command that serves it."""
-        options = ["--open"] if self.open else []
-        if self.second is not None:
-            options += ["--second", str(self.second.absolute())]
-        return options if self.offset is None else [*options, f"--offset={self.offset}"]
-
-
-def page_of(console: bool, opens: bool, second: Path | None, offset: str | None, detached: bool) -> Page | None:
-    """Return the page that the options of `up` are for, None without one. Raises BadValue where they do not fit."""
+    `second` is the recording that follows the run, `offset` its time at which the run has time 0. Raises BadValue where
+    the options of `up` do not fit.
+    """
     if not (console or opens):
         for option, value in (("--second", second), ("--offset", offset)):
             if value is not None:
@@ -60,13 +45,16 @@ def page_of(console: bool, opens: bool, second: Path | None, offset: str | None,
         read_at("--offset", parse_offset_ns, offset)
     if second is not None and not second.is_file():
         raise BadValue("--second: no such file", str(second))
-    return Page(opens, second, offset)
+    options = ["--open"] if opens else []
+    if second is not None:
+        options += ["--second", str(second.absolute())]
+    return options if offset is None else [*options, f"--offset={offset}"]
 
 
 class ConsoleChild:
     """The console of one run."""
 
-    def __init__(self, folder: RunFolder, display: Display, page: Page | None) -> None:
+    def __init__(self, folder: RunFolder, display: Display, page: Sequence[str] | None) -> None:
         self._folder, self._display, self._page = folder, display, page
         self._launcher = Launcher(folder.name)
         self._has_addresses = self._has_ended = False
@@ -78,14 +66,7 @@ class ConsoleChild:
             return
         path = self._folder.path / ADDRESSES
         path.unlink(missing_ok=True)
-        command = [
-            FOOSIM,
-            "view",
-            self._folder.name,
-            "--announce",
-            str(path),
-            *self._page.options(),
-        ]
+        command = [FOOSIM, "view", self._folder.name, "--announce", str(path), *self._page]
         try:
             self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
         except Failed as failed:

@@ -156,26 +156,24 @@ def _processes(status: dict[str, Any]) -> Table:
     Beside them is each node's share of the ticks of free bodies, or without any the ticks in which it solved a body.
     """
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
-    processes = status["processes"]
-    nodes = status["nodes"]
-    hosts, shared = any(process["host"] for process in processes.values()), status["shared"]
-    columns = [("name", "left"), *([("process", "left")] if shared else []), *([("host", "left")] if hosts else [])]
-    columns.append(("owns", "left"))
+    processes, nodes, shared = status["processes"], status["nodes"], status["shared"]
+    has_hosts = any(process["host"] for process in processes.values())
     free = sum(node["free_ticks"] for node in nodes.values())
-    solved = "free bodies" if free else "solved ticks"
-    for column, justify in (*columns, (solved, "right"), ("load", "right")):
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+    for column in ("name", *(["process"] if shared else []), *(["host"] if has_hosts else []), "owns"):
+        table.add_column(column)
+    for column in ("free bodies" if free else "solved ticks", "load"):
+        table.add_column(column, justify="right")
     table.add_column("waits for", no_wrap=True)
     for name in [*nodes, *(other for other in processes if other not in nodes)]:
         node, process = nodes.get(name), processes.get(name)
+        owned, solved = "", ""
+        if node is not None:
+            owned = _listed(node["owned"])
+            solved = f"{node['free_ticks'] / free:.0%}" if free else str(node["solved_ticks"])
         table.add_row(
-            name,
-            *([shared.get(name, name)] if shared else []),
-            *([process["host"] if process else ""] if hosts else []),
-            "" if node is None else _listed(node["owned"]),
-            "" if node is None else f"{node['free_ticks'] / free:.0%}" if free else str(node["solved_ticks"]),
-            "-" if process is None else f"{process['busy']:.0%}",
-            _doing(process),
+            *(name, *([shared.get(name, name)] if shared else [])),
+            *([process["host"] if process else ""] if has_hosts else []),
+            *(owned, solved, f"{process['busy']:.0%}" if process else "-", _doing(process)),
         )
     return table
 

@@ -12,10 +12,6 @@ from foosim.deployment.schema import Capture
 from foosim.runtime.disk import Level, Room, room_on_disk
 
 
-class CaptureExists(Refused):
-    """A capture is never overwritten."""
-
-
 def default_capture(world: str, stamp: str) -> Path:
     """Return the default path of a run's capture; `stamp` is the time in its name."""
     stem = f"{world}-{stamp}"
@@ -40,7 +36,7 @@ def check_capture(path: Path, *, is_split: bool = False) -> Path:
     """
     try:
         for found in parts_at(path).values() if is_split or path.exists() else ():
-            raise CaptureExists(f"{found} exists, and a capture is never overwritten")
+            raise Refused(f"{found} exists, and a capture is never overwritten")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             return path
@@ -50,14 +46,16 @@ def check_capture(path: Path, *, is_split: bool = False) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A folder that a run writes to: the nearest existing one, and the free space of its disk."""
+    """The nearest existing folder to one that a run writes to, and the free space of its disk."""
 
-    folder: Path
     there: Path
     room: Room
-    then: str
-    """What happens at the reserve."""
     ends_run: bool
+    """Whether the run ends at the reserve; else it continues without its capture."""
+
+    @property
+    def then(self) -> str:
+        return "the run ends" if self.ends_run else "the run continues without its capture"
 
     @property
     def is_refused(self) -> bool:
@@ -74,11 +72,9 @@ def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Pl
 
     `is_capture`: it is the capture, without which a run may go on. Else it is a journal.
     """
-    goes_on = is_capture and settings.on_full == "continue_unlogged"
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    room = room_on_disk(there, settings.reserve_bytes)
-    then = "the run continues without its capture" if goes_on else "the run ends"
-    return Place(folder, there, room, then, not goes_on)
+    ends_run = not is_capture or settings.on_full != "continue_unlogged"
+    return Place(there, room_on_disk(there, settings.reserve_bytes), ends_run)
 
 
 def check_rooms(settings: Capture, capture: Path | None, runs: Path | None) -> list[str]:
@@ -88,11 +84,11 @@ def check_rooms(settings: Capture, capture: Path | None, runs: Path | None) -> l
     where no journal is written.
     """
     warnings = []
-    for folder, is_capture in ((None if capture is None else capture.parent, True), (runs, False)):
+    for folder in (None if capture is None else capture.parent, runs):
         if folder is None:
             continue
         try:
-            place = place_of(settings, folder, is_capture=is_capture)
+            place = place_of(settings, folder, is_capture=folder is not runs)
         except OSError:
             continue  # the writer reports the error
         text = f"{folder}: {place.room} (capture.reserve)"

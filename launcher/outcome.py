@@ -49,35 +49,36 @@ class Outcome:
     """Result of a run: its JSON, and its messages for people."""
 
     result: dict[str, Any]
-    failed: bool
     lines: tuple[str, ...]
+    is_killed: bool = False
+    """Whether a second Ctrl-C has killed its processes."""
+
+    @property
+    def failed(self) -> bool:
+        return bool(self.result["failed"])
 
 
 def ended_outcome(folder: RunFolder) -> Outcome:
     """Return the outcome of a run that has a result."""
-    ended, launch = folder.result(), folder.launch()
+    ended, capture = folder.result(), folder.capture()
     assert ended is not None, f"run {folder.name} has not ended"
-    capture = None if launch is None or not launch.capture else Path(launch.capture)
     result = ended if capture is None else with_capture(ended, capture)
-    lines = f"run {folder.name} has ended: {result['reason']}", *capture_lines(capture, result)
-    return Outcome(result, bool(result["failed"]), lines)
+    return Outcome(result, (f"run {folder.name} has ended: {result['reason']}", *capture_lines(capture, result)))
 
 
 def refused_result(resumed: str | None, run: str | None, reason: str) -> dict[str, Any]:
     """Return the result of a run that did not begin: a resumed one, with its capture, or a new one."""
-    if resumed is None or not run_exists(resumed):
-        return result_without_supervisor({"run": resumed or run}, reason)
-    launch = open_run(resumed).launch()
-    capture = None if launch is None or not launch.capture else Path(launch.capture)
-    return with_capture(result_without_supervisor({"run": resumed}, reason), capture)
+    capture = open_run(resumed).capture() if resumed is not None and run_exists(resumed) else None
+    return with_capture(result_without_supervisor({"run": resumed or run}, reason), capture)
 
 
 def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | None) -> Outcome:
     """Return the outcome of a run that was left running."""
-    known = {"run": folder.name, **plan_facts(deployment), "capture": None if capture is None else str(capture)}
-    name = folder.name
-    line = f"run {name} is up; foosim status --run {name} shows it, down --run {name} ends it"
-    return Outcome({**_UNKNOWN, **known, "failed": False}, False, (line,))
+    name, path = folder.name, None if capture is None else str(capture)
+    known = {"run": name, **plan_facts(deployment), "capture": path, "failed": False}
+    return Outcome(
+        {**_UNKNOWN, **known}, (f"run {name} is up; foosim status --run {name} shows it, down --run {name} ends it",)
+    )
 
 
 def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals: Path | None = None) -> list[str]:
@@ -110,20 +111,15 @@ def with_capture(result: Mapping[str, Any], capture: Path | None) -> dict[str, A
     named = {**result, "capture": str(first_there(capture))}
     if result["recording"]["state"] not in (UNFINISHED, NOT_RECORDED["state"]):
         return named
-    try:
-        rows = _rows_in(first_there(capture))
+    from foosim.capture.foxglove import LOG
+    from foosim.capture.reader import Scan
+    from foosim.capture.rows import EPOCHS, PACKETS, TICK
+
+    try:  # as its writer counts them
+        rows = sum(1 for _ in Scan(first_there(capture)).messages(frozenset({TICK, PACKETS, EPOCHS, LOG})))
         state = "on" if has_end(files[max(files)]) else UNFINISHED
     except CaptureError as error:
         return {**named, "recording": {**result["recording"], "state": UNFINISHED, "problem": str(error)}}
     recording = {**result["recording"], "state": state, "written": rows}
     recording["offered"] = max(recording["offered"], rows + recording["refused"])
     return {**named, "recording": recording}
-
-
-def _rows_in(path: Path) -> int:
-    """Return the numbers of ticks, packets, epochs and lines of a capture, as its writer counts them."""
-    from foosim.capture.foxglove import LOG
-    from foosim.capture.reader import Scan
-    from foosim.capture.rows import EPOCHS, PACKETS, TICK
-
-    return sum(1 for _ in Scan(path).messages(frozenset({TICK, PACKETS, EPOCHS, LOG})))

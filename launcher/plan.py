@@ -5,25 +5,24 @@ What only some runs need is imported where they do: the reader of captures, the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from resource import RLIM_INFINITY, RLIMIT_NOFILE, getrlimit
 from typing import TYPE_CHECKING, Final
 
 from foosim.common import wall_clock
 from foosim.common.addresses import Address, check_listen
 from foosim.common.errors import BadValue, Refused, read_at
+from foosim.common.finding import Finding
 from foosim.common.units import Pace, parse_ns, parse_pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, refuse_findings
 from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import VHUB, Deployment, places
 from foosim.deployment.text.files import read_source_file
-from foosim.launcher.run_options import RunOptions, launched_options
+from foosim.launcher.run_options import RunOptions
 from foosim.node.physics.making import check_shapes
 from foosim.protocol import identity
-from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
 from foosim.world.assembly.sections import findings_of
 
@@ -118,22 +117,17 @@ def check_players_here(plan: Plan) -> None:
 
     Other machines have their own classes.
     """
-    from foosim.client.class_check import player_findings
-    from foosim.client.loading import look_in
+    from foosim.client.loading import look_in, player_findings
 
     look_in(str(plan.options.file.parent.absolute()))
     deployment, elsewhere = plan.deployment, places(plan.deployment)
-    findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
-    if findings:
-        file = plan.options.file
-        refuse_findings(read_source_file(file), str(file), findings, plan.options.all_sets)
+    _refuse(plan.options, player_findings(deployment, [name for name in deployment.players if name not in elsewhere]))
 
 
-def check_meshes(deployment: Deployment, options: RunOptions) -> None:
-    """Raise DeploymentError for meshes that bodies start in or pass through. Their files must have been read."""
-    findings = list(findings_of(deployment))
-    if findings:
-        refuse_findings(read_source_file(options.file), str(options.file), findings, options.all_sets)
+def _refuse(options: RunOptions, findings: Iterable[Finding]) -> None:
+    """Raise DeploymentError for findings, if there are any."""
+    if found := list(findings):
+        refuse_findings(read_source_file(options.file), str(options.file), found, options.all_sets)
 
 
 def make_plan(options: RunOptions) -> Plan:
@@ -143,7 +137,7 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     check_shapes(deployment, name, text)
-    check_meshes(deployment, options)
+    _refuse(options, findings_of(deployment))  # meshes that bodies start in or pass through
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else read_at("--pace", parse_pace, options.pace)
@@ -161,15 +155,3 @@ def make_plan(options: RunOptions) -> Plan:
     processes = processes_of(deployment, shape)
     stamp = wall_clock.now_stamp()
     return Plan(options, text, deployment, pace, ticks, address, branch, files, processes, stamp)
-
-
-def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
-    """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot be resumed."""
-    from foosim.launcher.resumable import check_resumable
-
-    if folder.is_live() or not folder.is_left():
-        raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
-    plan, launch = make_plan(launched_options(folder)), folder.launch()
-    capture = Path(launch.capture) if launch is not None and launch.capture else None
-    check_resumable(folder, plan.options, capture, has_hub_here=VHUB not in places(plan.deployment))
-    return plan, capture

@@ -6,24 +6,25 @@ status that it shows, and forwards a Ctrl-C.
 
 from __future__ import annotations
 
+import shlex
 import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from foosim.client.control import Control, NoAnswer
 from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
-from foosim.launcher.children.child_time import ChildTimes
+from foosim.deployment.schema import Player
+from foosim.launcher.children.child_time import ChildTimes, observe
 from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
-from foosim.launcher.children.observe import observe
-from foosim.launcher.children.processes import Child, Launcher, command_line, counted_signals
+from foosim.launcher.children.processes import Child, Launcher
 from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands
-from foosim.launcher.console_child import ConsoleChild, Page
+from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
 from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
 from foosim.launcher.hosts.ssh import remotes as remotes_of
@@ -32,6 +33,7 @@ from foosim.launcher.plan import Plan
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.early_signals import handling
 from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.open_plane_warning import Exposure
@@ -56,16 +58,6 @@ HANGS_MAX: Final = 2
 ENDED: Final = ("ended", "failed")
 """States of a run that only waits for its vHub to close the capture."""
 
-T = TypeVar("T")
-
-
-class Killed(Exception):
-    """A second Ctrl-C: all processes were killed. The text has the path of the unfinished capture."""
-
-    def __init__(self, text: str, result: Mapping[str, Any]) -> None:
-        super().__init__(text)
-        self.result = result
-
 
 class Up:
     """One run whose processes are children of this one."""
@@ -77,11 +69,11 @@ class Up:
         display: Display,
         run: str | None = None,
         resumed: RunFolder | None = None,
-        console: Page | None = None,
+        console: Sequence[str] | None = None,
     ) -> None:
         """`capture` is the path of its capture; None captures nothing. `run` names it, `resumed` is the run to resume.
 
-        `console` is the page that is served with the run.
+        `console` has the options of the page that is served with the run.
         """
         self.plan = plan
         self.capture = capture
@@ -107,12 +99,11 @@ class Up:
         """Whether the supervisor was requested to end the run."""
         self._lost: Child | None = None
         self._has_begun = self._has_ended = False
-        self._is_resumed = resumed is not None
+        self._is_resumed, self._is_killed = resumed is not None, False
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
         self._child_times = ChildTimes(observe)
-        declared = plan.deployment.players
-        self._beside = [declared[role] for role in self._roles(self._process_of[SUPERVISOR]) if role in declared]
+        self._beside = self._players(self._process_of[SUPERVISOR])
         """The players that share the supervisor's process."""
         self._hangs = 0
         """How often the supervisor's process was killed because it hung."""
@@ -131,8 +122,8 @@ class Up:
         """Number of the run's recoveries that were shown."""
 
     def run(self) -> Outcome:
-        """Start everything, show it until it is over, and return how it ended. Raises Killed."""
-        with counted_signals(self._count), self.display, self._console:  # its pages show the end of the run
+        """Start everything, show it until it is over, and return how it ended."""
+        with handling(self._count), self.display, self._console:  # its pages show the end of the run
             try:
                 is_started = self._start()
                 if is_started:
@@ -146,6 +137,9 @@ class Up:
             finally:
                 self._launcher.stop()
                 self._launcher.close()
+            if self._is_killed:
+                result = self.unended("killed by a second Ctrl-C")
+                return Outcome(result, ("killed", *self._capture_lines()), is_killed=True)
             self._bring_home()
             return self._outcome()
 
@@ -175,7 +169,11 @@ class Up:
         for process in self.plan.processes.values():
             if len(process.roles) > 1:
                 display.say(f"process {process.name} has {', '.join(process.roles)}")
-        self._show_network()  # while the first process starts
+        from foosim.vhub.links.summary import summaries  # while the first process starts
+        from foosim.vhub.links.summary_text import start_lines
+
+        for line in start_lines(summaries(self.plan.deployment), str(self.plan.options.file)):
+            display.say(line)
         for needs_radio, ready in ((False, self._own_info), (True, self._info_with_radio)):
             info = self._await(ready)
             if info is None:
@@ -200,13 +198,6 @@ class Up:
         name = process.name
         return name not in self._launcher.remotes and self.plan.deployment.launch_of(name) == "local"
 
-    def _show_network(self) -> None:
-        from foosim.vhub.links.summary import summaries
-        from foosim.vhub.links.summary_text import start_lines
-
-        for line in start_lines(summaries(self.plan.deployment), str(self.plan.options.file)):
-            self.display.say(line)
-
     def _begin(self, process: Process, info: RunInfo | None) -> None:
         """Start a process, or print the command line of one that is started by hand."""
         name = process.name
@@ -216,15 +207,12 @@ class Up:
             what, where = ("player", "in a terminal of its own") if is_player else ("node", "on its machine")
             if not is_player and self.plan.options.pki is not None:
                 command, where = [*command[:-1], "DIR"], f"{where}, DIR being the folder of its certificate there"
-            self.display.say(f"waiting for {what} {name}; start it {where}: {command_line(command)}")
+            self.display.say(f"waiting for {what} {name}; start it {where}: {shlex.join(command)}")
         else:
             self._launch(name, command)
 
     def _launch(self, name: str, command: Sequence[str]) -> None:
-        self._start_child(name, command, self.folder.log(name))
-
-    def _start_child(self, name: str, command: Sequence[str], log: Path) -> None:
-        self._launcher.start(name, command, log)
+        self._launcher.start(name, command, self.folder.log(name))
         if SUPERVISOR in self._roles(name):
             self._supervisor_watch.started(self._time_of(self._supervisor))
 
@@ -238,6 +226,11 @@ class Up:
         process = self.plan.processes.get(name)
         return (name,) if process is None else process.roles
 
+    def _players(self, name: str) -> list[Player]:
+        """Return the players of a process."""
+        declared = self.plan.deployment.players
+        return [declared[role] for role in self._roles(name) if role in declared]
+
     def _own_info(self) -> RunInfo | None:
         """Return the contents of the run file, once our supervisor has written it."""
         info = self.folder.info()
@@ -247,13 +240,13 @@ class Up:
         info = self.folder.info()
         return info if info is not None and info.radio else None
 
-    def _await(self, value: Callable[[], T | None]) -> T | None:
-        """Return the first value of `value` that is not None; None when the run is over, or is to end, before."""
+    def _await(self, ready: Callable[[], RunInfo | None]) -> RunInfo | None:
+        """Return the first value of `ready` that is not None; None when the run is over, or is to end, before."""
         held_s = time.monotonic() + HELD_S
         while self._goes_on():
             if time.monotonic() > held_s:
                 self.display.release()
-            found = None if self._ending_s else value()
+            found = None if self._ending_s else ready()
             if found is not None:
                 return found
             time.sleep(POLL_S)
@@ -268,8 +261,7 @@ class Up:
         exposure = Exposure(self.plan.address, time.monotonic_ns())
         with ExitStack() as stack:
             while self._goes_on():
-                reminder = exposure.due(time.monotonic_ns())
-                if reminder:
+                if reminder := exposure.due(time.monotonic_ns()):
                     self.display.say(reminder)
                 self._console.look()
                 if time.monotonic() >= next_s:
@@ -332,7 +324,7 @@ class Up:
                 continue
             self._restarts.forget(child.name)
             if child.exit_code is not None:
-                self._start_child(child.name, child.command, child.log)
+                self._launch(child.name, child.command)
             else:  # it was stopped, and has not ended yet
                 self._wanted.add(child.name)
         self._starts = starts
@@ -351,15 +343,14 @@ class Up:
         pids = {role: child.process.pid for role, child in alive.items()}
         away = {role for role, child in alive.items() if child.remote is not None}
         times_s = {role: self._time_of(child) for role, child in alive.items()}
-        killed = self._stalled_watch.look(status, pids, away, times_s)
-        for name, why in killed.items():
+        for name, why in self._stalled_watch.look(status, pids, away, times_s).items():
             self._kill(alive[name], why)
 
     def _end_stalled_supervisor(self, supervisor: Child) -> None:
         """Kill a supervisor that hangs: a new one resumes the run."""
-        if not self._supervisor_watch.is_found and self._own_info() is not None:
-            self._supervisor_watch.found()
-        why = self._supervisor_watch.why_killed(self._time_of(supervisor))
+        watch = self._supervisor_watch
+        watch.is_found = watch.is_found or self._own_info() is not None
+        why = watch.why_killed(self._time_of(supervisor))
         if why and not self._has_ended and not self._ending_s:
             self._hangs += not supervisor.killed
             self._kill(supervisor, why)
@@ -372,8 +363,7 @@ class Up:
     def _show_starved(self) -> None:
         """Show that this machine is starved, and by which processes that was observed."""
         pids = {child.name: child.process.pid for child in self._launcher.alive()}
-        warning = self._child_times.warning(pids, self._own_time.at(time.monotonic()))
-        if warning:
+        if warning := self._child_times.warning(pids, self._own_time.at(time.monotonic())):
             self.display.say(warning)
 
     def _kill(self, child: Child, why: str) -> None:
@@ -402,17 +392,11 @@ class Up:
         """
         may_judge = self._has_begun or knows or self._control is None
         for child in self._launcher.ended() if may_judge else ():
-            if SUPERVISOR in self._roles(child.name):
-                continue
-            if (
-                self._stopped.intersection(self._roles(child.name))
-                or (child.exit_code == DONE and not child.left_early)
-                or self._restarts.is_known(child.name)
-            ):
-                continue
-            if child.exit_code == REFUSED and not knows:
-                continue  # it may have been stopped since the last status
-            if self._comes_back(child):
+            roles = self._roles(child.name)
+            is_kept = SUPERVISOR in roles or self._stopped.intersection(roles) or self._restarts.is_known(child.name)
+            has_left = child.exit_code == DONE and not child.left_early
+            may_be_stopped = child.exit_code == REFUSED and not knows  # since the last status
+            if not (is_kept or has_left or may_be_stopped) and self._comes_back(child):
                 self._restart_later(child, now_s)
         self._start_due(now_s)
 
@@ -433,8 +417,11 @@ class Up:
     def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
-            command = self._vhub_again(name) if VHUB in self._roles(name) else child.command
-            self._start_child(name, command, child.log)
+            command: Sequence[str] = child.command
+            if VHUB in self._roles(name):  # with the address that clients know
+                again, info = self.plan.processes[name], self.folder.info()
+                command = self._commands.of(again, info, self._launcher.remotes.get(name))
+            self._launch(name, command)
 
     def _comes_back(self, child: Child) -> bool:
         """Whether the run waits for a replacement of this process, which has ended.
@@ -442,34 +429,24 @@ class Up:
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
         player that is not to be restarted is included: it has not acted, so it loses no state.
         """
-        roles, nodes = self._roles(child.name), self.plan.deployment.nodes
-        if VHUB in roles and (child.exit_code == REFUSED or child.name in self._restarts.failed):
-            return False
-        if self._has_begun:
-            has_players = any(role in self.plan.deployment.players for role in roles)
-            is_needed = VHUB in roles or any(role in nodes for role in roles)
-            return self._plays_again(child) if has_players else is_needed
-        is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
-        may_come = child.how.is_by_signal or child.is_away or is_orphan
-        return may_come and child.name not in self._restarts.failed
-
-    def _plays_again(self, child: Child) -> bool:
-        """Whether these are players whom something else has ended: one that ends by itself has failed."""
-        declared = self.plan.deployment.players
-        players = [declared[role] for role in self._roles(child.name) if role in declared]
-        may_restart = bool(players) and all(player.restart for player in players)
+        roles, players = self._roles(child.name), self._players(child.name)
+        is_given_up = child.name in self._restarts.failed
         is_lost = child.how.is_by_signal or child.is_away
-        return may_restart and is_lost and child.name not in self._restarts.failed
-
-    def _vhub_again(self, name: str) -> list[str]:
-        """Return the command that restarts the vHub's process, with the address that clients know."""
-        return self._commands.of(self.plan.processes[name], self.folder.info(), self._launcher.remotes.get(name))
+        if VHUB in roles and (child.exit_code == REFUSED or is_given_up):
+            return False
+        if not self._has_begun:
+            is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
+            return (is_lost or is_orphan) and not is_given_up
+        if players:  # one that ends by itself has failed
+            return is_lost and not is_given_up and all(player.restart for player in players)
+        return VHUB in roles or any(role in self.plan.deployment.nodes for role in roles)
 
     def _goes_on(self) -> bool:
         """Handle ended children and Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
-            raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
+            self._is_killed = True
+            return False
         supervisor = self._supervisor
         now_s = self._own_time.at(time.monotonic())
         if supervisor.exit_code is not None:
@@ -548,7 +525,7 @@ class Up:
                 self.folder.write_result(result)
         summary = [", ".join(result["summary"])] if result["summary"] else []
         lines = [*map(recovery_text, result["recoveries"][self._shown :]), line, *summary]
-        return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
+        return Outcome(result, (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:
         """Return the result of a run without an ordered end."""
@@ -578,6 +555,6 @@ class Up:
         lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 
-    def _count(self) -> None:
-        """Take note of a Ctrl-C."""
+    def _count(self, number: int, frame: object) -> None:
+        """Take note of a Ctrl-C, SIGTERM or SIGHUP."""
         self._interrupts += 1

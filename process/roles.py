@@ -7,15 +7,15 @@ vHub has folded its journal before the supervisor asks for it.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
 from foosim.client.main import PlayerShell, run_to_end
 from foosim.common.addresses import Address
-from foosim.launcher.journal_check import supervisor_records
 from foosim.launcher.plan import Plan
+from foosim.launcher.resume import supervisor_records
 from foosim.node.main import NodeShell
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
@@ -24,80 +24,69 @@ from foosim.runtime.journal import remove_journal
 from foosim.runtime.process import Stop
 from foosim.runtime.roles.shell import Process, client_session
 from foosim.runtime.run_folder import RunFolder
-from foosim.runtime.transport.certificates import Credentials, load_credentials
+from foosim.runtime.transport.certificates import load_credentials
 from foosim.runtime.transport.session import Session
 from foosim.supervisor.main import open_supervisor
 from foosim.vhub.main import HubOptions, open_vhub
 
 
-@dataclass(frozen=True, slots=True)
-class Roles:
-    """The roles of one process, and where it finds the others."""
+def run_roles(  # noqa: PLR0913  # what the command was given
+    name: str,
+    supervisor: tuple[Plan, RunFolder] | None,
+    vhub: tuple[HubOptions, Address] | None,
+    nodes: Sequence[str],
+    players: Sequence[str],
+    *,
+    connect: str,
+    radio: str,
+    pki: Path | None,
+    progress: Path | None,
+) -> int:
+    """Run the roles of the process `name` until their run ends; return the exit code. Raises Refused.
 
-    name: str
-    """The process's name."""
-    supervisor: tuple[Plan, RunFolder] | None = None
-    vhub: tuple[HubOptions, Address] | None = None
-    """With the address of the radio plane."""
-    nodes: tuple[str, ...] = ()
-    players: tuple[str, ...] = ()
-    connect: str = ""
-    """Address of the supervisor, where it is in another process."""
-    radio: str = ""
-    """Address of the vHub's radio plane, where it is in another process; only players need it."""
-    pki: Path | None = None
-    progress: Path | None = None
-
-    @property
-    def identity(self) -> str:
-        """Its identity on the simulation plane; empty where it has no role there."""
-        here = ([VHUB] if self.vhub is not None else []) + [identity.node(name) for name in self.nodes]
-        return identity.process(self.name) if len(here) > 1 else "".join(here)
-
-
-def run_roles(roles: Roles) -> int:
-    """Run the roles until their run ends; return the exit code. Raises Refused."""
+    `vhub` has the address of the radio plane. `connect` is the address of the supervisor where it is in another
+    process, `radio` that of the vHub's radio plane, which only players need.
+    """
     stop = Stop()
-    process = Process(roles.name, roles.progress, is_shared=True)
+    process = Process(name, progress, is_shared=True)
     with ExitStack() as opened:
 
-        def add_players(radio: Session | None) -> None:
+        def add_players(session: Session | None) -> None:
             """Add the players: on the vHub's session, else on one of theirs, or with certificates on one each."""
             credentials = None
-            for name in roles.players:
-                if radio is None or credentials is not None:  # a session has one certificate
-                    radio, credentials = opened.enter_context(radio_link(name))
-                process.add(PlayerShell(process, name, radio, credentials=credentials))
+            for player in players:
+                if session is None or credentials is not None:  # a session has one certificate
+                    link = client_session(radio, identity.client(player), pki, stop, Plane.RADIO)
+                    session, credentials = opened.enter_context(link)
+                process.add(PlayerShell(process, player, session, credentials=credentials))
 
-        def radio_link(name: str) -> AbstractContextManager[tuple[Session, Credentials | None]]:
-            return client_session(roles.radio, identity.client(name), roles.pki, stop, Plane.RADIO)
-
-        supervisor, simulation, credentials = None, None, None
-        if roles.supervisor is not None:
-            plan, folder = roles.supervisor
+        shell, simulation, credentials = None, None, None
+        here = ([VHUB] if vhub is not None else []) + [identity.node(node) for node in nodes]
+        if supervisor is not None:
+            plan, folder = supervisor
             settings = plan.settings(folder.name, is_launched=True)
             records = partial(supervisor_records, folder, plan.options)
-            supervised = open_supervisor(process, settings, plan.address, roles.pki, folder, records)
-            supervisor = opened.enter_context(supervised)
-            simulation = supervisor.session
-        elif roles.identity:
-            link = client_session(roles.connect, roles.identity, roles.pki, stop)
-            simulation, credentials = opened.enter_context(link)
-        if roles.vhub is not None:
+            supervised = open_supervisor(process, settings, plan.address, pki, folder, records)
+            shell = opened.enter_context(supervised)
+            simulation = shell.session
+        elif here:
+            own_name = identity.process(name) if len(here) > 1 else here[0]
+            simulation, credentials = opened.enter_context(client_session(connect, own_name, pki, stop))
+        if vhub is not None:
             assert simulation is not None
-            options, address = roles.vhub
-            own = load_credentials(roles.pki, VHUB)
+            options, address = vhub
+            own = load_credentials(pki, VHUB)
             hub = open_vhub(process, simulation, address, options, own, add_players)
             process.add(opened.enter_context(hub))
-        if supervisor is not None:
-            process.add(supervisor)
-        for name in roles.nodes:
+        if shell is not None:
+            process.add(shell)
+        for node in nodes:
             assert simulation is not None
-            process.add(NodeShell(process, name, simulation, credentials=credentials))
-        if roles.vhub is None:
+            process.add(NodeShell(process, node, simulation, credentials=credentials))
+        if vhub is None:
             add_players(None)
         stop.then(process.stop)
         code = run_to_end(process)
-    if code == DONE and roles.supervisor is not None:
-        remove_journal(roles.supervisor[1].journals, SUPERVISOR)
+    if code == DONE and supervisor is not None:
+        remove_journal(supervisor[1].journals, SUPERVISOR)
     return code

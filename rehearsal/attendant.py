@@ -18,7 +18,7 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Final
 
-from foosim.client.failing import Unanswered
+from foosim.client.errors import Unanswered
 from foosim.rehearsal.onlooker import LOOK_S, Onlooker
 from foosim.rehearsal.system import System
 

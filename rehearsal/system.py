@@ -14,10 +14,9 @@ from typing import Any, Final
 from mypy_extensions import mypyc_attr
 
 from foosim.client.core import ClientCore
-from foosim.client.errors import PlayerError
-from foosim.client.failing import Unanswered, report_failure
+from foosim.client.errors import PlayerError, Unanswered
 from foosim.client.loading import load_player
-from foosim.client.playing import PlayerLoop
+from foosim.client.playing import PlayerLoop, report_failure
 from foosim.common import limits
 from foosim.node.engines_pool import Solver
 from foosim.protocol import channels

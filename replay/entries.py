@@ -23,8 +23,8 @@ from foosim.capture.foxglove_reader import read_log, read_poses, renamed_scene
 from foosim.capture.mcap.format import Message
 from foosim.capture.rows import CLIENTS, FRAME, ROW_TYPES, TICK, ClientRow, PacketRow
 from foosim.common import limits
-from foosim.common.errors import BadValue, show
-from foosim.common.names import is_name, is_robot_name, nearest_name
+from foosim.common.errors import BadValue, no_such
+from foosim.common.names import is_name, is_robot_name
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import encode
 from foosim.protocol.replay_messages import (
@@ -91,9 +91,7 @@ def make_selection(deployment: Deployment, topics: Sequence[str] = (), remaps: S
     """
     for topic in topics:
         if not any(topic == known or topic.startswith(f"{known}/") for known in TOPICS):
-            nearest = nearest_name(topic, TOPICS)
-            what = f"--topic: not one of {', '.join(TOPICS)}, nor below one"
-            raise BadValue(what, topic, None if nearest is None else show(nearest))
+            raise no_such(f"--topic: not one of {', '.join(TOPICS)}, nor below one", topic, TOPICS)
     return Selection(tuple(topics), *_renamed(deployment, remaps))
 
 
@@ -107,9 +105,7 @@ def _renamed(deployment: Deployment, remaps: Iterable[str]) -> tuple[dict[str, s
         old, new = _parse_remap(text)
         table = channels if old.startswith("/") else names
         if table is names and old not in known:
-            nearest = nearest_name(old, known)
-            what = "--remap: the capture's deployment has no such endpoint or body"
-            raise BadValue(what, old, None if nearest is None else show(nearest))
+            raise no_such("--remap: the capture's deployment has no such endpoint or body", old, known)
         if old.removeprefix("/") in table:
             raise BadValue("--remap: renamed twice", old)
         table[old.removeprefix("/")] = new.removeprefix("/")

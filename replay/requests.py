@@ -66,18 +66,11 @@ class Requests:
         playback = self._playback
         if playback.ended and verb not in (STATUS, STOP):
             raise Refused("the replay has ended")
-        if verb == PAUSE:
-            playback.pause(now_ns)
-        elif verb == RESUME:
-            playback.resume(now_ns)
-        elif verb == STEP:
-            playback.step(arguments["count"], now_ns)
-        elif verb == SEEK:
-            playback.seek(arguments["time_ns"], now_ns)
-        elif verb == RATE:
+        self.stopped = self.stopped or verb == STOP
+        if verb == RATE:
             playback.set_pace(parse_pace(arguments["pace"]), now_ns)
-        elif verb == STOP:
-            self.stopped = True
+        elif verb in (PAUSE, RESUME, STEP, SEEK):
+            getattr(playback, verb)(*arguments.values(), now_ns)
         clock = playback.clock(now_ns)
         at = {"time_ns": playback.heading_ns(now_ns), "rate": clock.rate, "state": clock.state, "jumps": clock.jumps}
         return {**at, "published": playback.published, **self._description}

@@ -2,7 +2,7 @@
 
 The function behind `foosim capture verify`. It starts with the frame that the run began with, which is frame 0 but
 for a branch, on any number of nodes, and names the first tick and the entities that differ. With a later one it starts
-only where that is asked for, of a cut.
+only where that is asked for, of a cut. Frames between the captured ones are computed in the same way.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.reader import CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
+from foosim.capture.reader import About, CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
 from foosim.deployment.loader import load_deployment
 from foosim.node.physics.mesh_trial import check_models
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.assembly.initial_state import added_to, first_chain, start_with
-from foosim.world.frame import Frame, chain_next
+from foosim.world.frame import CHAIN_START, Frame, chain_next
 from foosim.world.start import Start
 
 
@@ -91,10 +91,7 @@ def verify(
 
     `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
     """
-    text = with_nodes(text, name, nodes)
-    deployment = load_deployment(text, name).with_assets(files or {})
-    check_models(deployment, name, text)
-    replica = Replica(text, name, deployment, start=start)
+    replica = replica_of(text, name, files or {}, start, nodes)
     chain = first_chain(None if start is None else start.origin)
     try:
         first = replica.frame.tick
@@ -102,6 +99,14 @@ def verify(
         return replace(found, arithmetic=replica.arithmetic.hex(), first_tick=first)
     finally:
         replica.close()
+
+
+def replica_of(text: str, name: str, files: Mapping[str, bytes], start: Start | None, nodes: int = 1) -> Replica:
+    """Return a deployment's world on so many nodes, at its start. Raises AssetError for a file of an unfit model."""
+    text = with_nodes(text, name, nodes)
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
+    return Replica(text, name, deployment, start=start)
 
 
 def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:
@@ -128,3 +133,41 @@ def _differing(frame: Frame, captured: CapturedTick) -> tuple[str, ...]:
         for entity, digest in zip(entities, captured.entities, strict=True)
         if frame.entity_digest(entity) != digest
     )
+
+
+class Between:
+    """Computes frames of one capture on one node, which is made when it is first needed. It belongs to one thread."""
+
+    def __init__(self, about: About) -> None:
+        self._about = about
+        self._replica: Replica | None = None
+
+    def __call__(self, frame: Frame, inputs: Iterable[CapturedTick]) -> Frame | None:
+        """Return the frame that inputs lead to from a captured one; None where it is not what the capture had.
+
+        Raises Refused where the capture cannot be computed again: its files do not fit.
+        """
+        replica = self._at(frame)
+        for captured in inputs:
+            found = replica.step(captured.edits, captured.delivered)
+            if found.digest != captured.digest:
+                self.close()
+                return None
+        return replica.frame
+
+    def _at(self, frame: Frame) -> Replica:
+        """Return the node, standing at a frame."""
+        if self._replica is not None:
+            if self._replica.frame.digest != frame.digest or self._replica.frame.tick != frame.tick:
+                self._replica.set_back(frame)
+            return self._replica
+        about = self._about
+        start = start_with(frame, about.path.name, CHAIN_START, added_to(frame.layout))
+        self._replica = replica_of(about.deployment_text, about.deployment_name, about.files, start)
+        return self._replica
+
+    def close(self) -> None:
+        """Give the node up; it is made again when it is needed."""
+        if self._replica is not None:
+            self._replica.close()
+            self._replica = None

@@ -87,15 +87,10 @@ def run_app(app: typer.Typer, name: str) -> NoReturn:
     """Run the command `name` and end with its exit code; refusals are shown without a traceback.
 
     With `--json` a command that is refused before its result prints an object, too: `failed`, `reason`.
-
-    Garbage collections skip imported objects, which live as long as the process; at its end they would take a fifth of
-    the time of a short command.
     """
     words = sys.argv[1:]
     others = _sessions()
     _printed.clear()
-    if gc.get_freeze_count() == 0:
-        gc.freeze()
     reason = ""
     try:
         code = _run(app, name, words)
@@ -123,7 +118,12 @@ def _sessions() -> Collection[Any]:
 
 
 def _end(code: int, others: Collection[Any]) -> NoReturn:
-    """End the process, also where a thread is inside Zenoh still, which would abort it at Python's own end."""
+    """End the process, also where a thread is inside Zenoh still, which would abort it at Python's own end.
+
+    Garbage collections at that end skip all that there is: they would take a tenth of the time of a short command.
+    """
+    if gc.get_freeze_count() == 0:
+        gc.freeze()
     session = sys.modules.get(SESSION)
     if session is not None and not session.end_all(others):
         atexit._run_exitfuncs()  # a terminal gets its settings back, among others

@@ -7,8 +7,8 @@ once. This module imports little, so that it is ready first.
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Final
 
 ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -27,15 +27,20 @@ def raise_noted() -> None:
         _interrupt(_noted.pop(0), None)
 
 
-@contextmanager
-def interrupting_signals() -> Iterator[None]:
+def interrupting_signals() -> AbstractContextManager[None]:
     """Raise KeyboardInterrupt at each Ctrl-C, SIGTERM or SIGHUP until the run handles them."""
-    before = {number: signal.signal(number, _interrupt) for number in ENDING}
+    return handling(_interrupt)
+
+
+@contextmanager
+def handling(handler: Callable[[int, object], None]) -> Iterator[None]:
+    """Call `handler` with the number of each Ctrl-C, SIGTERM or SIGHUP instead of ending."""
+    before = {number: signal.signal(number, handler) for number in ENDING}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def _interrupt(number: int, frame: object) -> None:

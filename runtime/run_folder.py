@@ -12,7 +12,7 @@ import os
 import shutil
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import msgspec
 import platformdirs
@@ -33,6 +33,8 @@ HOLD_TRIES: Final = 50
 SPARE_FILE: Final = "spare"
 SPARE_BYTES: Final = 64 * 1024
 """Kept on the disk while the run lives, so that its result can be written when the disk is full."""
+
+Content = TypeVar("Content")
 
 
 class NoRun(Failed):
@@ -112,14 +114,16 @@ class RunFolder:
 
     def write_launch(self, launch: Launch) -> None:
         """Write how the run was launched, so that it can be launched again."""
-        _replace(self.path / LAUNCH_FILE, msgspec.json.format(msgspec.json.encode(launch)))
+        _replace(self.path / LAUNCH_FILE, launch)
 
     def launch(self) -> Launch | None:
         """Return how the run was launched; None when no launcher did, or its file cannot be read."""
-        try:
-            return msgspec.json.decode((self.path / LAUNCH_FILE).read_bytes(), type=Launch)
-        except (OSError, msgspec.DecodeError):
-            return None
+        return self._read(LAUNCH_FILE, Launch)
+
+    def capture(self) -> Path | None:
+        """Return the path of the capture that the run was launched with; None without one."""
+        launch = self.launch()
+        return None if launch is None or not launch.capture else Path(launch.capture)
 
     def is_fresh(self) -> bool:
         """Whether nothing has run in it yet."""
@@ -141,27 +145,26 @@ class RunFolder:
 
     def write_info(self, info: RunInfo) -> None:
         """Write the run file; a reader sees the old one or the new one."""
-        _replace(self.path / RUN_FILE, msgspec.json.format(msgspec.json.encode(info)))
+        _replace(self.path / RUN_FILE, info)
 
     def info(self) -> RunInfo | None:
         """Return the run file's content, or None while there is none."""
-        try:
-            return msgspec.json.decode((self.path / RUN_FILE).read_bytes(), type=RunInfo)
-        except UNREADABLE:
-            return None
+        return self._read(RUN_FILE, RunInfo)
 
     def write_result(self, result: dict[str, Any]) -> None:
         """Write how the run ended, on a disk that is full, too."""
         (self.path / SPARE_FILE).unlink(missing_ok=True)
-        _replace(self.path / RESULT_FILE, msgspec.json.format(msgspec.json.encode(result)))
+        _replace(self.path / RESULT_FILE, result)
 
     def result(self) -> dict[str, Any] | None:
         """Return how the run ended, or None when it did not end in order."""
+        return self._read(RESULT_FILE, dict[str, Any])
+
+    def _read(self, name: str, kind: type[Content]) -> Content | None:
         try:
-            content = msgspec.json.decode((self.path / RESULT_FILE).read_bytes())
+            return msgspec.json.decode((self.path / name).read_bytes(), type=kind)
         except UNREADABLE:
             return None
-        return content if isinstance(content, dict) else None
 
 
 def is_locked(path: Path) -> bool:
@@ -179,9 +182,9 @@ def is_locked(path: Path) -> bool:
     return False
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, content: Launch | RunInfo | dict[str, Any]) -> None:
     fresh = path.with_name(path.name + ".new")
-    fresh.write_bytes(content + b"\n")
+    fresh.write_bytes(msgspec.json.format(msgspec.json.encode(content)) + b"\n")
     fresh.replace(path)
 
 

@@ -149,8 +149,8 @@ class SupervisorShell:
 
     def _has_capture(self) -> bool:
         """Whether the capture's file is marked as closed. A file on another machine cannot be checked from here."""
-        launch = self._folder.launch()
-        return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
+        capture = self._folder.capture()
+        return capture is not None and is_complete(capture)
 
     def _is_captured(self) -> bool:
         """Whether no capture is written, or its file is closed: no vHub has anything left to do."""

@@ -5,6 +5,6 @@ Those of deploy/table.yaml act when the camera's picture comes, at ticks that th
 
 from typing import Final
 
-from foosim.rehearsal.swarm.campaign import BY_PERIOD as KEYS
+from tests.swarm.campaign import BY_PERIOD as KEYS
 
 BY_PERIOD: Final = tuple(f"players.{name}.{key}" for name in ("player-red", "player-blue") for key in KEYS)

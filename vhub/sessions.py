@@ -11,6 +11,7 @@ are welcomed, and the first that joins has the name.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeVar
@@ -35,13 +36,39 @@ from foosim.protocol.messages import (
 )
 from foosim.runtime.closed import CLOSED, closed
 from foosim.vhub.network.memory import Joining
-from foosim.vhub.state.downlinks import Downlinks
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.members import may_lockstep, may_restart
 
 T = TypeVar("T")
 BOOTS_KEPT: Final = 32
 """How many earlier processes of one name are remembered: late messages arrive within seconds."""
+_Kept = tuple[int, int, bytes]
+"""When it expires, its number, its bytes."""
+
+
+class Downlinks:
+    """The last downlinks of every client, each kept for `kept_ns`: one that returns may lack them."""
+
+    def __init__(self) -> None:
+        self.kept_ns = limits.DOWNLINK_KEPT_NS
+        self._by_client: dict[str, deque[_Kept]] = {}
+
+    def keep(self, client: str, number: int, payload: bytes, now_ns: int) -> None:
+        """Add a downlink, and drop expired ones."""
+        kept = self._by_client.setdefault(client, deque(maxlen=limits.DOWNLINKS_KEPT_MAX))
+        while kept and kept[0][0] < now_ns:
+            kept.popleft()
+        kept.append((now_ns + self.kept_ns, number, payload))
+
+    def restore(self, downlinks: dict[str, list[tuple[int, bytes]]], now_ns: int) -> None:
+        """Restore the downlinks of the vHub process before this one."""
+        for client, said in downlinks.items():
+            for number, payload in said:
+                self.keep(client, number, payload, now_ns)
+
+    def behind(self, client: str, received: int) -> Iterable[bytes]:
+        """Return the downlinks with numbers above `received`, in order."""
+        return [payload for _, number, payload in self._by_client.get(client, ()) if number > received]
 
 
 class Claim(NamedTuple):

@@ -14,7 +14,7 @@ from hashlib import blake2b
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
-from foosim.common.finding import Finding, Location
+from foosim.common.finding import Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     LINEAR_VELOCITY,
@@ -392,21 +392,6 @@ def slot_that_speaks(robot: Entity, channel: str, field: str) -> str:
     return own if robot.offsets.get(own, -1) >= robot.split else field
 
 
-def unheard(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield the sensors that speak by a slot that their robot does not have."""
-    layout: Layout | None = None
-    for name, robot in spec.robots.items():
-        for channel, settings in robot.sensors.items():
-            speaks = registry.find_component("sensor", settings.kind).speaks
-            if not speaks:
-                continue
-            layout = layout or build_layout(spec)
-            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
-                valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
-                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
-                yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
-
-
 def _demanded(robot: RobotSettings) -> dict[str, int]:
     """Return the fields of a robot that its model has on demand."""
     model = registry.model_of(robot)
@@ -429,44 +414,6 @@ def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:
     for one in declaring(spec, name, robot):
         (owner if one.is_owners else solver).update(one.slots)
     return Carried(solver, owner)
-
-
-def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what declares a slot of an entity that something else has declared: it would be in one place for both."""
-    of_rules: list[tuple[str, Declaring]] = []
-    for label, settings in world_rules(spec).items():
-        place: Location = ("rules", label) if label in spec.rules else tuple(_kit_with(spec, label))
-        for model, slots in find_rule(settings).each.items():
-            named = _behind(label, slots)
-            of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
-    seen: set[tuple[int, tuple[tuple[str, int], ...]]] = set()
-    for name, robot in spec.robots.items():
-        parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
-        alike = id(registry.model_of(robot)), tuple([(label, id(settings)) for label, settings in parts])
-        if alike not in seen:  # many robots of a fleet are
-            seen.add(alike)
-            remembered = [one for model, one in of_rules if model in (registry.model_of(robot).name, ROBOTS)]
-            yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
-    for kit in kits_named(spec):
-        for name, model in kit.entities.items():
-            kind = _model(model)
-            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
-            yield from _doubled([motion, *(one for its, one in of_rules if its == kind.name)], name)
-
-
-def _kit_with(spec: WorldSpec, rule: str) -> Iterator[str]:
-    """Yield the kits that have a rule."""
-    return (kit.name for kit in kits_named(spec) if rule in kit.rules)
-
-
-def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
-    first: dict[str, Declaring] = {}
-    for one in all_of_it:
-        for slot in one.slots:
-            other = first.setdefault(slot, one)
-            if other is not one:
-                what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
-                yield Finding(one.location, what, slot.partition(".")[2], at="key")
 
 
 def _slots_of_modifiers(

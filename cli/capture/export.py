@@ -17,8 +17,7 @@ from foosim.analysis.export import STANDARD_OUTPUT, Format, export_capture
 from foosim.analysis.tables import table_names
 from foosim.capture.cut import cut_capture
 from foosim.cli.capture.options import Capture, reading, time_of
-from foosim.common.errors import BadValue, show
-from foosim.common.names import nearest_name
+from foosim.common.errors import UnknownName
 from foosim.runtime.command import DONE, FAILED, JsonOption, print_json
 
 _TABLES = ", ".join(table_names())
@@ -58,8 +57,7 @@ def _format(text: str | None) -> Format | None:
             return known
     if text is None:
         return None
-    nearest = nearest_name(text, formats)
-    raise BadValue(f"--format: not one of {', '.join(formats)}", text, None if nearest is None else show(nearest))
+    raise UnknownName("--format: not a format", text, formats)
 
 
 def cut(

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 from foosim.common.errors import Malformed
 from foosim.console.live.history import History
-from foosim.console.live.status_marks import StatusMarks
 from foosim.console.live.watched import Watched
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
@@ -24,6 +23,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.network.rules import Event
 from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
+from foosim.launcher.display import recovery_text
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame
@@ -254,3 +254,26 @@ def _first(drawing: Drawing, what: Mapping[str, Any]) -> Frame | None:
         return initial_frame(drawing.deployment) if is_start else None
     commit = decode(Commit, b64decode(what["frame"]))
     return frame_from_bytes(commit.tick, drawing.layout, commit.values, commit.outboxes)
+
+
+class StatusMarks:
+    """What is marked on the time line out of statuses: losses and returns, requests, each once."""
+
+    def __init__(self) -> None:
+        self._recoveries = 0
+        self._requests: set[tuple[Any, ...]] = set()
+
+    def new(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the marks that a status adds."""
+        marks = []
+        for entry in status["recoveries"][self._recoveries :]:
+            if entry["outage_ms"] is None:
+                break  # it is marked when it has ended
+            marks.append({"tick": entry["tick"], "kind": "recovery", "text": recovery_text(entry)})
+            self._recoveries += 1
+        requests = [(asked["tick"], asked["verb"], asked["text"], asked["who"]) for asked in status["requests"]]
+        for tick, verb, text, who in requests:
+            if (tick, verb, text, who) not in self._requests:
+                marks.append({"tick": tick, "kind": "request", "text": f"{who}: {text}"})
+        self._requests = set(requests)
+        return marks

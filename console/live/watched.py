@@ -6,16 +6,20 @@ Pure; explaining takes milliseconds a packet, so it is done where it holds up no
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
-from foosim.analysis.drops_shown import Reported, explain_drops
-from foosim.analysis.explain import Explained
-from foosim.capture.rows import PacketRow
+import msgspec
+
+from foosim.analysis.explain import Explained, explain_row
+from foosim.capture.rows import ClientRow, PacketRow
 from foosim.common.errors import Refused
+from foosim.console.shown.links import drop_message
 from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.source import Link
 from foosim.deployment.schema import Deployment
+from foosim.vhub.network.custom_models import model_versions
+from foosim.vhub.stages.told import Evidence
 from foosim.world.frame import Frame
 
 FRAMES_KEPT: Final = 64
@@ -82,21 +86,26 @@ class Watched:
             return next((frame for frame in reversed(frames) if frame.tick <= tick), None)
 
         try:
-            found = explain_drops(Reported(self._deployment, report, frame), source, destination)
+            found = explain_drops(self._deployment, report, (source, destination), frame)
         except Refused:  # such as a model of links that is not installed here
             found = []
         return {
             "type": "watched",
             "link": [source, destination],
             "rule": rule,
-            "drops": [self._drop(row, explained) for row, explained in found],
+            "drops": [drop_message(row.sent_ns // self._deployment.tick_ns, explained) for row, explained in found],
         }
 
-    def _drop(self, row: PacketRow, explained: Explained) -> dict[str, Any]:
-        return {
-            "tick": row.sent_ns // self._deployment.tick_ns,
-            "cause": row.cause,
-            "head": explained.head,
-            "steps": [{"stage": step.stage, "outcome": step.outcome, "text": step.text} for step in explained.steps],
-            "verdict": explained.verdict,
-        }
+
+def explain_drops(
+    deployment: Deployment, report: Mapping[str, Any], link: Link, frame: Callable[[int], Frame | None]
+) -> list[tuple[PacketRow, Explained]]:
+    """Return the last drops of a link that the vHub reports under `watched`, oldest first, each explained.
+
+    `frame(tick)` is the newest frame that was shown at or before a tick: None hides what each wall took of a signal.
+    """
+    rows = msgspec.convert(report["drops"].get(f"{link[0]}>{link[1]}", []), list[PacketRow])
+    here = [ClientRow(0, name, "joins", 0, []) for name in report["here"]]
+    asked = [(tick, event) for tick, event in report["asked"]]
+    evidence = Evidence(deployment, model_versions(deployment.network), asked, frame, lambda: here)
+    return [(row, explain_row(evidence, row)) for row in rows]

@@ -6,18 +6,17 @@ belongs to one thread, and so does the `Recording` that it reads. Pure: the call
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from foosim.analysis.explain import Explained, explain_row, network_events
 from foosim.capture.reader import TICK_MARKS
-from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, ClientRow, PacketRow
+from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, PacketRow, Row
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory
 from foosim.console.recorded.recording import Recording
+from foosim.console.shown.links import drop_message
 from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.timeline import Mark, Timeline
-from foosim.deployment.schema import Deployment
-from foosim.world.frame import Frame
+from foosim.vhub.stages.told import Evidence
 
 SLICE_ROWS: Final = 500
 TOLD_MAX: Final = 1024
@@ -43,6 +42,8 @@ class CaptureHistory:
         self._done: dict[str, int] = dict.fromkeys((EPOCHS, RECOVERIES, TICK, FRAME, PACKETS), 0)
         self._asked: list[tuple[int, str]] = []
         """Requested events of the network, by tick."""
+        versions, frame = recording.about.versions, recording.frame_up_to
+        self._evidence = Evidence(recording.deployment, versions, self._asked, frame, self._clients)
         self._told: dict[int, Explained] = {}
         self._rules = RuleTexts(recording.deployment)
         self._generation = recording.index.generation
@@ -120,39 +121,15 @@ class CaptureHistory:
         drops = []
         for number in self.links.last_drops(source, destination, at_ns):
             row = self.packet(number)
-            told = self._told.get(number) or explain_row(self, row)
+            told = self._told.get(number) or explain_row(self._evidence, row)
             if len(self._told) >= TOLD_MAX:
                 self._told.clear()
             self._told[number] = told
             dropped_ns = row.sent_ns if row.arrival_tick < 0 else row.arrival_tick * self.recording.tick_ns
-            drops.append(
-                {
-                    "tick": dropped_ns // self.recording.tick_ns,
-                    "cause": told.cause,
-                    "head": told.head,
-                    "steps": [{"stage": s.stage, "outcome": s.outcome, "text": s.text} for s in told.steps],
-                    "verdict": told.verdict,
-                }
-            )
-        rule = self._rules.text(source, destination, at_ns, self.asked(at_ns // self.recording.tick_ns))
+            drops.append(drop_message(dropped_ns // self.recording.tick_ns, told))
+        asked = [asked for asked in self._asked if asked[0] <= at_ns // self.recording.tick_ns]
+        rule = self._rules.text(source, destination, at_ns, asked)
         return {"link": [source, destination], "rule": rule, "drops": drops}
 
-    # What `explain` asks for: this is its evidence.
-
-    @property
-    def deployment(self) -> Deployment:
-        return self.recording.deployment
-
-    @property
-    def versions(self) -> Mapping[str, str]:
-        return self.recording.about.versions
-
-    def asked(self, until: int) -> Iterable[tuple[int, str]]:
-        return [asked for asked in self._asked if asked[0] <= until]
-
-    def frame(self, tick: int) -> Frame | None:
-        return self.recording.frame_up_to(tick)
-
-    def clients(self) -> Iterable[ClientRow]:
-        rows = len(self.recording.index.places[CLIENTS])
-        return [self.recording.row(CLIENTS, number) for number in range(rows)]
+    def _clients(self) -> list[Row]:
+        return [self.recording.row(CLIENTS, number) for number in range(len(self.recording.index.places[CLIENTS]))]

@@ -18,7 +18,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CapturedTick
 from foosim.capture.rows import CLIENTS, PACKETS
 from foosim.common.errors import Refused
-from foosim.console.clock.comparing import Compare, compared
+from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import ARGUMENTS, VERBS, Clock, Deck, checked
 from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.branch_text import branch_answer
@@ -73,8 +73,8 @@ class FileSource:
             clock = self._deck = Deck(Playhead(first, last, tick_ns), tick_ns, time.monotonic_ns)
         self.clock: Final = clock
         self.offset_ns: Final = offset_ns
-        verbs = (*VERBS, BRANCH) if self.is_master else (BRANCH,)
-        self._about = About("capture", path.name, self.recording.deployment.world, tick_ns, verbs, (first, last))
+        verbs = (*VERBS, BRANCH) if self._deck is not None else (BRANCH,)
+        self.about = About("capture", path.name, self.recording.deployment.world, tick_ns, verbs, (first, last))
         self._recompute = recompute
         self._wanted = Wanted()
         self._front = ThreadPoolExecutor(1, "seen")
@@ -93,15 +93,6 @@ class FileSource:
         self._is_inexact = False
         """Whether frames between the captured ones cannot be computed."""
 
-    @property
-    def about(self) -> About:
-        return self._about
-
-    @property
-    def is_master(self) -> bool:
-        """Whether the clock is its own."""
-        return self._deck is not None
-
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
         self.clock.changed()
@@ -115,7 +106,7 @@ class FileSource:
                 for work in (self._show, self._gather, self._tell_status, self._tell_links, self._refresh):
                     tasks.create_task(work(feed))
                 if self._compare is not None:
-                    tasks.create_task(compared(self.clock, self._compare, self.opened(), self.covers).run(feed))
+                    tasks.create_task(compare(feed, self.clock, self._compare, self.opened(), self.covers))
         finally:
             for pool in (self._front, self._back, self._exact):
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -190,7 +181,7 @@ class FileSource:
 
     def _describe(self, feed: Feed) -> None:
         if self._world >= 0:
-            feed.describe(self._about, self.recording.worlds[self._world].drawing.content())
+            feed.describe(self.about, self.recording.worlds[self._world].drawing.content())
 
     async def _show_exactly(self, feed: Feed, look: Look) -> None:
         """Publish the recomputed frame of a tick without one, or the reason why it cannot be computed."""
@@ -258,7 +249,7 @@ class FileSource:
                 feed.tell({"type": "note", "level": "error", "text": str(error)})
                 continue
             first, last = self.recording.span
-            self._about = replace(self._about, span=(first, last))
+            self.about = replace(self.about, span=(first, last))
             if self._deck is not None:
                 self._deck.playhead.grow(first, last, self._deck.clock_ns())
                 self._deck.changed()

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.console.clock.comparing import Compare, compared
+from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import VERBS, Clock, Deck
 from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
@@ -73,21 +73,12 @@ class PosesSource:
         self.clock: Final = clock
         first, last = ((time_ns - offset_ns) // clock.tick_ns for time_ns in (first_ns, last_ns))
         self._covers = first, last
-        verbs = VERBS if self.is_master else ()
+        verbs = VERBS if self._deck is not None else ()
         world = "" if deployment is None else deployment.world
-        self._about = About("poses", path.name, world, clock.tick_ns, verbs, (first, last))
+        self.about = About("poses", path.name, world, clock.tick_ns, verbs, (first, last))
         self._scene = _scene(self.tracks, deployment)
         self._compare = compare
         self._wanted = Wanted()
-
-    @property
-    def about(self) -> About:
-        return self._about
-
-    @property
-    def is_master(self) -> bool:
-        """Whether the clock is its own."""
-        return self._deck is not None
 
     def covers(self) -> tuple[int, int]:
         """Return the first and the last tick of the clock at which something is known."""
@@ -103,11 +94,11 @@ class PosesSource:
         return {name: pose for name, pose in found.items() if pose is not None}
 
     async def run(self, feed: Feed) -> None:
-        feed.describe(self._about, self._scene)
+        feed.describe(self.about, self._scene)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show(feed))
             if self._compare is not None:
-                tasks.create_task(compared(self.clock, self._compare, lambda: self.where, self.covers).run(feed))
+                tasks.create_task(compare(feed, self.clock, self._compare, lambda: self.where, self.covers))
 
     async def _show(self, feed: Feed) -> None:
         names = [link["name"] for link in self._scene["links"]]

@@ -22,7 +22,7 @@ from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.reader import DECODERS, CapturedTick, captured_tick, deployment_of, layout_of, read_about
+from foosim.capture.reader import DECODERS, CapturedTick, captured_tick, deployment_of, layout_of, read_about, row_of
 from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.shown.drawing import Drawing
@@ -124,10 +124,7 @@ class Recording:
 
     def decoded(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
         """Return what a decoder makes of a message. Raises CaptureError."""
-        try:
-            return decoder.decode(message.data)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise CaptureError(f"{self.path}: {message.topic} at {message.log_ns} ns: {error}") from None
+        return row_of(decoder, message, f"{self.path}: ")
 
     def world_at(self, tick: int) -> int:
         """Return the number of the world at a tick; the first one before its beginning."""

@@ -6,7 +6,7 @@ simulated; a packet is counted when it was sent.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -259,7 +259,7 @@ class _Gathered:
         self._fates: Counter[str] = Counter()
         self._copies = 0
         self._causes: dict[str, list[int]] = {}
-        self._links: dict[tuple[str, str], LinkTally] = {}
+        self._links: defaultdict[tuple[str, str], LinkTally] = defaultdict(LinkTally)
         self._channels: dict[str, list[BinTally]] = {}
         self._packets: Counter[str] = Counter()
         self._senders: dict[tuple[str, str], SenderTally] = {}
@@ -274,10 +274,7 @@ class _Gathered:
         number = min(max(row.sent_ns - self._start_ns, 0) // self._bin_ns, self._bins - 1)
         self._fates[row.fate] += 1
         self._copies += row.copy > 0
-        link = row.source, row.destination
-        if link not in self._links:
-            self._links[link] = LinkTally()
-        self._links[link].add(row)
+        self._links[row.source, row.destination].add(row)
         self._channel(row.channel)[number].add(row)
         if row.fate == "dropped":
             self._causes.setdefault(row.cause, [0] * self._bins)[number] += 1
@@ -378,18 +375,9 @@ class _Gathered:
     def _link(self, source: str, destination: str) -> LinkReport:
         tally = self._links[source, destination]
         age = tally.age_ns(self._end_ns)
-        return LinkReport(
-            source,
-            destination,
-            tally.offered,
-            tally.delivered,
-            tally.dropped,
-            dict(sorted(tally.causes.items())),
-            self._delay_ms(source, destination),
-            _ms(tally.delay_most_ns),
-            None if age is None else _ms(age[0]),
-            None if age is None else _ms(age[1]),
-        )
+        counts = tally.offered, tally.delivered, tally.dropped, dict(sorted(tally.causes.items()))
+        delays_ms = self._delay_ms(source, destination), _ms(tally.delay_most_ns)
+        return LinkReport(source, destination, *counts, *delays_ms, *((None, None) if age is None else map(_ms, age)))
 
     def _delay_ms(self, source: str, destination: str) -> float:
         """Return a link's mean delay, 0 where nothing was delivered."""
@@ -406,20 +394,12 @@ class _Gathered:
         return ChannelReport(name, self._packets[name], delivered, dropped, bins)
 
     def _sender(self, source: str, medium: str) -> SenderReport:
-        tally = self._senders[source, medium]
-        span_ns = self._end_ns - self._start_ns
-        return SenderReport(
-            source,
-            medium,
-            tally.queue.count,
-            _ms(tally.queue.mean),
-            _ms(tally.queue.quantile(0.95)),
-            _ms(tally.queue.most),
-            _ms(tally.access.mean),
-            _ms(tally.access.most),
-            tally.retries,
-            round(tally.airtime_ns / span_ns, 6) if span_ns else 0.0,
-        )
+        tally, span_ns = self._senders[source, medium], self._end_ns - self._start_ns
+        queue, access = tally.queue, tally.access
+        queue_ms = _ms(queue.mean), _ms(queue.quantile(0.95)), _ms(queue.most)
+        access_ms = _ms(access.mean), _ms(access.most)
+        share = round(tally.airtime_ns / span_ns, 6) if span_ns else 0.0
+        return SenderReport(source, medium, queue.count, *queue_ms, *access_ms, tally.retries, share)
 
     def _rule(self, rule: str, radio: str) -> RuleReport:
         tally, settings = self._rules[rule, radio], self._settings[rule, radio]

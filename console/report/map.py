@@ -19,6 +19,7 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.console.shown.scene_json import standing_bounds
 from foosim.deployment.network.rules import selects
 from foosim.deployment.schema import Deployment
+from foosim.painting.outlines import hull_of
 from foosim.vhub.line_of_sight.placement import World
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
@@ -304,7 +305,7 @@ def outline(shape: Shape, position: Vector = ORIGIN, orientation: Quaternion = U
     corners = [(x + x0, y + y0, z + z0) for x, y, z in (rotate(turned, corner) for corner in _corners(shape))]
     red, green, blue, _ = shape.colour
     top = max(z for _, _, z in corners)
-    return Outline(shape.name, hull((x, y) for x, y, _ in corners), top, (red, green, blue))
+    return Outline(shape.name, tuple(hull_of([(x, y) for x, y, _ in corners])), top, (red, green, blue))
 
 
 def _corners(shape: Shape) -> Iterable[Vector]:
@@ -328,24 +329,3 @@ def _corners(shape: Shape) -> Iterable[Vector]:
     vertices = (geometry.mesh if isinstance(geometry, Hull) else geometry).vertices
     step = -(-len(vertices) // VERTICES_MAX)
     return [(x, y, z) for x, y, z in vertices[::step].tolist()]
-
-
-def hull(points: Iterable[Place]) -> tuple[Place, ...]:
-    """Return the convex hull of points, counter-clockwise. Source: Andrew's monotone chain (1979)."""
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return tuple(ordered)
-
-    def chain(along: Iterable[Place]) -> list[Place]:
-        found: list[Place] = []
-        for point in along:
-            while len(found) >= 2 and _turn(found[-2], found[-1], point) <= 0.0:
-                found.pop()
-            found.append(point)
-        return found[:-1]
-
-    return tuple(chain(ordered) + chain(reversed(ordered)))
-
-
-def _turn(a: Place, b: Place, c: Place) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

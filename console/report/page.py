@@ -256,20 +256,9 @@ def _senders(found: Report) -> Iterator[str]:
         "that the last attempts took; earlier attempts are in the time of access."
     )
     shown = sorted(found.senders, key=lambda sender: (-sender.airtime_share, sender.source, sender.medium))[:ROWS_SHOWN]
-    head = (
-        "from",
-        "by",
-        "packets",
-        "queue mean ms",
-        "p95",
-        "longest",
-        "access mean ms",
-        "longest",
-        "retries",
-        "airtime",
-    )
+    head = ("from", "by", "packets", "queue mean ms", "p95", "longest", "access mean ms", "longest", "retries")
     yield _table(
-        head,
+        (*head, "airtime"),
         [
             (s.source, s.medium, s.transmissions, f"{s.queue_mean_ms:.3f}", f"{s.queue_p95_ms:.3f}",
              f"{s.queue_most_ms:.3f}", f"{s.access_mean_ms:.3f}", f"{s.access_most_ms:.3f}", s.retries,
@@ -289,18 +278,9 @@ def _configured(found: Report) -> Iterator[str]:
         "is what it adds by itself. Waiting, the medium, the way, clogs, partitions and receivers do the rest. "
         "Configured is what the deployment says: * where events changed it meanwhile."
     )
-    head = (
-        "rule",
-        "radio",
-        "links",
-        "packets",
-        "own loss configured",
-        "measured",
-        "own delay configured ms",
-        "measured",
-    )
+    head = ("rule", "radio", "links", "packets", "own loss configured", "measured", "own delay configured ms")
     yield _table(
-        (*head, "all loss", "mean delay ms", "median", "p95"),
+        (*head, "measured", "all loss", "mean delay ms", "median", "p95"),
         [
             (m.rule + ("*" if m.is_changed else ""), m.radio or "-", m.links, m.packets,
              _percent(m.own_loss_configured), _percent(m.own_loss),

@@ -15,6 +15,7 @@ from itertools import islice
 from math import dist
 from typing import Any, Final
 
+from foosim.analysis.explain import Explained
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
@@ -266,3 +267,14 @@ def _drops(seen: Mapping[Key, Count]) -> list[dict[str, Any]]:
         }
         for (source, destination, cause), count in found.items()
     ]
+
+
+def drop_message(tick: int, explained: Explained) -> dict[str, Any]:
+    """Return a dropped packet as a page shows it."""
+    return {
+        "tick": tick,
+        "cause": explained.cause,
+        "head": explained.head,
+        "steps": [{"stage": step.stage, "outcome": step.outcome, "text": step.text} for step in explained.steps],
+        "verdict": explained.verdict,
+    }

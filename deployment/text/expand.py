@@ -18,14 +18,13 @@ from typing import Final
 from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.finding import Location
-from foosim.common.names import nearest_name
+from foosim.common.names import nearest_quoted
 from foosim.deployment.text.each import EACH, BadSign, Each, Filling, put
-from foosim.deployment.text.fleets import Fleet, fleet_and_number, member, members, read_fleets
+from foosim.deployment.text.fleets import Fleet, fleet_and_number, members, read_fleets
 from foosim.deployment.text.includes import INCLUDE
-from foosim.deployment.text.presets import with_preset
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.selection import Chosen, Population, TooManyComparisons, is_several
-from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, without
+from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, with_preset, without
 from foosim.deployment.text.yaml import DEPTH_MAX, Fields, Items, Leaf, Place, Problem, Tree, measure, plain
 from foosim.world.scenery import SCENERY_MAX
 
@@ -104,16 +103,7 @@ class Expansion:
         if INCLUDE in values:
             what = "a text that came without its files, which has to stand alone"
             report.add(values[INCLUDE].place, (INCLUDE,), what, plain(values[INCLUDE]))
-        for name, section in values.items():
-            if not isinstance(section, Fields):
-                continue
-            values[name] = with_preset(name, section, report)
-            if name in FLEETS:
-                values[name] = (self._robots if name == ROBOTS else None) or self._section_of_fleets(name, section)
-            elif name in FOR_ROBOTS:
-                values[name] = self._section_for_robots(name, section)
-            elif name == "nodes":
-                values[name] = self._nodes or section
+        values |= {name: node for name in values if name != TEMPLATES and (node := self.section(name))}
         whole = without(Fields(self._tree.place, values, self._tree.keys), TEMPLATES, INCLUDE)
         depth, nodes = measure(whole, {})
         if depth > DEPTH_MAX:
@@ -122,37 +112,21 @@ class Expansion:
             report.add(whole.place, (), f"more than {limits.EXPANDED_NODES_MAX} values and keys when expanded", nodes)
         return whole
 
-    # --- one entry, for settings that change what is made -------------------------------------------------------------
-
-    def names(self, section: str) -> list[str]:
-        """Return the names of a section's entries, those that are made among them."""
-        written = self._tree.values.get(section)
-        if not isinstance(written, Fields):
-            return []
-        if section in FLEETS:
-            fleets = self._fleets_of(section, written)
-            made = [f"{key}-{n}" for key, fleet in fleets.items() for n in range(1, fleet.count + 1)]
-            return list(dict.fromkeys([*(key for key in written.values if key not in fleets), *made]))
-        if section in FOR_ROBOTS:
-            eaches = self._eaches_of(section, written)
-            return list(dict.fromkeys([*(key for key in written.values if EACH not in _keys(written, key)), *eaches]))
-        return list(written.values)
-
-    def entry(self, section: str, name: str) -> Tree | None:
-        """Return one entry of a section, expanded; None where there is none."""
-        written = self._tree.values.get(section)
-        if section == TEMPLATES:
-            return self.templates.whole(name) if name in self.templates.names else None
-        if section not in ENTRIES or not isinstance(written, Fields):
-            return None
-        own = written.values.get(name)
-        if section in FLEETS:
-            made = fleet_and_number(name, self._fleets_of(section, written))
-            if made is not None:
-                return member(*made, own, self.templates)
-        elif name in (eaches := self._eaches_of(section, written)):
-            return self._filled(section, name, *eaches[name], own)
-        return None if own is None else self.templates.applied(own, (section, name))
+    def section(self, name: str) -> Tree | None:
+        """Return one section, expanded; of templates those that are not wrong. None where there is none."""
+        section = self._tree.values.get(name)
+        if not isinstance(section, Fields):
+            return section
+        if name == TEMPLATES:
+            wholes = {one: self.templates.whole(one) for one in self.templates.names}
+            return Fields(section.place, {one: node for one, node in wholes.items() if node is not None})
+        if name == ROBOTS:
+            return self._robots
+        if name in FLEETS:
+            return self._section_of_fleets(name, section)
+        if name in FOR_ROBOTS:
+            return self._section_for_robots(name, section)
+        return self._nodes if name == "nodes" else with_preset(name, section, self._report)
 
     # --- fleets -------------------------------------------------------------------------------------------------------
 
@@ -264,9 +238,8 @@ class Expansion:
             self._report.stop()
         if not chosen and place not in self._unmatched:  # by another entry of a template
             self._unmatched.add(place)
-            nearest = nearest_name(text, self._population.names)
-            what = "a selector that matches no robot"
-            self._report.add(place, path, what, text, None if nearest is None else repr(nearest))
+            nearest = nearest_quoted(text, self._population.names)
+            self._report.add(place, path, "a selector that matches no robot", text, nearest)
         return chosen
 
     # --- entries for each robot ---------------------------------------------------------------------------------------

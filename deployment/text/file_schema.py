@@ -15,8 +15,7 @@ from foosim.deployment.text.each import EACH
 from foosim.deployment.text.expand import ENTRIES, FLEETS, FOR_ROBOTS
 from foosim.deployment.text.fleets import AXES, COUNT, SPACING
 from foosim.deployment.text.includes import INCLUDE
-from foosim.deployment.text.presets import PRESET
-from foosim.deployment.text.templates import LIKE, TEMPLATES
+from foosim.deployment.text.templates import LIKE, PRESET, TEMPLATES
 
 Schema = dict[str, Any]
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from foosim.common.errors import describe
-from foosim.common.finding import Finding, Location, path_text
+from foosim.common.finding import Finding, Location, with_written
 from foosim.deployment.text.expand import ENTRIES
 from foosim.deployment.text.fleets import AXES, SPACING
 from foosim.deployment.text.templates import TEMPLATES
-from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree
+from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain_shared
 
 FINDINGS_MAX: Final = 2_000
 """Findings that are looked at, also of those that are the same problem: each may have thousands of names to compare."""
@@ -44,6 +44,7 @@ class Places:
 
     def problem(self, finding: Finding, *, is_made: bool = False) -> Problem:
         """Return the problem that a finding is. `is_made`: it is one of an entry as it is made, whatever made it."""
+        finding = with_written(finding, self._data)
         place, is_key, depth = self._find(finding)
         if finding.other is not None:
             there = self._find(finding.other)
@@ -56,9 +57,7 @@ class Places:
         location = finding.location
         if written[:1] and written[0] in _AS_WRITTEN and not (is_made and written[0] == TEMPLATES):
             location = (*written, *location[depth:])
-        path = path_text(location if finding.at == "value" else location[:-1])
-        text = describe(finding.what, finding.value, finding.nearest)
-        return Problem(place, f"{path}: {text}" if path else text)
+        return Problem(place, replace(finding, location=location).text)
 
     def distinct(self, findings: Iterable[Finding], broken: Collection[Location]) -> Iterator[Finding]:
         """Yield the findings that are no other's problem, and not of broken entries; lazily, and so many at most."""
@@ -66,7 +65,7 @@ class Places:
         for number, finding in enumerate(findings):
             if number == FINDINGS_MAX:
                 return
-            key = self._find(finding)[0], _nameless(finding)
+            key = self._find(finding)[0], _nameless(with_written(finding, self._data))
             if key not in met and finding.location[:2] not in broken:
                 met.add(key)
                 yield finding
@@ -88,6 +87,10 @@ class Places:
                 return node.place, False, depth
             depth += 1
         return (place, is_key, depth) if finding.at == "key" else (node.place, False, depth)
+
+    @cached_property
+    def _data(self) -> Any:
+        return plain_shared(self._expanded)
 
     @cached_property
     def _values(self) -> dict[Place, Location]:

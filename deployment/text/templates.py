@@ -4,20 +4,26 @@
 its own come over them: a mapping over a mapping is merged key by key, anything else replaces what the template has, and
 `null` takes it away. A template may be like another one. Nodes are shared, so that an entry without keys of its own
 costs nothing, and keep their places: what is wrong with a template is wrong there.
+
+A kit's section with `preset: NAME` is in the same way over all that the kit knows under that name.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from foosim.common import limits
+from foosim.common.errors import BadValue
 from foosim.common.finding import Location
-from foosim.common.names import NAME_RULE, is_name, nearest_name
+from foosim.common.names import NAME_RULE, is_name, nearest_quoted
 from foosim.deployment.text.report import Report
-from foosim.deployment.text.yaml import Fields, Leaf, Place, Tree, plain
+from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Tree, plain
+from foosim.world.forms import registry
+from foosim.world.forms.forms import Kit
 
 TEMPLATES: Final = "templates"
 LIKE: Final = "like"
+PRESET: Final = "preset"
 OF_ENTRIES: Final = ("count", "spacing", "each")
 """Keys that an entry has, and no template: how many there are is said where they are."""
 
@@ -119,7 +125,7 @@ class Templates:
         elif name in self._refused:
             return None
         elif name not in self._written:
-            what, nearest = "unknown template", nearest_name(name, self._written)
+            what, nearest = "unknown template", nearest_quoted(name, self._written)
         elif name in chain:
             what = f"a template that is like itself ({' is like '.join([*chain[chain.index(name) :], name])})"
         elif len(chain) >= limits.LIKE_DEPTH_MAX:
@@ -128,7 +134,7 @@ class Templates:
             return self.whole(name, chain)
         if like.place not in self._reported:  # by another entry of a fleet
             self._reported.add(like.place)
-            self._report.add(like.place, path, what, name, None if nearest is None else repr(nearest))
+            self._report.add(like.place, path, what, name, nearest)
         return None
 
     def _use(self, like: Tree, section: str) -> None:
@@ -148,3 +154,32 @@ class Templates:
         left = [name for name in self._written if name not in self._sections]
         found = {name: (self.whole(name), self._keys[name]) for name in left}
         return {name: (whole, place) for name, (whole, place) in found.items() if whole is not None}
+
+
+def with_preset(name: str, section: Tree, report: Report) -> Tree:
+    """Return a section over the preset that it names, itself where it names none or is that of no kit with presets.
+
+    What comes from the preset has the place of its name. Of an unknown one, which is reported, the first stands in.
+    """
+    if not isinstance(section, Fields) or PRESET not in section.values:
+        return section
+    kit = registry.lookup("kit", name) if name.isidentifier() else None
+    if not isinstance(kit, Kit) or not kit.presets:
+        return section
+    value = section.values[PRESET]
+    chosen = plain(value)
+    if not isinstance(chosen, str) or chosen not in kit.presets:
+        nearest = nearest_quoted(chosen, kit.presets) if isinstance(chosen, str) else None
+        bad = BadValue(f"unknown preset, valid are {', '.join(kit.presets)}", chosen, nearest)
+        report.add_value(value.place, (name, PRESET), bad)
+        chosen = next(iter(kit.presets))
+    return merged(_tree(kit.presets[chosen], value.place), without(section, PRESET))
+
+
+def _tree(data: Any, place: Place) -> Tree:
+    """Return plain data as a tree, all of it at one place."""
+    if isinstance(data, dict):
+        return Fields(place, {key: _tree(value, place) for key, value in data.items()}, dict.fromkeys(data, place))
+    if isinstance(data, list):
+        return Items(place, [_tree(value, place) for value in data])
+    return Leaf(place, data)

@@ -1,16 +1,19 @@
 """The clock of a child: while it waits for a processor, only the processor time that it receives counts.
 
 A process that hangs sleeps or computes, so all of its time counts. One that is starved of processor time has threads in
-state R that do not run, so its clock is slow, and no deadline of the launcher ends it for that. Pure: `observe`
-reads /proc. Times are in s.
+state R that do not run, so its clock is slow, and no deadline of the launcher ends it for that. Pure but for `observe`,
+which reads /proc. Times are in s.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
+PROC: Final = Path("/proc")
 EVERY_S: Final = 0.2
 """The shortest time between two observations of a process."""
 WINDOW_S: Final = 5.0
@@ -85,3 +88,28 @@ class ChildTimes:
             return ""
         self._warned_s = now_s
         return f"this machine is starved of processor time: {', '.join(texts)}; their deadlines are extended"
+
+
+def observe(pid: int) -> Observed | None:
+    """Return what /proc reports of a process; None where there is no /proc, or no such process."""
+    try:
+        of_all = _fields(PROC / f"{pid}/stat")
+        tasks = os.scandir(PROC / f"{pid}/task")
+        with tasks:
+            is_runnable = of_all[0] == "R" or any(_is_runnable(task.path) for task in tasks)
+    except OSError:
+        return None
+    return Observed(is_runnable, (int(of_all[11]) + int(of_all[12])) / os.sysconf("SC_CLK_TCK"))
+
+
+def _is_runnable(task: str) -> bool:
+    """Whether a thread runs or waits for a processor; False for one that has ended since."""
+    try:
+        return _fields(Path(task) / "stat")[0] == "R"
+    except OSError:
+        return False
+
+
+def _fields(path: Path) -> list[str]:
+    """Return the fields of a stat file after the name, which may have spaces: state, parent, ..."""
+    return path.read_text().rpartition(")")[2].split()

@@ -67,10 +67,6 @@ class SupervisorWatch:
         """Its process was started or restarted."""
         self._started_s, self.is_found, self._silent_s, self._unconnected_s = now_s, False, 0.0, 0.0
 
-    def found(self) -> None:
-        """It has published its address."""
-        self.is_found = True
-
     def answered(self) -> None:
         """It has answered a request."""
         self._silent_s = self._unconnected_s = 0.0

@@ -10,19 +10,17 @@ from __future__ import annotations
 
 import errno
 import os
-import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from foosim.common.errors import Failed
-from foosim.launcher.children.memory import OomKills, oom_kills
-from foosim.launcher.children.restarts import Ending
+from foosim.launcher.children.ending import Ending, OomKills, oom_kills
 from foosim.launcher.hosts.ssh import Remote
 from foosim.runtime.children import GRACE_S, ROLE, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
@@ -67,11 +65,10 @@ class Child:
         """How it ended; it has."""
         code = self.exit_code
         assert code is not None, f"{self.name} lives"
-        name = signal.Signals(-code).name if code < 0 else ""
         if self.oom_killed is None:
             may_be = code == -signal.SIGKILL and self.remote is None
             self.oom_killed = oom_kills().since(self.oom_kills) if may_be else ""
-        return Ending(code, name, self._tail(LINES), self.killed, self.oom_killed, self.remote is not None)
+        return Ending(code, self._tail(LINES), self.killed, self.oom_killed, self.remote is not None)
 
     @property
     def ending(self) -> str:
@@ -138,46 +135,30 @@ class Launcher:
         """The pipe's two ends: children read the first; only this process has the second, and never writes."""
 
     def start(self, name: str, command: Sequence[str], log: Path) -> Child:
-        """Start `command`, whose first word is one of foosim's commands, on this process's machine.
+        """Start `command`, whose first word is one of foosim's commands, on this process's machine. Raises Failed.
 
         For a unit of systemd the child here only requests its start there, and then ends.
         """
-        remote = self.remotes.get(name)
-        if remote is not None:
-            return self._start_there(name, command, log, remote)
-        kills = oom_kills()
-        try:
-            with log.open("ab") as file:
-                begin = file.tell()
-                process = subprocess.Popen(
-                    (script(command[0]), *command[1:]),
-                    stdin=subprocess.DEVNULL,
-                    stdout=file,
-                    stderr=subprocess.STDOUT,
-                    env=child_environment(self._end),
-                    pass_fds=(self._end,),
-                    process_group=0,
-                )
-        except OSError as error:
-            why = "too little memory" if error.errno == errno.ENOMEM else error.strerror
-            raise Failed(f"{name} cannot be started: {why}") from None
-        child = self.children[name] = Child(name, tuple(command), log, process, None, begin, kills)
-        return child
-
-    def _start_there(self, name: str, command: Sequence[str], log: Path, remote: Remote) -> Child:
-        line = remote.unit_started(name) if name in self.units else remote.guarded(self.run, name, command)
-        earlier = self.children.get(name)
+        remote, earlier = self.remotes.get(name), self.children.get(name)
+        if remote is None:
+            line = [script(command[0]), *command[1:]]
+            about: dict[str, Any] = {"env": child_environment(self._end), "pass_fds": (self._end,)}
+        else:
+            line = remote.unit_started(name) if name in self.units else remote.guarded(self.run, name, command)
+            about = {}
         if earlier is not None:
             earlier.let_go()
+        kills, source = oom_kills(), subprocess.DEVNULL if remote is None else subprocess.PIPE
         try:
             with log.open("ab") as file:
                 begin = file.tell()  # before the child shares this file, and its place
                 process = subprocess.Popen(
-                    line, stdin=subprocess.PIPE, stdout=file, stderr=subprocess.STDOUT, process_group=0
+                    line, stdin=source, stdout=file, stderr=subprocess.STDOUT, process_group=0, **about
                 )
-        except FileNotFoundError:
-            raise Failed(f"there is no ssh here, which {name} is to be started with on host {remote.name}") from None
-        child = self.children[name] = Child(name, tuple(command), log, process, remote, begin)
+        except OSError as error:
+            why = "too little memory" if error.errno == errno.ENOMEM else str(error)
+            raise Failed(f"{name} cannot be started: {why}") from None
+        child = self.children[name] = Child(name, tuple(command), log, process, remote, begin, kills)
         return child
 
     def ended(self) -> list[Child]:
@@ -201,8 +182,7 @@ class Launcher:
         """End all children: SIGTERM, then, after the grace period, SIGKILL; hanging players log their stacks before."""
         self._signal(signal.SIGTERM)
         if not self.wait(grace_s):
-            asked = [child for child in self.alive() if child.ask_for_stack()]
-            if asked:
+            if [child for child in self.alive() if child.ask_for_stack()]:
                 self.wait(STACK_S)
             self.kill()
 
@@ -225,24 +205,3 @@ class Launcher:
                 os.killpg(child.process.pid, number)
             except ProcessLookupError:
                 continue
-
-
-@contextmanager
-def counted_signals(count: Callable[[], None]) -> Iterator[None]:
-    """Call `count` at each Ctrl-C, SIGTERM or SIGHUP instead of ending."""
-
-    def take(number: int, frame: object) -> None:
-        count()
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, take) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def command_line(command: Sequence[str]) -> str:
-    """Return a command as a person types it."""
-    return shlex.join(command)

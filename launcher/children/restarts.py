@@ -1,81 +1,18 @@
-"""Descriptions of how a process ended, and its restarts with exponential back-off and a limit. Pure."""
+"""Restarts of processes, with exponential back-off and a limit. Pure."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 from foosim.common import limits
-from foosim.runtime.children import BY_SIGNAL
-from foosim.runtime.command import REFUSED
 
 WAITS_S: Final = (0.5, 1.0, 2.0, 4.0, limits.RESTART_PAUSE_NS_MAX / 1e9)
 AWAY_S: Final = 4.0
 """Back-off for a process whose machine was unreachable; it is retried without a limit."""
 WINDOW_S: Final = 60.0
 """A process that ended this often within this time is given up."""
-NO_MEMORY: Final = (
-    *("MemoryError", "can't start new thread", "Cannot allocate memory", "failed to map segment"),
-    *("std::bad_alloc", "memory allocation of", "Memory allocation still failed"),
-)
-"""Messages of Python, the system and its loader, C++, Rust and OpenBLAS on a failed allocation."""
-WORDS_MAX: Final = 4_000
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """How a process ended: its exit code (-N: signal N), the end of its log, and what else is known.
-
-    `killed_by_us` is why its launcher killed it, empty when it did not; `oom_killed` is where the kernel has killed
-    processes for want of memory while this one lived, which may have been others; empty for nowhere.
-    """
-
-    code: int
-    signal: str = ""
-    """The name of the signal that ended it."""
-    log: Sequence[str] = ()
-    killed_by_us: str = ""
-    oom_killed: str = ""
-    is_remote: bool = False
-
-    @property
-    def is_by_signal(self) -> bool:
-        """Whether a signal ended it, and not the process itself."""
-        return self.code < 0 or (self.is_remote and self.code > BY_SIGNAL)
-
-    @property
-    def text(self) -> str:
-        """`was killed by SIGKILL, not by foosim`: follows the name of the process."""
-        if self.killed_by_us and self.is_by_signal:
-            return f"was killed by up: {self.killed_by_us}"
-        if self.code < 0:
-            if self._lacked_memory:
-                return f"was killed by {self.signal}: too little memory"
-            meanwhile = f"; too little memory: the kernel has killed for that {self.oom_killed} while it ran"
-            return f"was killed by {self.signal}, not by foosim{meanwhile * bool(self.oom_killed)}"
-        if self._lacked_memory:
-            return f"ended with exit code {self.code}: too little memory"
-        if self.code == REFUSED and self.last_words:
-            return f"ended with exit code {self.code}, refused: {self.last_words}"
-        return f"ended with exit code {self.code}"
-
-    @property
-    def last_words(self) -> str:
-        """The last error in its log, without time and name, or the last line; it may have the reason."""
-        words = ""
-        for line in reversed(self.log):
-            head, found, text = line.strip().partition(": ")
-            is_dated = bool(found) and head[:4].isdigit() and "Z " in head
-            words = words or (text if is_dated else line.strip())
-            if not is_dated or " ERROR " in head:  # roles that share the process may log warnings as they leave
-                return (text if is_dated else line.strip())[:WORDS_MAX]
-        return words[:WORDS_MAX]
-
-    @property
-    def _lacked_memory(self) -> bool:
-        return any(said in line for line in self.log for said in NO_MEMORY)
 
 
 @dataclass(slots=True)

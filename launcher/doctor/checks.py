@@ -2,8 +2,7 @@
 
 Each check is a function that returns findings about one subject, and a row of `CHECKS`; it changes and starts nothing.
 A check concerns the machine it runs on, the supervisor's or a host of the deployment: `doctor.remote` collects the
-findings of the hosts. `findings_of` adds comparisons with this machine: a host's clock, its arithmetic, and whether its
-ports can be reached from here. Clocks matter for logs and for the dates of certificates; no run compares them.
+findings of the hosts, and compares them with this machine.
 """
 
 from __future__ import annotations
@@ -13,54 +12,37 @@ import importlib.metadata
 import os
 import platform
 import shutil
-import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
-import msgspec
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes
 from packaging.requirements import Requirement
 
-from foosim.client.class_check import player_findings
+from foosim.client.loading import player_findings
 from foosim.common import limits, wall_clock
 from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import Refused, describe
 from foosim.deployment.processes import joint_processes, processes_of
 from foosim.deployment.schema import Deployment, places
-from foosim.launcher.hosts.port_check import REMEDIES, listen, why_not_reached
-from foosim.launcher.hosts.prepare import check_hosts
-from foosim.launcher.hosts.ssh import Remote, remotes
+from foosim.launcher.hosts.prepare import check_hosts, why_not_free, why_not_reached
+from foosim.launcher.hosts.ssh import remotes
 from foosim.launcher.new_capture import place_of
-from foosim.launcher.pki.hosts import identities_on
+from foosim.launcher.pki import fingerprint, identities_on
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
 from foosim.runtime.children import FOOSIM, script
 from foosim.runtime.run_folder import hosted_folder, runs_folder
-from foosim.runtime.transport.certificate_files import (
-    check_certificate,
-    check_key,
-    hosts_of,
-    read_ca,
-    read_certificate,
-)
-from foosim.runtime.transport.certificate_folder import (
-    CA_FILE,
-    CA_KEY_FILE,
-    KEY_SUFFIX,
-    CertificateError,
-)
-from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials
+from foosim.runtime.transport.certificate_files import hosts_of, read_ca, read_certificate
+from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, KEY_SUFFIX, CertificateError
+from foosim.runtime.transport.certificates import certificate_path, load_credentials
 
 State = Literal["fine", "warning", "problem"]
 
 HERE: Final = "here"
 PLACEMENT: Final = "placement"
-CLOCK_WARN_NS: Final = 50_000_000
 TIME_ERROR: Final = 5
 """Result of `adjtimex` for a clock that is not synchronized."""
 PYTHON_TESTED: Final = (3, 11)
@@ -109,39 +91,9 @@ class Case:
         address, place = self.address.next_port(), places(self.deployment).get(VHUB)
         return address if place is None else replace(address, host=self.deployment.hosts[place].address)
 
-    @property
-    def has_vhub(self) -> bool:
-        """Whether the vHub is to run on this machine."""
-        return places(self.deployment).get(VHUB) == self.host
-
     def provide(self, more: str = "") -> str:
         """Return the command that issues missing certificates, and sends them to a host."""
         return f"foosim pki init DIR FILE{more} --send" if self.is_there else f"foosim pki init {self.pki} FILE{more}"
-
-
-class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The host's own findings, and the fingerprint of its arithmetic."""
-
-    fingerprint: str
-    findings: list[Finding]
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """Response of one host: its answer, or a `problem` and its `remedy`.
-
-    Its clock is `offset_ns` ahead of the one here, give or take `error_ns`. `radio` is where a vHub there would listen,
-    if that was tried, and `not_reached` why it would not be reached from here.
-    """
-
-    remote: Remote
-    answer: Answer | None = None
-    problem: str = ""
-    remedy: str = ""
-    offset_ns: int = 0
-    error_ns: int = 0
-    radio: str = ""
-    not_reached: str = ""
 
 
 def examine(case: Case) -> list[Finding]:
@@ -158,18 +110,12 @@ _Said = tuple[str, State, str, str]
 """Subject, state, text, remedy."""
 
 
-# --- processes -------------------------------------------------------------------------------------------------------
-
-
 def _processes(case: Case) -> Iterator[_Said]:
     """Which roles share a process, on this machine."""
     hosts = places(case.deployment)
     for process in processes_of(case.deployment).values():
         if len(process.roles) > 1 and hosts.get(process.roles[0]) == case.host:
             yield process.name, "fine", f"has {', '.join(process.roles)}", ""
-
-
-# --- versions --------------------------------------------------------------------------------------------------------
 
 
 def _versions(case: Case) -> Iterator[_Said]:
@@ -238,35 +184,24 @@ def _certificates(case: Case) -> Iterator[_Said]:
             yield path.name, "problem", "can be read by others", f"chmod 600 {path}"
 
 
-def fingerprint(certificate: x509.Certificate) -> str:
-    """Return the fingerprint of a certificate, in hex."""
-    return certificate.fingerprint(hashes.SHA256()).hex()
-
-
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
     """Check the certificate of one process of the run."""
     path = certificate_path(folder, who)
     if not path.exists():
         return who, "problem", "no certificate", case.provide()
     try:
-        now = wall_clock.now_utc()
-        found = read_certificate(path)
-        check_certificate(path, found, who, read_ca(folder, now), now)
-        check_key(key_path(folder, who), found)
         credentials = load_credentials(folder, who)
     except CertificateError as error:
-        remedy = f"{case.provide()}; if that refuses it, remove both files before"
-        return who, "problem", error.what, remedy
-    assert credentials is not None
+        return who, "problem", error.what, f"{case.provide()}; if that refuses it, remove both files before"
+    assert credentials is not None and credentials.until is not None
     address = {SUPERVISOR: case.address, VHUB: case.radio}.get(who)
-    hosts = [host.lower() for host in hosts_of(found)]
+    hosts = [host.lower() for host in hosts_of(read_certificate(path))]
     if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
         remedy = case.provide(f" --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
-    soon = credentials.ends_soon(wall_clock.now_utc())
-    if soon:
+    if soon := credentials.ends_soon(wall_clock.now_utc()):
         return who, "warning", soon, case.provide()
-    return who, "fine", f"until {found.not_valid_after_utc:%Y-%m-%d}", ""
+    return who, "fine", f"until {credentials.until:%Y-%m-%d}", ""
 
 
 # --- this machine ----------------------------------------------------------------------------------------------------
@@ -276,17 +211,14 @@ def _ports(case: Case) -> Iterator[_Said]:
     """Whether the processes that listen on this machine can use their addresses."""
     if not case.is_there:
         yield _port("simulation plane", case.address)
-    if case.has_vhub:
+    if places(case.deployment).get(VHUB) == case.host:
         yield _port("radio plane", case.radio)
 
 
 def _port(plane: str, address: Address) -> _Said:
-    try:
-        listen(address).close()
-    except socket.gaierror as error:
-        return plane, "problem", f"{address}: no such host, {error.strerror}", "give a name or address of this machine"
-    except OSError as error:
-        return plane, "problem", f"{address}: {error.strerror}", REMEDIES.get(error.errno or 0, "take another address")
+    why, remedy = why_not_free(address)
+    if why:
+        return plane, "problem", f"{address}: {why}", remedy
     return plane, "fine", f"{address} is free" if address.port else f"{address}: the system chooses a free port", ""
 
 
@@ -294,13 +226,11 @@ def _network(case: Case) -> Iterator[_Said]:
     """Whether processes on this host would reach the supervisor."""
     if not case.reach:
         return
-    address = parse_address(case.reach)
-    why = why_not_reached(address)
-    if why:
+    if why := why_not_reached(parse_address(case.reach)):
         remedy = "let the firewalls between pass this port, or listen at an address that this host reaches (--listen)"
-        yield "supervisor", "problem", f"{address} is not reached: {why}", remedy
+        yield "supervisor", "problem", f"{case.reach} is not reached: {why}", remedy
     else:
-        yield "supervisor", "fine", f"{address} is reached", ""
+        yield "supervisor", "fine", f"{case.reach} is reached", ""
 
 
 def _placement(case: Case) -> Iterator[_Said]:
@@ -390,47 +320,3 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "network": _network,
 }
 """Every check by its name, in the order in which they are shown."""
-
-
-# --- hosts, compared with this machine -------------------------------------------------------------------------------
-
-
-def findings_of(told: Told, own_fingerprint: str, mixed_cpu: bool) -> list[Finding]:
-    """Return the findings about a host: its own, and those of the comparison with this machine."""
-    name, answer = told.remote.name, told.answer
-    if answer is None:
-        return [Finding("ssh", told.remote.host.destination, "problem", told.problem, told.remedy, name)]
-    compared = [
-        Finding("ssh", told.remote.host.destination, "fine", "answers", host=name),
-        _clock_finding(told),
-        _arithmetic_finding(name, answer.fingerprint, own_fingerprint, mixed_cpu),
-    ]
-    if told.radio:
-        compared.append(_radio_finding(name, told.radio, told.not_reached))
-    return [*compared, *(replace(finding, host=name) for finding in answer.findings)]
-
-
-def _clock_finding(told: Told) -> Finding:
-    offset_ns, error_ns, name = told.offset_ns, told.error_ns, told.remote.name
-    text = f"{offset_ns / 1e6:+.0f} ms against the clock here, within {error_ns / 1e6:.0f} ms"
-    if abs(offset_ns) - error_ns <= CLOCK_WARN_NS:
-        return Finding("clock", "offset", "fine", text, host=name)
-    remedy = "start a time service on both; runs do not mind, logs and the dates of certificates do"
-    return Finding("clock", "offset", "warning", text, remedy, name)
-
-
-def _arithmetic_finding(name: str, there: str, here: str, mixed_cpu: bool) -> Finding:
-    if there == here:
-        return Finding("arithmetic", "compared", "fine", "is that of this machine", host=name)
-    text = f"{there[:16]} is not {here[:16]}, that of this machine"
-    if mixed_cpu:
-        return Finding("arithmetic", "compared", "warning", text, "mixed_cpu lets it in; runs may differ in bits", name)
-    remedy = "use equal processors and libraries, or set `mixed_cpu: true` in the deployment"
-    return Finding("arithmetic", "compared", "problem", text, remedy, name)
-
-
-def _radio_finding(name: str, address: str, why: str) -> Finding:
-    if not why:
-        return Finding("network", "radio plane", "fine", f"{address} is reached from here", host=name)
-    remedy = f"let the firewalls between pass this port, or correct hosts.{name}.address"
-    return Finding("network", "radio plane", "problem", f"{address} is not reached from here: {why}", remedy, name)

@@ -1,14 +1,22 @@
-"""Preparation of a run's remote hosts, and the fetching of a capture from them.
+"""Preparation of a run's remote hosts and of the ports where it listens, and the fetching of a capture from a host.
 
-A vHub on another machine writes the capture there; when it has ended the file is sent through ssh, compared with its
-digest, and then removed there.
+A host gets the certificates of its processes, and nothing else. A vHub on another machine writes the capture there;
+when it has ended the file is sent through ssh, as a tar file with checksums, and then removed there. Whether a firewall
+closes a port only a connection to a listener shows; both send nothing.
 """
 
 from __future__ import annotations
 
+import errno
+import gzip
+import shlex
+import shutil
+import socket
 import subprocess
-from collections.abc import Mapping
-from hashlib import blake2b
+import tarfile
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Final
 
@@ -16,41 +24,66 @@ from foosim.capture.parts import part_path
 from foosim.common.addresses import Address, parse_address
 from foosim.common.errors import Failed, Refused
 from foosim.deployment.schema import Deployment
-from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher.hosts.ssh import CAPTURE, SSH_FAILED, Remote
 
-BLOCK_BYTES: Final = 1 << 20
-SIZE_LINE_MAX: Final = 64
 FORGET_S: Final = 15.0
-
-
-class OutOfReach(Refused):
-    """Processes are to run on other machines, and the supervisor does not listen where those reach it."""
-
-
-class NoFolder(Refused):
-    """A process on another machine needs certificates, and their folder there is not known."""
+SEND_S: Final = 60.0
+REACH_S: Final = 3.0
+BACKLOG: Final = 64
+REMEDIES: Final = {
+    errno.EADDRINUSE: "end what listens there, or take another port",
+    errno.EADDRNOTAVAIL: "give an address of this machine, see `ip address`",
+    errno.EACCES: "take a port above 1023",
+}
 
 
 def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, Remote]) -> None:
-    """Raise OutOfReach when a process on another machine could not connect to where the supervisor listens.
+    """Raise Refused when a process on another machine could not connect to where the supervisor listens.
 
-    Raises NoFolder when it would have no certificate to do so.
+    Also when it would have no certificate to do so.
     """
     for name, remote in remotes.items():
         there = f"{name} on host {remote.name} ({remote.host.address})"
         if address.is_loopback and not parse_address(remote.host.address).is_loopback:
-            raise OutOfReach(
+            raise Refused(
                 f"{there} cannot connect to {address}; give --listen HOST[:PORT], or `listen:` in the deployment, "
                 "with an address of this machine that it reaches"
             )
         if address.protocol == "tls" and remote.host.pki is None:
-            raise NoFolder(
+            raise Refused(
                 f"{there} has no certificate: set hosts.{remote.name}.pki to their folder on it; "
                 "`foosim pki init DIR FILE --send` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:
-            raise OutOfReach(f"{there} is a unit of systemd and needs a fixed port; give --listen HOST:PORT")
+            raise Refused(f"{there} is a unit of systemd and needs a fixed port; give --listen HOST:PORT")
+
+
+def send_files(remote: Remote, contents: Mapping[str, bytes]) -> list[str]:
+    """Write files of a folder of certificates, by name, into that of a host, and return their paths there.
+
+    Raises Failed when the host names no folder or cannot be reached.
+    """
+    if remote.host.pki is None:
+        raise Failed(f"host {remote.name} names no folder for certificates: set it in hosts.{remote.name}.pki")
+    paths = {f"{remote.host.pki.rstrip('/')}/{name}": content for name, content in contents.items()}
+    there = shlex.quote(remote.host.pki)
+    for path, content in paths.items():
+        target = shlex.quote(path)
+        script = f"umask 077; mkdir -p {there} && cat >{target}.new && mv {target}.new {target}"
+        command = remote.ssh(["sh", "-c", script])
+        try:
+            done = subprocess.run(command, input=content, capture_output=True, timeout=SEND_S, check=False)
+        except subprocess.TimeoutExpired:
+            raise Failed(f"host {remote.name}: no answer within {SEND_S:g} s") from None
+        except OSError as error:
+            raise Failed(f"host {remote.name}: {error}") from None
+        lines = done.stderr.decode("utf-8", "replace").splitlines()
+        if done.returncode == SSH_FAILED:
+            raise Failed(remote.why(done.returncode, lines))
+        if done.returncode:
+            raise Failed(f"host {remote.name}: {'; '.join(lines[-1:])}")
+    return [*paths]
 
 
 def fetch_capture(remote: Remote, run: str, path: Path) -> None:
@@ -64,10 +97,7 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
     ) as process:
         assert process.stdout is not None and process.stderr is not None
-        try:
-            problem = _receive(process.stdout, path, came)
-        except OSError as error:
-            problem = f"{path}: {error.strerror}"
+        problem = _receive(process.stdout, path, came)
         # If the output is not read to the end, the closed pipe kills the process: its exit code then means nothing.
         is_cut_here = bool(problem) and process.stdout.read(1) != b""
         process.stdout.close()
@@ -93,24 +123,82 @@ def _receive(stream: IO[bytes], path: Path, came: dict[Path, Path]) -> str:
 
     `came` gets the temporary names, with the final ones.
     """
-    while (line := stream.readline(SIZE_LINE_MAX)) != b"end\n":
-        number, _, size = line.strip().partition(b" ")
-        if not (number.isdigit() and size.isdigit()):
-            return "it came damaged" if came else "nothing was sent"
-        home = part_path(path, int(number))
-        part = home.with_name(home.name + ".part")
-        came[part] = home
-        if not _receive_file(stream, part, int(size)):
-            return "it came damaged"
+    try:
+        with gzip.GzipFile(fileobj=stream) as packed:
+            with tarfile.open(fileobj=packed, mode="r|") as sent:
+                for member in sent:
+                    home = part_path(path, int(member.name))
+                    part = home.with_name(home.name + ".part")
+                    came[part] = home
+                    content = sent.extractfile(member)
+                    assert content is not None, "a guard sends files"
+                    with part.open("wb") as file:
+                        shutil.copyfileobj(content, file)
+            packed.read()  # the checksum is at the end
+    except (tarfile.TarError, zlib.error, EOFError, ValueError, gzip.BadGzipFile):
+        return "it came damaged"
+    except OSError as error:
+        return f"{path}: {error.strerror}"
     return "" if came else "nothing was sent"
 
 
-def _receive_file(stream: IO[bytes], part: Path, left: int) -> bool:
-    """Write so many bytes to `part`; return whether they have the digest that follows."""
-    digest = blake2b(digest_size=32)
-    with part.open("wb") as file:
-        while left > 0 and (block := stream.read(min(left, BLOCK_BYTES))):
-            left -= len(block)
-            digest.update(block)
-            file.write(block)
-    return not left and stream.readline().strip() == digest.hexdigest().encode()
+# --- ports -----------------------------------------------------------------------------------------------------------
+
+
+def listen(address: Address) -> socket.socket:
+    """Return a socket that listens at an address. Raises OSError."""
+    family, kind, number, _, place = socket.getaddrinfo(
+        address.host.strip("[]"), address.port, type=socket.SOCK_STREAM
+    )[0]
+    listener = socket.socket(family, kind, number)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(place)
+        listener.listen(BACKLOG)  # the system accepts connections; no process does
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+def why_not_free(address: Address) -> tuple[str, str]:
+    """Return why an address cannot be listened on, and the remedy; empty texts when it can."""
+    try:
+        listen(address).close()
+    except socket.gaierror as error:
+        return f"no such host, {error.strerror}", "give a name or address of this machine"
+    except OSError as error:
+        return error.strerror or str(error), REMEDIES.get(error.errno or 0, "take another address")
+    return "", ""
+
+
+def check_free(addresses: Iterable[Address]) -> None:
+    """Raise Failed for the first address that cannot be listened on, with the remedy."""
+    for address in addresses:
+        why, remedy = why_not_free(address)
+        if why:
+            how = f"{remedy} (--listen HOST:PORT, or `listen:` in the deployment)"
+            raise Failed(f"cannot listen on {address}: {why}; {how}")
+
+
+@contextmanager
+def listening(address: Address) -> Iterator[None]:
+    """Ensure that an address has a listener: our own if there is none and the address is free."""
+    try:
+        listener = listen(address)
+    except OSError:
+        yield
+        return
+    with listener:
+        yield
+
+
+def why_not_reached(address: Address, timeout_s: float = REACH_S) -> str:
+    """Return why nothing can be connected to at an address, an empty text when it can."""
+    try:
+        with socket.create_connection((address.host.strip("[]"), address.port), timeout_s):
+            return ""
+    except TimeoutError:
+        return f"no answer within {timeout_s:g} s"
+    except OSError as error:
+        return error.strerror or str(error)

@@ -1,8 +1,8 @@
 """Starting processes on another machine: the command line of the system's ssh, and the meaning of its exit code.
 
 `ssh` is the user's own: keys, agents, jump hosts and ~/.ssh/config are as they are; it never prompts. On the
-other side `foosim guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs the
-commands, `hosts` fetches what a run left on a machine.
+other side `foosim guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs
+the commands, `prepare` fetches what a run left on a machine.
 """
 
 from __future__ import annotations
@@ -29,15 +29,11 @@ CAPTURE: Final = "capture.mcap"
 _ALWAYS: Final = ("-T", "-o", "BatchMode=yes")
 _DEFAULTS: Final = ("ConnectTimeout=10", "ServerAliveInterval=5", "ServerAliveCountMax=3")
 
-# Messages of OpenSSH and their meanings: the first match counts.
-_SAID: Final[Sequence[tuple[str, str]]] = (
-    ("Permission denied", "it refused the key: `{ssh}` has to work without a password (ssh-copy-id, or an agent)"),
-    ("Host key verification failed", "its host key is not known: type `{ssh}` once, and compare the key"),
-    ("REMOTE HOST IDENTIFICATION HAS CHANGED", "its host key has changed: find out why before anything else"),
-    ("Could not resolve hostname", "its name is not known: correct hosts.{host}.address or hosts.{host}.ssh"),
-    ("Bad configuration option", "ssh does not know an option: correct hosts.{host}.ssh_options"),
-    ("unknown option", "ssh does not know an option: correct hosts.{host}.ssh_options"),
-)
+# Messages of OpenSSH: of a connection that is refused, and of a machine that cannot be reached.
+_REFUSED: Final = (
+    "Permission denied", "Host key verification failed", "REMOTE HOST IDENTIFICATION HAS CHANGED",
+    "Could not resolve hostname", "Bad configuration option", "unknown option",
+)  # fmt: skip
 _AWAY: Final = (
     "Connection refused", "No route to host", "Network is unreachable", "timed out", "Connection closed",
     "closed by remote host", "Connection reset", "Broken pipe", "not responding", "Invalid argument",
@@ -76,9 +72,9 @@ class Remote:
         return self.ssh(guard)
 
     def unit_started(self, name: str) -> list[str]:
-        """Return the command line that starts a node's unit: the system's for root, else the user's own."""
+        """Return the command line that starts a node's unit (deploy/systemd): root's is the system's."""
         script = f'if [ "$(id -u)" = 0 ]; then user=; else user=--user; {OWN_BUS}; fi'
-        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start {unit_name(name)}"])
+        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start foosim-node@{name}.service"])
 
     def why(self, code: int, lines: Sequence[str]) -> str:
         """Return why ssh, or its command, ended with this code; `lines` are the last ones of its log."""
@@ -95,23 +91,16 @@ class Remote:
         if code != SSH_FAILED:
             return f"ended with exit code {code} on host {self.name}"
         where = f"host {self.name} ({self.host.destination})"
-        for said, meaning in _SAID:
-            if any(said in line for line in lines):
-                return f"{where}: {meaning.format(host=self.name, ssh=self.typed)}"
-        if self.is_away(code, lines):
-            said_last = next(line for line in reversed(lines) if any(said in line for said in _AWAY))
-            return f"{where} cannot be reached: {said_last.strip()}"
+        for messages, what in ((_REFUSED, ""), (_AWAY, " cannot be reached")):
+            last = [line.strip() for line in lines if any(said in line for said in messages)][-1:]
+            if last:
+                return f"{where}{what}: {last[0]}"
         return f"{where}: the connection ended, or the guard there was killed"
 
     @staticmethod
     def is_away(code: int, lines: Sequence[str]) -> bool:
         """Whether it was the network: the machine may come back by itself."""
         return code == SSH_FAILED and any(said in line for line in lines for said in _AWAY)
-
-
-def unit_name(node: str) -> str:
-    """Return the name of the unit of systemd that runs a node, by its template in deploy/systemd."""
-    return f"foosim-node@{node}.service"
 
 
 def remotes(deployment: Deployment) -> dict[str, Remote]:

@@ -7,36 +7,34 @@ the file or keeps an entity as a number is found by that, whatever it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import import_module
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.changes import changed
-from foosim.rehearsal.check.differences import (
-    Asking,
-    Frames,
-    Readings,
-    Senses,
-    alone_and_together,
-    asked_alone_and_together,
-    first_difference,
-    first_other_reading,
-)
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.assembly.used_forms import forms_of
-from foosim.world.components.view import ComponentError
+from foosim.world.assembly.world import World, asked_together
+from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
+from foosim.world.components.sensing import Sensing
+from foosim.world.components.view import ComponentError, SensingView, View, called, has_together
+from foosim.world.components.watching import ReadOnly
+from foosim.world.forms import registry
 from foosim.world.forms.forms import Form
 from foosim.world.frame import Frame
+from foosim.world.layout import Entity, Layout
 
 NODES: Final = (1, 2, 3)
 MOVES: Final = 12
 """Moves of robots between nodes, and as often all objects of a node are made anew."""
+NAMED_MAX: Final = 4
+"""Actuators that a message about several names."""
 
 
 def used_form(text: str, name: str, wanted: str) -> Form:
@@ -49,31 +47,15 @@ def used_form(text: str, name: str, wanted: str) -> Form:
     if wanted in labels:
         return labels[wanted]
     form_name, _, kind = wanted.rpartition(" ")
-    made = _class_at(kind) if ":" in kind else None
+    made = registry.class_at(kind) if ":" in kind else None
     found = [form for form in forms if form_name in ("", form.form) and (kind == form.name or made is form.made)]
     if len(found) == 1:
         return found[0]
     if found:
         which = " or ".join(f"{form.form} {form.name}" for form in found)
         raise BadValue(f"several forms of {name} are called this: {which}", wanted)
-    if " " in wanted or ":" in wanted:
-        raise UnknownName(f"{name} uses no form called this", wanted, labels)
-    raise UnknownName(f"{name} uses no form called this", wanted, [form.name for form in forms])
-
-
-def _class_at(path: str) -> Any:
-    """Return what `module:Class` is, wherever it was imported from; None where there is nothing. Raises BadValue."""
-    module, _, attribute = path.partition(":")
-    try:
-        return getattr(import_module(module), attribute, None)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # SystemExit, too: a module may do anything
-        raise BadValue(f"cannot be imported: {type(error).__name__}: {error}", path) from error
-
-
-def _silent(line: str) -> None:
-    """Nobody wants to know where a check is."""
+    choices = [*labels] if " " in wanted or ":" in wanted else [form.name for form in forms]
+    raise UnknownName(f"{name} uses no form called this", wanted, choices)
 
 
 @dataclass
@@ -90,7 +72,7 @@ class ComponentCheck:
     seed: int = 1
     files: Mapping[str, bytes] = field(default_factory=dict)
     run: Callable[..., Rehearsed] = rehearse
-    on_step: Callable[[str], None] = _silent
+    on_step: Callable[[str], None] = lambda line: None
     now: str = "before its first rehearsal"
     sensors: int = 0
     compared: int = 0
@@ -125,38 +107,35 @@ class ComponentCheck:
             self.begin(shared.removesuffix(","))
             many, frames = self._rehearsed(self.text, nodes, partial(_shuffle, seed=self.seed, ticks=self.ticks))
             if many.json["failed"] or many.digests != first.digests:
-                where = first_difference(alone, frames) or str(many.json["reason"])
+                where = _first_difference(alone, frames) or str(many.json["reason"])
                 yield f"{shared} the world is another one: {where}"
-        senses = Senses(self.text, self.name, self.files)
-        readings = Readings()
+        fitted, found = _Fitted(self.text, self.name, self.files), _Compared()
         try:
-            yield from alone_and_together(senses, alone, readings)
-            yield from asked_alone_and_together(Asking(self.text, self.name, self.files), alone)
+            for frame in alone:
+                found.measure(fitted.due(frame), frame)
+                for actuators in fitted.together(frame.layout):
+                    found.ask(actuators, frame)
         except ComponentError as error:
             self.has_failed = True
-            yield str(error)
+            yield from (*found.differ.values(), str(error))
             return
-        self.notes += readings.notes()
-        self.sensors, self.compared = senses.count, sum(count > 0 for count in readings.given.values())
+        yield from found.broken()
+        self.notes += found.notes()
+        self.sensors, self.compared = fitted.count, sum(count > 0 for count in found.given.values())
         for what, other in self._changed:
             self.begin(what.removesuffix(","))
             beside, frames = self._rehearsed(other, 1)
-            where = first_difference(alone, frames)
-            where = where or first_other_reading(senses, alone, Senses(other, self.name, self.files), frames)
+            where = _first_difference(alone, frames)
+            where = where or _first_other_reading(fitted, alone, _Fitted(other, self.name, self.files), frames)
             if beside.json["failed"] or where:
                 yield f"{what} the world is another one: {where or beside.json['reason']}"
 
     def _rehearsed(
         self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_watched: bool = False
     ) -> tuple[Rehearsed, list[Frame]]:
-        frames = Frames()
-        settings = Settings(on_commit=frames, is_watched=is_watched)
-        return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames.frames
-
-
-def broken_laws(text: str, name: str, ticks: int, seed: int = 1) -> Iterator[str]:
-    """Yield which laws a deployment's forms break, in words, as each is found."""
-    yield from ComponentCheck(text, name, ticks, seed).broken()
+        frames: list[Frame] = []
+        settings = Settings(on_commit=frames.append, is_watched=is_watched)
+        return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames
 
 
 def _shuffle(system: System, *, seed: int, ticks: int) -> None:
@@ -173,3 +152,142 @@ def _shuffle(system: System, *, seed: int, ticks: int) -> None:
         system.at_tick(1 + at % max(1, ticks - 10), partial(move, robots[robot % len(robots)], word))
         rebuild: Callable[[], None] = system.solvers[nodes[other % len(nodes)]].rebuild
         system.at_tick(1 + when % max(1, ticks - 10), rebuild)
+
+
+# --- where two runs of a world differ --------------------------------------------------------------------------------
+
+
+def _first_difference(one: Sequence[Frame], other: Sequence[Frame]) -> str:
+    """Return at which tick, and in which slots that both have, two runs differ first; empty where they do not."""
+    for here, there in zip(one, other, strict=False):
+        if here.digest != there.digest:
+            slots = [
+                f"{entity.name} {slot}"
+                for entity in here.layout.entities
+                for slot in entity.offsets
+                if slot in there.layout[entity.name].offsets
+                and _content(here, entity, slot) != _content(there, there.layout[entity.name], slot)
+            ]
+            if slots or here.layout.digest == there.layout.digest:
+                return f"tick {here.tick}, {', '.join(slots[:4]) or 'outboxes'}"
+    return ""
+
+
+def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
+    """Return the numbers of a slot, and the names of the entities to which it refers."""
+    at = entity.offsets[slot]
+    entities, references = frame.layout.entities, frame.layout.references
+    return [
+        entities[int(frame.numbers[place])].name
+        if place in references and frame.numbers[place] >= 0.0
+        else frame.numbers[place]
+        for place in range(at, at + entity.counts[slot])
+    ]
+
+
+class _Fitted:
+    """What measures in a deployment, and what can be asked together, fitted to the layouts of its frames.
+
+    `count` is how many sensors there are.
+    """
+
+    def __init__(self, text: str, name: str, files: Mapping[str, bytes]) -> None:
+        self._deployment = load_deployment(text, name).with_assets(files)
+        self._sensors: dict[bytes, list[FittedSensor]] = {}
+        self._together: dict[bytes, list[list[FittedActuator]]] = {}
+        self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
+
+    def due(self, frame: Frame) -> list[FittedSensor]:
+        """Return the sensors that measure a frame."""
+        layout = frame.layout
+        if layout.digest not in self._sensors:
+            sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
+            self._sensors[layout.digest] = sensors
+        return [one for one in self._sensors[layout.digest] if one.is_due(frame.tick, frame.numbers)]
+
+    def readings(self, frame: Frame) -> dict[tuple[str, str], object]:
+        """Return what is measured at a frame, by robot and channel."""
+        due = self.due(frame)
+        payloads = Sensing().sample(due, SensingView(frame.tick, frame.numbers, frame.values))
+        return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}
+
+    def together(self, layout: Layout) -> list[list[FittedActuator]]:
+        """Return the actuators that can be asked together, by motion and class, in the order of their robots."""
+        if layout.digest not in self._together:
+            found: dict[tuple[str, str], list[FittedActuator]] = {}
+            for index, actuators in sorted(World(self._deployment, layout).actuators.items()):
+                motion = layout.entities[index].kind.motion
+                for one in actuators:
+                    kind = type(one.actuator)
+                    if motion and has_together(kind, "command"):
+                        found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
+            self._together[layout.digest] = list(found.values())
+        return self._together[layout.digest]
+
+
+@dataclass
+class _Compared:
+    """What sensors and actuators give alone and with others, of whom the first difference is kept; and how often each
+    sensor was sampled, how often a number of that was not finite and how often there was a reading."""
+
+    differ: dict[str, str] = field(default_factory=dict)
+    sampled: Counter[str] = field(default_factory=Counter)
+    not_finite: Counter[str] = field(default_factory=Counter)
+    given: Counter[str] = field(default_factory=Counter)
+
+    def measure(self, due: Sequence[FittedSensor], frame: Frame) -> None:
+        """Compare the readings of sensors in a frame. Raises ComponentError."""
+        numbers = ReadOnly(frame.numbers)
+        view = SensingView(frame.tick, numbers, frame.values)
+        together = Sensing().sample(due, view)
+        labels = [f"sensor {one.channel} of {one.robot}" for one in due]
+        self.sampled.update(labels)
+        self.not_finite.update(f"sensor {one.channel} of {one.robot}" for one in view.not_finite)
+        for label, one, payload in zip(labels, due, together, strict=True):
+            its = SensingView(frame.tick, numbers, frame.values)
+            (alone,) = Sensing().sample([one], its)
+            self.given[label] += payload is not None
+            if alone != payload or any(view.written.get(at) != number for at, number in its.written.items()):
+                self.differ.setdefault(
+                    label, f"{label} gives another reading alone than with others, at tick {frame.tick}"
+                )
+
+    def ask(self, actuators: Sequence[FittedActuator], frame: Frame) -> None:
+        """Compare what actuators of one class ask for in a frame. Raises ComponentError."""
+        view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
+        made: Any = type(actuators[0].actuator)
+        what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
+        together = called(what, "", frame.tick, made.together, [one.actuator for one in actuators])
+        asked = asked_together(what, together, len(actuators), view)
+        for one, its in zip(actuators, asked.tolist(), strict=True):
+            label = f"actuator {one.channel} of {one.robot}"
+            alone = called(f"actuator {one.channel}", one.robot, frame.tick, one.actuator.command, view)
+            if its != [list(motor) for motor in alone]:
+                self.differ.setdefault(
+                    label, f"{label} asks for something else alone than with others, at tick {frame.tick}"
+                )
+
+    def broken(self) -> Iterator[str]:
+        """Yield what differs, and the sensors of which no reading is one."""
+        yield from self.differ.values()
+        for label, count in self.sampled.items():
+            if self.not_finite[label] == count:
+                yield f"{label} has a number that is not finite in each of its {count} readings"
+
+    def notes(self) -> Iterator[str]:
+        """Yield what may be as it is meant: readings that were not finite, sensors whose readings were all dropped."""
+        for label, count in self.sampled.items():
+            if 0 < self.not_finite[label] < count:
+                yield f"{label} has a number that is not finite in {self.not_finite[label]} of its {count} readings"
+            elif not self.given[label] and not self.not_finite[label]:
+                yield f"{label} never gives a reading: its modifiers drop each of {count}"
+
+
+def _first_other_reading(one: _Fitted, frames: Sequence[Frame], other: _Fitted, others: Sequence[Frame]) -> str:
+    """Return at which tick which sensor that both have gives another reading; empty where none does."""
+    for here, there in zip(frames, others, strict=False):
+        found = other.readings(there)
+        for key, payload in one.readings(here).items():
+            if found[key] != payload:
+                return f"tick {here.tick}, the reading of {key[1]} of {key[0]}"
+    return ""

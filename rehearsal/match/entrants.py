@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from foosim.client.class_check import class_faults
+from foosim.client.loading import class_faults
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players import OF_THE_TABLE

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from foosim.protocol.channels import CHANNELS, Channel, Plane
+from foosim.runtime import GC_THRESHOLDS
 from foosim.runtime.progress import EVERY_NS, ProgressFile
 from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.role import Letter, Role
@@ -23,13 +24,11 @@ from foosim.runtime.systemd import Notify
 from foosim.runtime.transport.inbox import Inbox, Item
 
 NS_PER_S: Final = 1_000_000_000
-GC_THRESHOLDS: Final = (20_000, 20, 100)
 NEVER_NS: Final = 2**63 - 1
 
 
 def collect_seldom() -> None:
     """Exclude the loaded objects from garbage collection, and make collections rare."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)
 

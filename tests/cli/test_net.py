@@ -12,7 +12,6 @@ import pytest
 import yaml
 
 from foosim.analysis.explain import PacketName, explain_packet, parse_packet
-from foosim.analysis.explain_stages import STAGE_NAMES
 from foosim.analysis.network_tables import link_line, links_shown, use_text
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
@@ -22,6 +21,7 @@ from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.overrides import nested
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.vhub.stages import STAGES
 from tests.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -95,14 +95,20 @@ def test_lint_of_a_network_alone_says_what_it_cannot_know(command: Command, tmp_
     done = command("lint", file)
     assert done.code == 0
     assert done.out.startswith("a network section without its deployment: the selectors match no endpoints")
-    network = "  radios:\n    wifi: {preset: wifi_5, loss: 2}\n  links:\n  - {id: x, from: a, via: wif}\n"
-    file.write_text(f"network:\n{network}")
-    done = command("lint", file)
-    assert done.code == 2
-    assert [line.split(": ", 1)[1] for line in done.err.splitlines()] == [
+
+    def problems_of(text: str) -> list[str]:
+        file.write_text(text)
+        done = command("lint", file)
+        assert done.code == 2
+        return [line.split(": ", 1)[1] for line in done.err.splitlines()]
+
+    network = "network:\n  radios:\n    wifi: {preset: wifi_5, loss: 2}\n  links:\n  - {id: x, from: a, via: wif}\n"
+    assert problems_of(network) == [
         "network.radios.wifi.preset: not one of perfect, range_only, acoustic, wifi_2_4_indoor, wifi_5_indoor,"
         " dot11p, lte, lora_eu868, zigbee, wired_1g, internet, 'wifi_5', nearest is 'wifi_5_indoor'",
         "network.radios.wifi.loss: not a probability (a number and one of p, %), 2",
+    ]
+    assert problems_of(network.replace("wifi_5, loss: 2", "wifi_5_indoor")) == [
         "network.links[0]: missing key, 'to'",
         "network.links[0].via: unknown radio, 'wif', nearest is 'wifi'",
     ]
@@ -181,7 +187,7 @@ def test_every_packet_is_explained_and_its_draws_agree(capture: CaptureData) -> 
     for row in seen.values():
         explained = explain_packet(capture, PacketName(row.source, row.sequence, row.destination, row.copy))
         assert explained.agrees and (explained.fate, explained.cause) == (row.fate, row.cause)
-        assert [step.stage for step in explained.steps] == list(STAGE_NAMES)
+        assert [step.stage for step in explained.steps] == [name for name, _, _ in STAGES]
         dropping = [step.text for step in explained.steps if step.outcome == "dropped"]
         assert len(dropping) == (row.fate == "dropped") and all(text.endswith(f": {row.cause}") for text in dropping)
         unreached = [step for step in explained.steps if step.outcome == "not reached"]
@@ -246,7 +252,7 @@ def test_explain_prints_a_line_a_stage(command: Command, path: Path) -> None:
     done = command("explain", path, "camera:0:player-blue")
     assert done.code == 0
     lines = done.out.splitlines()
-    assert [line.split()[0] for line in lines[1:-1]] == list(STAGE_NAMES)
+    assert [line.split()[0] for line in lines[1:-1]] == [name for name, _, _ in STAGES]
     assert lines[-1].startswith("delivered at tick ")
     content = json.loads(command("explain", path, "camera:0:player-blue", "--json").out)
     assert content["agrees"] and content["steps"][4]["facts"]["airtime_ns"] == 496

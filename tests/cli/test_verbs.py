@@ -18,9 +18,9 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Capture
 from foosim.deployment.text.files import read_deployment_text
+from foosim.launcher import pki as certificates
 from foosim.launcher import plan
 from foosim.launcher.new_capture import check_capture, check_rooms
-from foosim.launcher.pki import certificates
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.help_text import summary_of

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app
-from foosim.client.failing import failed
+from foosim.world.forms.failures import failure_of
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -48,9 +48,9 @@ class Unmade(Player):
 LINES = SOURCE.splitlines()
 
 
-def place(path: Path, code: str) -> str:
+def place(code: str) -> str:
     (line,) = [number for number, text in enumerate(LINES, 1) if text.strip() == code]
-    return f"({path / 'own_failing.py'}:{line}: {code})"
+    return f"(own_failing.py:{line})"
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_a_rehearsal_ends_in_order_and_says_where(own: Path, name: str, when: st
     result = json.loads(ran.stdout)  # it has nothing else, whatever players print
     assert result["failed"] and result["ticks"] == (51 if when == "at tick 50" else 0)
     assert result["reason"].startswith(f"player-blue failed {when}: {what}")
-    assert result["reason"].endswith(place(own, code))
+    assert result["reason"].endswith(place(code))
     told = f"player-blue: error: {result['reason']}"
     assert "Traceback (most recent call last):" in ran.stderr and told in ran.stderr
     assert ("at 45\n" in ran.stderr) == (when == "at tick 50"), "what it prints"
@@ -96,6 +96,6 @@ class Silent(Exception):
 
 
 def test_whatever_an_error_says_it_is_one_line() -> None:
-    assert str(failed("x failed", Silent(), "own")) == "x failed: Silent: its text cannot be made"
-    assert str(failed("x failed", ValueError("a\n b" * 1000), "own")).endswith("...")
-    assert str(failed("x failed", KeyboardInterrupt(), "own")) == "x failed: KeyboardInterrupt"
+    assert failure_of(Silent(), "own") == "Silent: its text cannot be made"
+    assert failure_of(ValueError("a\n b" * 1000), "own").endswith("...")
+    assert failure_of(KeyboardInterrupt(), "own") == "KeyboardInterrupt"

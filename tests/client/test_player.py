@@ -177,7 +177,7 @@ def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
     Scripted.made[-1].commands = commands
     with pytest.raises(PlayerError) as error:
         go(loop, 1)
-    place = f"{__file__}:{RAISES}: raise self.commands"
+    place = f"tests/client/test_player.py:{RAISES}"
     act = f"tests/client/test_player.py:{Scripted.act.__code__.co_firstlineno}"
     assert str(error.value) == f"{NAME} failed at tick 5: {text.replace('PLACE', place).replace('ACT', act)}"
     assert error.value.exit_code == 1
@@ -206,7 +206,7 @@ def test_a_player_that_cannot_be_made_says_why() -> None:
             raise BadValue("parameter team is not one of red, blue", "green")
 
     before = "player-red failed before its first tick"
-    with pytest.raises(PlayerError, match=rf"^{before}: KeyError: 'error' \(.*raise parameters"):
+    with pytest.raises(PlayerError, match=rf"^{before}: KeyError: 'error' \(tests/client/test_player.py:\d+\)"):
         begun(load=lambda path: Fails)
     with pytest.raises(PlayerError, match="player player-red: parameter team is not one of red, blue, 'green'"):
         begun(load=lambda path: Refuses)

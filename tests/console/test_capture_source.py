@@ -19,7 +19,7 @@ from foosim.console.recorded.poses_source import NOWHERE, PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import About, Curve, Moment, Source, Wanted
 from foosim.deployment.loader import apply_sets
-from foosim.replay.between import Between
+from foosim.replay.verify import Between
 from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, damaged, replay
 
 

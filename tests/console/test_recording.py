@@ -16,7 +16,7 @@ from foosim.capture.rows import FRAME, ROW_TYPES
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.recorded.recording import TOPICS, Recording
 from foosim.console.shown.poses import Poser
-from foosim.replay.between import Between
+from foosim.replay.verify import Between
 from foosim.world.frame import Frame
 from tests.replay.conftest import TICKS, damaged, messages_of, rewritten
 

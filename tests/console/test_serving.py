@@ -17,7 +17,7 @@ from foosim.common.errors import BadValue
 from foosim.console.server import server as server_module
 from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.server.serving import ServeOptions, _announce, listening_at, write_private
-from foosim.launcher.pki import certificates
+from foosim.launcher import pki as certificates
 from tests.console.memory import TOKENS, Browser, MemorySource, table
 
 

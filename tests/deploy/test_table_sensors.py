@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import broken_laws
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
+from tests.frames import broken_laws
 
 PATH: Final = Path(__file__).parents[2] / "deploy" / "table_sensors.yaml"
 TEXT: Final = PATH.read_text()

@@ -86,15 +86,19 @@ def test_a_text_without_its_files_is_refused() -> None:
 
 
 def test_problems_are_in_the_file_that_they_are_written_in(files: Files) -> None:
-    source = files(
-        f="include: [a/a.yaml, b.yaml]\n" + HEAD + "nodes: {one: {robots: ['*']}}\nclients: {c: {on: r-4}}\n",
-        a_a=ROVER.replace("rate: 5 Hz", "rate: 60 Hz") + "  other: {modl: 1, class: 'a:B'}\n",
-        b="# text\n" + ROBOTS.replace("x: 1 m", "x: 1 kg") + SHELF.replace("width", "widht"),
-    )
-    assert refused(source) == [
+    text = "include: [a/a.yaml, b.yaml]\n" + HEAD + "nodes: {one: {robots: ['*']}}\nclients: {c: {on: r-4}}\n"
+    fast = ROVER.replace("rate: 5 Hz", "rate: 60 Hz")
+    assert refused(files(f=text, a_a=fast, b=ROBOTS)) == [
         "f.yaml:11:19: clients.c.on: unknown robot, 'r-4', nearest is 'r-1'",
         "a/a.yaml:5:32: templates.rover.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, "
         "'60 Hz', nearest is '50 Hz'",
+    ]
+    source = files(
+        f=text,
+        a_a=fast + "  other: {modl: 1, class: 'a:B'}\n",
+        b="# text\n" + ROBOTS.replace("x: 1 m", "x: 1 kg") + SHELF.replace("width", "widht"),
+    )
+    assert refused(source) == [
         "a/a.yaml:7:11: templates.other: unknown key, 'modl'",
         "b.yaml:2:40: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km); kg measures a mass, '1 kg'",
         "b.yaml:4:10: scenery.shelf: missing key, 'width'",

@@ -103,15 +103,14 @@ def test_problems_of_the_file_and_of_all_settings_come_together() -> None:
     bad = TABLE_TEXT.replace("engine: bullet", "engine: bulet")
     line = bad[: bad.index("engine:")].count("\n") + 1
     with pytest.raises(DeploymentError) as error:
-        apply_sets(bad, "bad.yaml", ["seed=5", "tik=1 ms", "substeps=3", "nodes.red.robots[0]=red.gaol"])
+        apply_sets(bad, "bad.yaml", ["seed=5", "tik=1 ms", "listen=10.0.0.1:70000"])
     assert error.value.problems[0] == (
         f"bad.yaml:{line}:9: engine: unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'bulet', "
         "nearest is 'bullet'"
     )
     assert [problem for problem in error.value.problems if problem.startswith("--set")] == [
         "--set:2:1: unknown key, 'tik', nearest is 'tick'",
-        "--set:3:10: substeps: does not divide the tick of 2000000 ns, 3, nearest is 2 and 4",
-        "--set:4:21: nodes.red.robots[0]: unknown robot, 'red.gaol', nearest is 'red.goal'",
+        "--set:3:8: listen: not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT), '10.0.0.1:70000'",
     ]
 
 

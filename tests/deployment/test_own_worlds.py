@@ -16,12 +16,12 @@ from jsonschema import Draft202012Validator
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
+from tests.frames import Frames
 from tests.kinematic_yard import yard_text
 from tests.own_forms import TABLE, folder_on_path, problems, written
 
@@ -226,9 +226,8 @@ KITS: Final = {
                                         f"{installed('rule')}, or any module:Class), 'fed'"],
     "rules={'feed': {'kind': 'feed', 'count': 'two'}}": ["its rule feed: count: not a whole number, 'two'"],
     "rules={'feed': {'kind': 'feed', 'coun': 2}}": ["its rule feed: unknown key, 'coun', nearest is 'count'"],
-    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: cannot be imported: ModuleNotFoundError: No module "
-                                               "named 'own_none' (is the folder that it is in on PYTHONPATH?), "
-                                               "'own_none:X'"],
+    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: there is no module own_none (it is neither beside the "
+                                               "deployment nor on PYTHONPATH), 'own_none:X', nearest is 'own_form:X'"],
     "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
     "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
                            "place_at and no field position"],
@@ -263,7 +262,7 @@ FAILING: Final = {
     "    def shapes(self): return ()": "    def shapes(self): return (1 // 0,)",
     "    def physics(self): return None": "    def physics(self): return self.nothing",
     "    def findings(self): return iter(())": "    def findings(self): yield from 3",
-    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda data: 1 // 0)",
+    "class Zoo(Own):": "class Zoo(Own):\n    check = staticmethod(lambda section, spec: 1 // 0)",
 }
 """Lines of a kit, and others that raise."""
 
@@ -274,14 +273,16 @@ def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: 
     written(site, *lines, "kit('zoo', SpecBase)(Zoo)")
     registry.find("kit", "own_form:Zoo")
     (told,) = problems("zoo={}")
-    assert re.match(r"kit zoo(: \w+)? fails: \w+Error: .*, 'zoo'$", told), told
+    assert re.match(r"kit zoo(: check fails| failed at tick 0): \w+Error: .*, 'zoo'$", told), told
     assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
 
 
 def test_a_scene_that_fails_is_named_with_the_place_in_its_file(site: Path) -> None:
     written(site, "def shapes(settings):", "    return [settings.height]", "scene('plain', SceneSettings)(shapes)")
     (told,) = problems("scene={kind: 'own_form:shapes'}")
-    assert told.startswith("scene own_form:shapes fails: AttributeError: 'SceneSettings' object has no attribute")
+    assert told.startswith(
+        "scene own_form:shapes failed at tick 0: AttributeError: 'SceneSettings' object has no attribute"
+    )
 
 
 # --- what a form of one world says of another ------------------------------------------------------------------------
@@ -391,7 +392,9 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
     text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
     done = rehearse(text, "x.yaml", 20, 1)
     assert not done.json["failed"], done.json["reason"]
-    with pytest.raises(DeploymentError, match=r"robots.mast: .*it sends rays from a robot without a body, 'mast'"):
+    with pytest.raises(
+        DeploymentError, match=r"robots.mast.sensors: .*it sends rays from a robot without a body, 'mast'"
+    ):
         load_deployment(text.replace("own_form:Mast", "own_form:Ghost"), "x.yaml")
 
 

@@ -123,7 +123,7 @@ def test_a_player_that_a_person_starts_has_a_process_of_its_own_in_each_shape() 
 
 
 def test_an_unknown_shape_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(BadValue, match="not one of deployed, one, each"):
+    with pytest.raises(BadValue, match=r"not a shape \(there are: deployed, each, one\)"):
         parse_shape("on")
 
 

@@ -17,8 +17,6 @@ import pytest
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import broken_laws
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
@@ -26,6 +24,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.registry import FORMS, own_module
 from tests.forms.limits import Edge, edges
 from tests.forms.worlds import VARIANTS, WORLDS, World, changed_slots
+from tests.frames import Frames, broken_laws
 
 Key = tuple[str, ...]
 TICKS: Final = 100

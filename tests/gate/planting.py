@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from foosim.rehearsal.swarm.campaign import undisturbed
+from tests.swarm.campaign import undisturbed
 
 
 class Planting:

@@ -15,8 +15,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
-from foosim.rehearsal.swarm.campaign import fly
 from tests.gate.mutants import MUTANTS
+from tests.swarm.campaign import fly
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS: Final = 1000

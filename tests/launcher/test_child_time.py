@@ -11,8 +11,7 @@ from typing import Final
 
 import pytest
 
-from foosim.launcher.children.child_time import WARNED_EVERY_S, WINDOW_S, ChildTime, ChildTimes, Observed
-from foosim.launcher.children.observe import observe
+from foosim.launcher.children.child_time import WARNED_EVERY_S, WINDOW_S, ChildTime, ChildTimes, Observed, observe
 
 STARVED: Final = (
     *((0.0, 0.02), (0.2, 0.03), (0.4, 0.04), (0.6, 0.04), (0.8, 0.05), (1.0, 0.06), (1.2, 0.07), (1.4, 0.08)),

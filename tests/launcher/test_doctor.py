@@ -15,10 +15,10 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Capture, Deployment
 from foosim.deployment.text.files import read_deployment_text
+from foosim.launcher import pki as certificates
 from foosim.launcher.doctor import checks as doctor
 from foosim.launcher.doctor.checks import CHECKS, Case, Finding, examine, is_well
 from foosim.launcher.new_capture import check_rooms
-from foosim.launcher.pki import certificates
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.run_folder import runs_folder
@@ -68,7 +68,7 @@ def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Pat
     deployment = load_deployment(text, "table.yaml")
     here, there = Case(deployment, "127.0.0.1"), Case(deployment, "127.0.0.1", host="arm")
     (finding,) = [finding for finding in examine(here) if finding.check == "players"]
-    assert (finding.subject, finding.state) == ("player-blue", "problem") and "class Teem" in finding.text
+    assert (finding.subject, finding.state) == ("player-blue", "problem") and "no Teem" in finding.text
     assert finding.remedy.startswith("correct players.player-blue.class, or put the module's folder on PYTHONPATH")
     (finding,) = [finding for finding in examine(there) if finding.check == "players"]
     assert (finding.subject, finding.state, finding.host) == ("player-red", "problem", "arm")
@@ -126,7 +126,7 @@ def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, fol
     finding = found(case, "vhub")
     assert finding.state == "problem" and finding.remedy.endswith(f"foosim pki init {folder} FILE --host 127.0.0.9")
     assert found(case, "node.red").state == "fine", "who only connects listens nowhere"
-    certificates.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
+    certificates.renew(folder, "vhub", hosts=["127.0.0.9"])
     assert found(case, "vhub").state == "fine"
 
 

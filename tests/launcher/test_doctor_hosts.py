@@ -15,11 +15,11 @@ from foosim.common.errors import Malformed
 from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.launcher.doctor.checks import CLOCK_WARN_NS, Answer, Case, Finding, Told, examine, findings_of, fingerprint
-from foosim.launcher.doctor.remote import GREETING, Question, serve
+from foosim.launcher import pki as certificates
+from foosim.launcher.doctor.checks import Case, Finding, examine
+from foosim.launcher.doctor.remote import CLOCK_WARN_NS, GREETING, Answer, Question, compared, serve
 from foosim.launcher.hosts.ssh import Remote
-from foosim.launcher.pki import certificates
-from foosim.launcher.pki.hosts import files_for
+from foosim.launcher.pki import files_for, fingerprint
 from foosim.runtime.transport.certificate_files import read_certificate
 
 CLUSTER: Final = Path(__file__).parents[2] / "deploy" / "cluster.yaml"
@@ -28,23 +28,12 @@ LEFT: Final = Remote("left", Host(address="a.lan"))
 HERS: Final = Finding("disk", "state", "fine", "9 GiB", host="who it takes itself for")
 
 
-def told(**changes: Any) -> Told:
-    return Told(LEFT, Answer(changes.pop("fingerprint", "aa"), [HERS]), **changes)
-
-
-def found(heard: Told, check: str, subject: str, mixed_cpu: bool = False) -> Finding:
-    findings = findings_of(heard, "aa", mixed_cpu)
+def found(check: str, subject: str, fingerprint: str = "aa", **about: Any) -> Finding:
+    findings = compared(LEFT, Answer(fingerprint, [HERS]), "aa", **about)
     assert {finding.host for finding in findings} == {"left"}, "whatever it says"
     (finding,) = [finding for finding in findings if (finding.check, finding.subject) == (check, subject)]
     assert (finding.state == "fine") == (finding.remedy == ""), finding
     return finding
-
-
-def test_a_host_that_does_not_answer_is_one_finding() -> None:
-    heard = Told(LEFT, problem="host left (a.lan) cannot be reached: no", remedy="make `ssh a.lan` work")
-    assert findings_of(heard, "aa", False) == [
-        Finding("ssh", "a.lan", "problem", heard.problem, heard.remedy, "left"),
-    ]
 
 
 @pytest.mark.parametrize(
@@ -59,22 +48,22 @@ def test_a_host_that_does_not_answer_is_one_finding() -> None:
     ],
 )
 def test_a_clock_that_is_surely_off_is_told(offset_ns: int, error_ns: int, state: str) -> None:
-    finding = found(told(offset_ns=offset_ns, error_ns=error_ns), "clock", "offset")
+    finding = found("clock", "offset", offset_ns=offset_ns, error_ns=error_ns)
     assert finding.state == state and finding.text.startswith(f"{offset_ns / 1e6:+.0f} ms")
 
 
 def test_other_arithmetic_is_told_as_the_handshake_would() -> None:
-    assert found(told(), "arithmetic", "compared").state == "fine"
-    assert found(told(fingerprint="bb"), "arithmetic", "compared").state == "problem"
-    assert found(told(fingerprint="bb"), "arithmetic", "compared", mixed_cpu=True).state == "warning"
+    assert found("arithmetic", "compared").state == "fine"
+    assert found("arithmetic", "compared", "bb").state == "problem"
+    assert found("arithmetic", "compared", "bb", mixed_cpu=True).state == "warning"
 
 
 def test_a_vhub_that_would_not_be_reached_is_told() -> None:
     radio = "tcp/a.lan:7401"
-    assert found(told(radio=radio), "network", "radio plane").state == "fine"
-    finding = found(told(radio=radio, not_reached="no answer within 3 s"), "network", "radio plane")
+    assert found("network", "radio plane", radio=radio).state == "fine"
+    finding = found("network", "radio plane", radio=radio, not_reached="no answer within 3 s")
     assert finding.state == "problem" and "tcp/a.lan:7401 is not reached from here: no answer" in finding.text
-    assert not [finding for finding in findings_of(told(), "aa", False) if finding.check == "network"]
+    assert not [finding for finding in compared(LEFT, Answer("aa", []), "aa") if finding.check == "network"]
 
 
 # --- on a host -------------------------------------------------------------------------------------------------------
@@ -99,8 +88,8 @@ def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> Non
     ca = fingerprint(read_certificate(certificates.init(folder)))
     certificates.issue(folder, ["node.blue", "vhub"])
     there.mkdir()
-    for name in {*files_for(deployment, "left"), *files_for(deployment, "radio")}:
-        (there / name).write_bytes((folder / name).read_bytes())
+    for name, content in (files_for(deployment, "left", folder) | files_for(deployment, "radio", folder)).items():
+        (there / name).write_bytes(content)
         (there / name).chmod(0o600)
     left = Case(deployment, LISTEN, pki=there, host="left", ca=ca)
     findings = on_host(left)

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.launcher.children import memory, processes
-from foosim.launcher.children.memory import OomKills, oom_kills
+from foosim.launcher.children import ending as endings
+from foosim.launcher.children import processes
+from foosim.launcher.children.ending import Ending, OomKills, oom_kills
 from foosim.launcher.children.processes import Child
-from foosim.launcher.children.restarts import Ending
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 
@@ -24,27 +24,27 @@ WARNING = "2026-11-23T18:22:43.354Z WARNING vhub: leaves its capture run.mcap un
 @pytest.mark.parametrize(
     ("ending", "text"),
     [
-        (Ending(-9, "SIGKILL"), "was killed by SIGKILL, not by foosim"),
-        (Ending(-9, "SIGKILL", killed_by_us="it had no answer"), "was killed by up: it had no answer"),
+        (Ending(-9), "was killed by SIGKILL, not by foosim"),
+        (Ending(-9, killed_by_us="it had no answer"), "was killed by up: it had no answer"),
         (
-            Ending(-9, "SIGKILL", oom_killed="on this machine"),
+            Ending(-9, oom_killed="on this machine"),
             "was killed by SIGKILL, not by foosim; "
             "too little memory: the kernel has killed for that on this machine while it ran",
         ),
         (
-            Ending(-6, "SIGABRT", ["memory allocation of 4096 bytes failed"]),
+            Ending(-6, ["memory allocation of 4096 bytes failed"]),
             "was killed by SIGABRT: too little memory",
         ),
-        (Ending(-11, "SIGSEGV", ["anything"]), "was killed by SIGSEGV, not by foosim"),
-        (Ending(1, "", ["  File ...", "MemoryError"]), "ended with exit code 1: too little memory"),
-        (Ending(1, "", ["RuntimeError: can't start new thread"]), "ended with exit code 1: too little memory"),
-        (Ending(1, "", ["no journal of this version"]), "ended with exit code 1"),
+        (Ending(-11, ["anything"]), "was killed by SIGSEGV, not by foosim"),
+        (Ending(1, ["  File ...", "MemoryError"]), "ended with exit code 1: too little memory"),
+        (Ending(1, ["RuntimeError: can't start new thread"]), "ended with exit code 1: too little memory"),
+        (Ending(1, ["no journal of this version"]), "ended with exit code 1"),
         (
-            Ending(3, "", ["before", REFUSED]),
+            Ending(3, ["before", REFUSED]),
             "ended with exit code 3, refused: refused by the supervisor: a node red is already here",
         ),
-        (Ending(3, "", ["a.mcap: exists already"]), "ended with exit code 3, refused: a.mcap: exists already"),
-        (Ending(3, "", [ERROR, WARNING]), "ended with exit code 3, refused: the run does not go on"),
+        (Ending(3, ["a.mcap: exists already"]), "ended with exit code 3, refused: a.mcap: exists already"),
+        (Ending(3, [ERROR, WARNING]), "ended with exit code 3, refused: the run does not go on"),
         (Ending(3), "ended with exit code 3"),
     ],
 )
@@ -53,7 +53,7 @@ def test_a_reason_names_who_ended_a_process(ending: Ending, text: str) -> None:
 
 
 def test_a_signal_is_known_on_another_machine_too() -> None:
-    assert Ending(-9, "SIGKILL").is_by_signal and Ending(137, is_remote=True).is_by_signal
+    assert Ending(-9).is_by_signal and Ending(137, is_remote=True).is_by_signal
     assert not Ending(137).is_by_signal and not Ending(1, is_remote=True).is_by_signal
 
 
@@ -65,7 +65,7 @@ def test_the_kernel_says_where_it_has_killed(tmp_path: Path, monkeypatch: pytest
     (tmp_path / "group").write_text("4:memory:/other\n0::/user/run\n")
     (group / "memory.events").write_text("low 0\noom 9\noom_kill 2\n")
     for name, place in (("_VMSTAT", "vmstat"), ("_OWN_GROUP", "group"), ("_GROUPS", "")):
-        monkeypatch.setattr(memory, name, tmp_path / place)
+        monkeypatch.setattr(endings, name, tmp_path / place)
     begun = oom_kills()
     assert begun == OomKills(2, 3) and oom_kills().since(begun) == ""
     (tmp_path / "vmstat").write_text("oom_kill 4\n")

@@ -6,15 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from foosim.common.errors import Failed, Refused
+from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.launcher.hosts.prepare import NoFolder, OutOfReach, check_hosts
+from foosim.launcher import pki as certificates
+from foosim.launcher.hosts.prepare import check_hosts
 from foosim.launcher.hosts.ssh import remotes
-from foosim.launcher.pki import certificates
-from foosim.launcher.pki.hosts import files_for
+from foosim.launcher.pki import files_for
 from foosim.launcher.plan import check_certificates, make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.protocol.identity import identities_of
+from foosim.runtime.transport.certificate_folder import CertificateError
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
@@ -25,14 +27,23 @@ def with_certificates(*sets: str) -> Deployment:
     return load_deployment(apply_sets((DEPLOY / "cluster.yaml").read_text(), "cluster.yaml", sets), "cluster.yaml")
 
 
-def test_what_is_sent_to_a_host_is_its_own_and_no_more() -> None:
-    assert files_for(with_certificates(), "left") == ["ca.pem", "node.blue.key", "node.blue.pem"]
-    assert files_for(with_certificates(), "radio") == ["ca.pem", "vhub.key", "vhub.pem"]
-    assert files_for(with_certificates("players.player-red.host=left"), "left") == [
+def test_what_is_sent_to_a_host_is_its_own_and_no_more(tmp_path: Path) -> None:
+    folder = tmp_path / "pki"
+    certificates.provide(folder, identities_of(with_certificates()))
+
+    def sent(host: str, *sets: str) -> list[str]:
+        files = files_for(with_certificates(*sets), host, folder)
+        assert all(content == (folder / name).read_bytes() for name, content in files.items())
+        return [*files]
+
+    assert sent("left") == ["ca.pem", "node.blue.key", "node.blue.pem"]
+    assert sent("radio") == ["ca.pem", "vhub.key", "vhub.pem"]
+    assert sent("left", "players.player-red.host=left") == [
         *("ca.pem", "node.blue.key", "node.blue.pem", "client.player-red.key", "client.player-red.pem")
     ]
-    with pytest.raises(Failed, match="nothing is placed on host radio"):
-        files_for(with_certificates("vhub.host=left"), "radio")
+    (folder / "vhub.key").write_bytes((folder / "node.blue.key").read_bytes())
+    with pytest.raises(CertificateError, match=r"vhub\.key: the key does not belong to the certificate"):
+        sent("radio")
 
 
 def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
@@ -44,7 +55,7 @@ def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
     check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
     assert check_certificates(plan) == []
     plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts[:2]), pki=folder))
-    with pytest.raises(NoFolder, match=r"red on host right .* set hosts.right.pki .* `foosim pki init DIR FILE"):
+    with pytest.raises(Refused, match=r"red on host right .* set hosts.right.pki .* `foosim pki init DIR FILE"):
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
 
@@ -58,7 +69,7 @@ def test_hosts_have_to_reach_the_supervisor() -> None:
         check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
     check("192.168.10.1")
-    with pytest.raises(OutOfReach, match=r"blue on host left \(192.168.10.2\) cannot connect to tcp/127.0.0.1:7400"):
+    with pytest.raises(Refused, match=r"blue on host left \(192.168.10.2\) cannot connect to tcp/127.0.0.1:7400"):
         check("127.0.0.1:7400")
-    with pytest.raises(OutOfReach, match="needs a fixed port"):
+    with pytest.raises(Refused, match="needs a fixed port"):
         check("192.168.10.1", "nodes.blue.launch=systemd")

@@ -18,11 +18,11 @@ import pytest
 from foosim.capture.parts import FOOTER
 from foosim.common.errors import Refused
 from foosim.launcher import console_child
-from foosim.launcher.journal_check import supervisor_records
-from foosim.launcher.outcome import plan_facts, result_without_supervisor, with_capture
-from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.outcome import Outcome, plan_facts, result_without_supervisor, with_capture
+from foosim.launcher.plan import make_plan
+from foosim.launcher.resume import plan_again, supervisor_records
 from foosim.launcher.run_options import RunOptions, launch_of
-from foosim.launcher.up import Killed, Up
+from foosim.launcher.up import Up
 from foosim.protocol.actions import Journal as JournalAction
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
@@ -235,11 +235,16 @@ def test_json_is_one_object_also_of_a_run_that_was_killed(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
-    def kill(self: Up) -> None:
-        raise Killed("killed", self.unended("killed by a second Ctrl-C"))
+    def kill(self: Up) -> Outcome:
+        self._interrupts = 2
+        self._launch(SUPERVISOR, ["sleep", "100"])
+        monkeypatch.setattr(self, "_start", self._goes_on)
+        return run_whole(self)
+
+    run_whole = Up.run
 
     monkeypatch.setattr(Up, "run", kill)
-    done = typed()("up", TABLE, "--no-capture", "--json")
+    done = typed()("up", TABLE, "--no-capture", "--json", "--processes", "each")
     (line,) = done.out.splitlines()
     content = msgspec.json.decode(line)
     assert content.keys() == run.result.keys() - OF_THE_TABLE and done.err.endswith("killed\n")
@@ -312,6 +317,13 @@ def test_a_signal_while_the_command_itself_is_imported_leaves_a_result(module: s
     content = msgspec.json.decode(done.stdout.splitlines()[-1])
     reason = "SIGTERM ended foosim up before the run began"
     assert (done.returncode, done.stderr, content["reason"], content["run"]) == (FAILED, f"{reason}\n", reason, module)
+
+
+def test_an_import_that_fails_is_reported_as_it_is() -> None:
+    fails = AMID_AN_IMPORT.replace("signal.raise_signal(signal.SIGTERM)", "raise ImportError('it is broken')")
+    words = "up", str(TABLE), "--no-capture", "--run", "foosim.launcher.begin"
+    done = subprocess.run([sys.executable, "-c", fails, *words], capture_output=True, text=True, check=False)
+    assert done.returncode == FAILED and done.stderr.splitlines()[-1] == "ImportError: it is broken"
 
 
 def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_that_is_done(run: Run, left: Left) -> None:

@@ -17,8 +17,7 @@ from typer.testing import CliRunner
 from foosim.cli.pki import app
 from foosim.common import wall_clock
 from foosim.common.errors import BadValue, Refused
-from foosim.launcher.pki import certificates as pki
-from foosim.launcher.pki.certificates import FileExists
+from foosim.launcher import pki
 from foosim.runtime.transport import certificates
 from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
 from foosim.runtime.transport.certificate_folder import CertificateError
@@ -71,9 +70,9 @@ def test_what_is_issued_is_accepted_and_nothing_is_overwritten(folder: Path) -> 
     assert credentials is not None and credentials.name == "red" and credentials.ends_soon(wall_clock.now_utc()) == ""
     assert load_credentials(None, "node.red") is None, "no folder, no certificates"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(FileExists, match=r"not overwritten: .*node\.red\.pem, .*node\.red\.key"):
+    with pytest.raises(Refused, match=r"not overwritten: .*node\.red\.pem, .*node\.red\.key"):
         pki.issue(folder, ["node.blue", "node.red"])
-    with pytest.raises(FileExists, match=r"ca\.pem"):
+    with pytest.raises(Refused, match=r"ca\.pem"):
         pki.init(folder)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before, "nothing was made"
 

@@ -17,12 +17,12 @@ from foosim.client import control
 from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
 from foosim.launcher.children.processes import Child
 from foosim.launcher.children.restarts import WAITS_S
-from foosim.launcher.console_child import ADDRESSES, Page
+from foosim.launcher.console_child import ADDRESSES
 from foosim.launcher.display import Display
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
-from foosim.launcher.up import END_S, Killed, Up
+from foosim.launcher.up import END_S, Up
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.run_status import NOT_RECORDED
 from foosim.runtime.command import REFUSED
@@ -126,11 +126,10 @@ def test_what_follows_when_the_supervisor_ends(
     assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
     up._launcher.children[SUPERVISOR].process.wait()
     up._interrupts = 2
-    with pytest.raises(Killed) as killed:
-        up._goes_on()
-    assert killed.value.result.keys() == outcome.result.keys()
-    assert killed.value.result["reason"] == "killed by a second Ctrl-C"
-    up._launcher.close()
+    monkeypatch.setattr(up, "_start", up._goes_on)
+    killed = up.run()
+    assert killed.is_killed and killed.result.keys() == outcome.result.keys()
+    assert killed.result["reason"] == "killed by a second Ctrl-C"
 
 
 def test_the_console_ends_last_when_it_is_known_how_the_run_ended(
@@ -165,7 +164,7 @@ def test_without_a_terminal_the_address_of_the_page_comes_before_the_run(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
     display = Display(said)
-    console = Up(make_plan(RunOptions(TABLE, processes="each")), None, display, "run", console=Page())._console
+    console = Up(make_plan(RunOptions(TABLE, processes="each")), None, display, "run", console=[])._console
     console._launcher.start("console", ["sleep", "100"], tmp_path / "log")
     with display, console:
         display.say("run run")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from foosim.rehearsal.check.component_check import broken_laws
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.frame import Frame
 from tests.forms.worlds import driver
+from tests.frames import broken_laws
 from tests.kinematic_yard import yard_text
 
 TICKS: Final = 150

@@ -16,13 +16,12 @@ import yaml
 from foosim.cli.rehearse import elsewhere
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import broken_laws
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import driver, still
+from tests.frames import Frames, broken_laws
 from tests.laws.test_yard import yard
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"

@@ -16,7 +16,6 @@ from foosim.protocol.hub_messages import ResumeGrant
 from foosim.rehearsal.machine_loss import lose_hub, lose_supervisor
 from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.settings import Settings
-from foosim.rehearsal.swarm.faults import ask
 from foosim.rehearsal.system import System
 from foosim.runtime.roles.bus import CALM, Weather
 from foosim.supervisor import core as supervisor_core
@@ -26,6 +25,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Past
+from tests.swarm.faults import ask
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000

@@ -15,15 +15,14 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.node.edited_frame import edit
-from foosim.rehearsal.check.component_check import broken_laws
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.swarm.faults import PUSH_MAX
 from foosim.rehearsal.system import Settings, System
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Add, Remove, removed
 from foosim.world.frame import Frame
 from tests.forms.worlds import HALL, TABLE, World, driver
+from tests.frames import Frames, broken_laws
+from tests.swarm.faults import PUSH_MAX
 
 NAME: Final = "others.yaml"
 READERS: Final = """

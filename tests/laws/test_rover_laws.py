@@ -16,12 +16,12 @@ from foosim.client.player import Player, Samples
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.frame import Frame
+from tests.swarm.campaign import fly
 
 TICKS: Final = 250
 ROVERS: Final = 6

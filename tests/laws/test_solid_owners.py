@@ -15,7 +15,6 @@ from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.run import deal_robots
 from foosim.world.assembly.rest import Rest, is_still
@@ -24,6 +23,7 @@ from foosim.world.components.drives import Drives
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 from tests.forms.worlds import DEPLOY
+from tests.frames import Frames
 from tests.solid_yards import ARMS, ARMS_X_M, NAME, PUSHED, SIDE_M, STACK, Push, run, stack, three_arms
 
 TICKS = 200

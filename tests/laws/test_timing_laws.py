@@ -21,14 +21,14 @@ from foosim.protocol.codec import decode
 from foosim.protocol.messages import Deliveries, Go
 from foosim.rehearsal import journals
 from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.swarm.campaign import fly as fly_seed
-from foosim.rehearsal.swarm.faults import TICKS as SWARM_TICKS
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
 from foosim.world.edits import Disrupt
 from tests.laws.test_hub_recovery_law import SETS, TABLE, Fault, Seen, assert_the_same, fly, kill_hub
+from tests.swarm.campaign import fly as fly_seed
+from tests.swarm.faults import TICKS as SWARM_TICKS
 from tests.turns import BY_PERIOD
 
 TICKS: Final = 120

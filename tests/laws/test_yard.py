@@ -11,10 +11,10 @@ import yaml
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.check.component_check import ComponentCheck
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings
 from tests.forms.worlds import DEPLOY, driver, still
+from tests.frames import Frames
 
 NAME: Final = "yard.yaml"
 TICKS: Final = 200

@@ -6,14 +6,14 @@ with it they share still: the order and the bursts of a link, its queue, the air
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 import msgspec
 import pytest
 
 from foosim.analysis.explain import explain_row
-from foosim.capture.rows import ClientRow, PacketRow
+from foosim.capture.rows import PacketRow
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
@@ -22,8 +22,8 @@ from foosim.vhub.network.draw_address import counts_within_channels
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
+from foosim.vhub.stages.told import Evidence
 from foosim.vhub.state.hub_state import HubState
-from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, Hub, deployment_of, rule
 from tests.links.test_determinism import ALL, NETWORKS, PLACES, network, traffic
@@ -208,28 +208,10 @@ def test_the_address_of_a_draw_is_the_documented_one() -> None:
         assert sending.of("news") == draw_key(1, "sending", source, "r", *more), "of a broadcast's turn on the air"
 
 
-class Everything:
-    """All that is known of a run in which nobody asked for anything, for who explains its rows."""
-
-    versions: Final[Mapping[str, str]] = {}
-
-    def __init__(self, deployment: Deployment) -> None:
-        self.deployment = deployment
-
-    def asked(self, until: int) -> Iterable[tuple[int, str]]:
-        return []
-
-    def frame(self, tick: int) -> Frame | None:
-        return None
-
-    def clients(self) -> Iterable[ClientRow]:
-        return []
-
-
 def test_a_row_has_the_address_of_its_draws() -> None:
     """`explain` makes them again."""
     deployment = deployment_of(rule(FREE, ALL))
-    everything = Everything(deployment)
+    everything = Evidence(deployment, {}, [], lambda tick: None, list)
     found = drive(deployment, FIRST, ("air", "news", "scan"), ticks=60, talk=True)
     for flight in [f for f in found.values() if f.destination == "a"]:
         assert explain_row(everything, packet_row(flight)).agrees

@@ -10,7 +10,6 @@ import msgspec
 import pytest
 
 from foosim.analysis.explain import PacketName, Step, explain_packet
-from foosim.analysis.explain_stages import STAGE_NAMES
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -18,6 +17,7 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.vhub.recording.model_hash import model_hash
 from foosim.vhub.recording.rows_of_closing import DECIDING
+from foosim.vhub.stages import STAGES as PIPELINE
 from tests.links.offered import TABLE
 from tests.turns import BY_PERIOD
 
@@ -168,7 +168,7 @@ def test_fields_of_other_causes_are_left_out(capture: CaptureData) -> None:
 
 
 def test_stages_are_told_in_their_order(capture: CaptureData, lost: Lost) -> None:
-    assert list(steps(capture, lost["law", "duty_cycle", ""][0])) == list(STAGE_NAMES)
+    assert list(steps(capture, lost["law", "duty_cycle", ""][0])) == [name for name, _, _ in PIPELINE]
 
 
 def test_one_hash_is_that_of_a_model(capture: CaptureData) -> None:

@@ -306,10 +306,10 @@ DIRECT: Final = {
     "sensor": f"{OWN} failed at tick 25: TypeError: numbers of a frame are written by view.write alone (",
     "batch": "sensor pair of red.attack, pair of red.goal failed at tick 25: TypeError: numbers of a frame are ",
     "modifier": f"{BENT} failed at tick 25: TypeError: numbers of a frame are written by view.write alone (",
-    "accept": f"{MOTORS} failed at tick 25: it writes blue.attack joint_positions directly: numbers of a frame are ",
-    "command": f"{MOTORS} failed at tick 25: it writes blue.attack joint_positions directly",
-    "rule": "rule rules of the world failed at tick 25: it writes blue.attack joint_positions directly",
-    "wears": "rule wears of red.goal failed at tick 25: it writes blue.attack joint_positions directly",
+    "accept": f"{MOTORS} failed at tick 25: TypeError: numbers of a frame are written by view.write alone (",
+    "command": f"{MOTORS} failed at tick 25: TypeError: numbers of a frame are written by view.write alone (",
+    "rule": "rule rules of the world failed at tick 25: TypeError: numbers of a frame are written by view.write alo",
+    "wears": "rule wears of red.goal failed at tick 25: TypeError: numbers of a frame are written by view.write al",
 }
 
 

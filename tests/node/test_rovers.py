@@ -14,13 +14,13 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
-from foosim.rehearsal.swarm.world_bounds import strays
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.moving.wheels import slips_of, wheels_of
 from foosim.world.parameters.hall import hall_of
+from tests.swarm.world_bounds import strays
 
 EMPTY: Final = (
     "scenery={}",

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.component_check import ComponentCheck, broken_laws, used_form
-from foosim.rehearsal.check.differences import Frames
+from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.components.view import View
 from foosim.world.moving.asked import MotionsAsked
 from tests.conftest import Command, Typed
+from tests.frames import Frames, broken_laws
 from tests.kinematic_yard import yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -224,8 +224,8 @@ WRONG: Final = {
     "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
-    "foosim.world.models.rod:Rot": "uses no form called this (there are: actuator rod_position, ",
-    "own_gone:Own": "cannot be imported: ModuleNotFoundError: No module named 'own_gone', 'own_gone:Own'",
+    "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
+    "own_gone:Own": "no module own_gone (it is neither beside the deployment nor on PYTHONPATH), 'own_gone:Own'",
 }
 
 

@@ -8,11 +8,11 @@ from typing import Final
 import pytest
 
 from foosim.node.core import NodeCore
-from foosim.rehearsal.swarm.campaign import fly
 from tests.gate.direct import DIRECT, DirectMutant, Failed, run_all
 from tests.gate.mutants import MUTANTS
 from tests.gate.planting import Mutant
 from tests.gate.search import find
+from tests.swarm.campaign import fly
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS_MAX: Final = 1000

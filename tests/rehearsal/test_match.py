@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from matplotlib.figure import Figure
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.players import OF_THE_TABLE
@@ -125,6 +124,8 @@ def test_a_player_that_fails_ends_its_game_with_the_reason(tmp_path: Path, monke
 
 
 def test_the_picture_has_a_mark_and_an_interval_for_each_row() -> None:
+    from matplotlib.figure import Figure  # each worker that collects would take 0.4 s
+
     cells = []
     for delay_ms in (0, 20, 50):
         for loss in (0.0, 0.1):

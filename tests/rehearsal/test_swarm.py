@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from contextlib import closing
+from contextlib import closing, redirect_stdout
 from dataclasses import asdict, replace
+from io import StringIO
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from typer.testing import CliRunner
 
-from foosim.cli.rehearse import app
 from foosim.common.errors import Failed
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
@@ -21,8 +20,12 @@ from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries, Done, Sent
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.swarm.campaign import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
-from foosim.rehearsal.swarm.faults import (
+from foosim.rehearsal.system import Settings
+from foosim.runtime.roles.bus import CALM
+from foosim.vhub.state.records import TickRecord
+from tests.swarm.__main__ import fly_seeds, main
+from tests.swarm.campaign import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
+from tests.swarm.faults import (
     CHANGES_THE_WORLD,
     FAULT_OF,
     HEALED_TICK,
@@ -32,11 +35,7 @@ from foosim.rehearsal.swarm.faults import (
     Dice,
     loses_players,
 )
-from foosim.rehearsal.swarm.packet_invariants import PacketLaws
-from foosim.rehearsal.swarm.workers import fly_seeds
-from foosim.rehearsal.system import Settings
-from foosim.runtime.roles.bus import CALM
-from foosim.vhub.state.records import TickRecord
+from tests.swarm.packet_invariants import PacketLaws
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS: Final = 30_000
@@ -48,10 +47,11 @@ SEEDS: Final = 8
 @pytest.fixture(scope="module")
 def told() -> dict[str, Any]:
     """What the command that flies seeds tells of each."""
-    chosen = "--seed", str(FIRST), "--seeds", str(SEEDS)
-    done = CliRunner().invoke(app, [str(TABLE), "--swarm", *chosen, "--json"])
-    assert done.exit_code == 0, done.stderr
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    printed = StringIO()
+    with redirect_stdout(printed):
+        code = main([str(TABLE), "--seed", str(FIRST), "--seeds", str(SEEDS), "--json"])
+    assert code == 0, printed.getvalue()
+    found: dict[str, Any] = json.loads(printed.getvalue().splitlines()[-1])
     return found
 
 
@@ -168,7 +168,3 @@ def test_a_minute_under_faults_is_the_minute_that_would_have_been(seed: int) -> 
     flight.run()
     expected = undisturbed(TABLE.read_text(), TABLE.name, seed % WORLDS, MINUTE_TICKS)
     assert flight.system.supervisor.state.chain == expected and flight.laws.ticks == MINUTE_TICKS
-
-
-def test_without_the_swarm_the_command_needs_an_end() -> None:
-    assert CliRunner().invoke(app, [str(TABLE)]).exit_code != 0, "without --swarm it needs --for"

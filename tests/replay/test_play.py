@@ -27,7 +27,7 @@ from foosim.client.errors import ConnectionFailed
 from foosim.client.replay_listener import Replay, ReplayGone, ReplayRefused, hear_replay
 from foosim.common.errors import BadValue
 from foosim.common.units import Pace
-from foosim.launcher.pki import certificates
+from foosim.launcher import pki as certificates
 from foosim.protocol.replay_messages import (
     Played,
     PlayedLine,

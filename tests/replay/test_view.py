@@ -26,11 +26,12 @@ def test_the_command_opens_captures_and_tables_and_the_second_follows_the_first(
     table.write_text("time,entity,x,y\n0,ball,0,0\n")
     one, other = open_sources(run, run, -5_000_000)
     assert isinstance(one, FileSource) and isinstance(other, FileSource)
-    assert one.is_master and not other.is_master and other.clock is one.clock and other.offset_ns == -5_000_000
+    assert "seek" in one.about.verbs and "seek" not in other.about.verbs, "the first leads"
+    assert other.clock is one.clock and other.offset_ns == -5_000_000
     _, real = open_sources(run, table)
     assert isinstance(real, PosesSource) and real.about.world == "table"
     (alone,) = open_sources(table)
-    assert isinstance(alone, PosesSource) and alone.is_master
+    assert isinstance(alone, PosesSource) and "seek" in alone.about.verbs
     with pytest.raises(BadValue, match="give the capture first"):
         open_sources(table, run)
 

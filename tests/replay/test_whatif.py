@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
@@ -143,9 +142,16 @@ def test_the_command_shows_links_and_draws_them(run: Path, tmp_path: Path) -> No
     assert "red.goal" in drawing.read_text()
 
 
+def empty_figure() -> Any:
+    """A picture; to import it takes each worker that collects 0.4 s."""
+    from matplotlib.figure import Figure
+
+    return Figure()
+
+
 def test_a_picture_has_two_bars_for_each_link_and_figure(run: Path) -> None:
     found = what_if(open_capture(run))
-    figure = Figure()
+    figure = empty_figure()
     draw(figure, found, "run")
     delivered, delay, _ = figure.axes
     for bars, sides in zip(
@@ -159,7 +165,7 @@ def test_a_picture_has_two_bars_for_each_link_and_figure(run: Path) -> None:
 
 def test_a_picture_of_many_links_is_bounded(run: Path) -> None:
     found = what_if(open_capture(run))
-    figure = Figure()
+    figure = empty_figure()
     draw(figure, WhatIf(1, 0, 0, found.links * 40, {}, {}, ()), "run")
     assert "the first 200 of" in figure.get_suptitle() and len(figure.axes[0].containers[0]) == 200
 

@@ -44,9 +44,8 @@ SECOND_NS: Final = 10**9
         ({"clog": {"form": "camera", "to": "*"}}, [
             "clog: missing key, 'from'", "clog: unknown key, 'form', nearest is 'from'"
         ]),
-        ({"set": {"link": "lam", "loss": "5"}}, [
-            "set.link: unknown link rule, 'lam', nearest is 'lan'", "set.loss: not a probability"
-        ]),
+        ({"set": {"link": "lam", "loss": "5 %"}}, ["set.link: unknown link rule, 'lam', nearest is 'lan'"]),
+        ({"set": {"link": "lan", "loss": "5"}}, ["set.loss: not a probability"]),
         ({"heal": "all", "clog": {"from": "camera", "to": "*"}}, ["beside clog: an event does one thing, 'heal'"]),
     ],
 )  # fmt: skip

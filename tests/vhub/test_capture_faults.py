@@ -24,7 +24,7 @@ from foosim.common import limits
 from foosim.common.errors import Refused
 from foosim.vhub.recording import file as capture_file
 from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.disk_progress import DiskProgress
+from foosim.vhub.recording.disk_watch import DiskProgress
 from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:

@@ -139,8 +139,8 @@ def test_a_body_that_fails_in_the_vhub_ends_a_rehearsal_in_order(forms: Any, act
         ("{'beta': raises}", SAID.format("ValueError: no file here")),
         (
             "{'beta': raises, 'trial': True}",
-            "lost vhub: the deployment is not valid on its machine: posts.yaml:15:3: robots: model hub_post of beta: "
-            "body fails: ValueError: no file here (hub_forms.py:",
+            "lost vhub: the deployment is not valid on its machine: posts.yaml:15:3: robots: model hub_post of beta "
+            "failed at tick 0: ValueError: no file here (hub_forms.py:",
         ),
     ],
     ids=["in the run", "where it reads the deployment"],

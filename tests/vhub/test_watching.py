@@ -5,7 +5,7 @@ that the run is the same whoever looks. In rehearsal, on virtual time.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Final
@@ -13,14 +13,14 @@ from typing import Any, Final
 import pytest
 from msgspec.structs import replace
 
-from foosim.analysis.drops_shown import Reported, explain_drops
-from foosim.analysis.explain import explain_row
-from foosim.capture.rows import ClientRow
+from foosim.analysis.explain import Explained, explain_row
+from foosim.capture.rows import ClientRow, PacketRow
 from foosim.common import limits
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.units import Pace
 from foosim.console.live.watched import Watched as Shown
-from foosim.deployment.schema import Deployment
+from foosim.console.live.watched import explain_drops
+from foosim.console.shown.source import Link
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Heartbeat, Watched
@@ -30,6 +30,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub import status
 from foosim.vhub.network.packet import DROPPED, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
+from foosim.vhub.stages.told import Evidence
 from foosim.vhub.state.records import Closing
 from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, Watching
 from foosim.world.edits import Disrupt
@@ -134,7 +135,7 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
     run = seen()
     told = run.watched
     assert set(told["drops"]) == {"camera>player-red", "camera>player-blue"}
-    rows = [row for row, _ in explain_drops(evidence(run), *LINK)]
+    rows = [row for row, _ in drops(run, LINK)]
     assert len(rows) == DROPS_KEPT
     dropped = [replace(packet_row(flight), payload=b"", wall_released_ns=0) for flight in drops_on(run, LINK)]
     at = dropped.index(rows[-1])
@@ -163,30 +164,21 @@ def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:
         assert numbers == pytest.approx(frames[tick].vector("ball", "position", 3), abs=0.05)
 
 
-def evidence(run: Run, frames: Mapping[int, Frame] | None = None) -> Reported:
-    deployment = run.system.supervisor.state.deployment
-    return Reported(deployment, run.watched, lambda tick: None if frames is None else frames.get(tick))
+def drops(run: Run, link: Link, frames: Mapping[int, Frame] | None = None) -> list[tuple[PacketRow, Explained]]:
+    return explain_drops(run.system.supervisor.state.deployment, run.watched, link, (frames or {}).get)
 
 
-class Everything:
+def everything(run: Run) -> Evidence:
     """All that was known of a run: what a capture would have."""
-
-    versions: Final[Mapping[str, str]] = {}
-
-    def __init__(self, run: Run) -> None:
-        self.deployment: Deployment = run.system.supervisor.state.deployment
-        self._closings = run.closings
-
-    def asked(self, until: int) -> Iterable[tuple[int, str]]:
-        edits = [(closing.frame.tick, edit) for closing in self._closings for edit in closing.edits]
-        return [(tick, edit.event) for tick, edit in edits if tick <= until and isinstance(edit, Disrupt)]
-
-    def frame(self, tick: int) -> Frame | None:
-        return next(closing.frame for closing in self._closings if closing.frame.tick == tick)
-
-    def clients(self) -> Iterable[ClientRow]:
-        joins = [(closing.frame.tick, joining) for closing in self._closings for joining in closing.joins]
-        return [ClientRow(tick, joining.name, "joins", joining.period, []) for tick, joining in joins]
+    edits = [(closing.frame.tick, edit) for closing in run.closings for edit in closing.edits]
+    joins = [(closing.frame.tick, joining) for closing in run.closings for joining in closing.joins]
+    return Evidence(
+        run.system.supervisor.state.deployment,
+        {},
+        [(tick, edit.event) for tick, edit in edits if isinstance(edit, Disrupt)],
+        {closing.frame.tick: closing.frame for closing in run.closings}.get,
+        lambda: [ClientRow(tick, joining.name, "joins", joining.period, []) for tick, joining in joins],
+    )
 
 
 def test_a_drop_is_explained_without_a_capture_as_it_is_with_one() -> None:
@@ -194,19 +186,19 @@ def test_a_drop_is_explained_without_a_capture_as_it_is_with_one() -> None:
     frames = {closing.frame.tick: closing.frame for closing in run.closings}
     causes = set()
     for link in (LINK, ("camera", "player-blue")):
-        told = explain_drops(evidence(run, frames), *link)
-        assert [explained for _, explained in told] == [explain_row(Everything(run), row) for row, _ in told]
+        told = drops(run, link, frames)
+        assert [explained for _, explained in told] == [explain_row(everything(run), row) for row, _ in told]
         assert all(explained.agrees and explained.verdict.startswith("dropped ") for _, explained in told)
         causes |= {row.cause for row, _ in told}
     assert len(causes) >= 2, causes
-    assert explain_drops(evidence(run), "player-red", "camera") == [], "nobody looks at that one"
+    assert drops(run, ("player-red", "camera")) == [], "nobody looks at that one"
 
 
 def test_an_event_that_was_asked_for_is_known_in_an_explanation() -> None:
     """A cut while it lasts: all the last drops of the link are by it."""
     cut = {"partition": [["camera"], ["rest"]], "for": "200 ms"}
     run = Run(ticks=260).at(20, "watch", links=[LINK]).at(190, "network", event=cut).go()
-    told = explain_drops(evidence(run), *LINK)
+    told = drops(run, LINK)
     assert {row.cause for row, _ in told} == {"partition"}
     policy = [step.text for _, explained in told for step in explained.steps if step.stage == "policy"]
     assert all("cut by request 1" in text for text in policy)
@@ -309,7 +301,7 @@ def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> 
     messages = [console.drops(status, [LINK]) for status in reports]
     (last,) = next(told for told in reversed(messages) if told)
     assert (last["type"], last["link"]) == ("watched", list(LINK))
-    assert [drop["cause"] for drop in last["drops"]] == [row.cause for row, _ in explain_drops(evidence(run), *LINK)]
+    assert [drop["cause"] for drop in last["drops"]] == [row.cause for row, _ in drops(run, LINK)]
     assert {"stage", "outcome", "text"} == last["drops"][0]["steps"][0].keys()
     assert console.drops(reports[-1], [LINK]) == [], "nothing new"
     told = [message for status in reports for message in console.readings(status)]

@@ -23,7 +23,7 @@ from foosim.common.addresses import parse_address
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_deployment_text
-from foosim.launcher.pki import certificates
+from foosim.launcher import pki as certificates
 from foosim.protocol.access import access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
 from foosim.runtime.transport import session as wire

@@ -15,7 +15,6 @@ import pytest
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
 from foosim.launcher.doctor import remote as doctor_remote
-from foosim.launcher.doctor.checks import findings_of
 from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
 from foosim.launcher.hosts.ssh import Remote
 from tests.apart import apart
@@ -100,7 +99,7 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
 
 def why_silent(remote: Remote, limit_s: float = LIMIT_S) -> tuple[str, str]:
     """What is said, and said to do, of a host that does not answer."""
-    (finding,) = findings_of(ask(remote, Question("there", "", "", "", False, "", "", ""), limit_s), "", False)
+    (finding,) = ask(remote, Question("there", "", "", "", False, "", "", ""), limit_s)
     assert (finding.subject, finding.state, finding.host) == ("127.0.0.1", "problem", "there")
     return finding.text, finding.remedy
 

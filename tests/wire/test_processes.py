@@ -10,7 +10,7 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.common.units import parse_pace
-from foosim.launcher.pki import certificates
+from foosim.launcher import pki as certificates
 from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture
 from tests.apart import apart

@@ -15,7 +15,8 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Refused
-from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.plan import make_plan
+from foosim.launcher.resume import plan_again
 from foosim.launcher.run_options import RunOptions
 from foosim.protocol import channels
 from foosim.rehearsal.run import rehearse

@@ -10,7 +10,7 @@ from foosim.capture.reader import open_capture
 from foosim.client import control
 from foosim.client.client import connect
 from foosim.client.control import Control
-from foosim.launcher.pki import certificates as pki
+from foosim.launcher import pki
 from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.certificates import operator_credentials

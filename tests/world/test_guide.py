@@ -17,12 +17,12 @@ import pytest
 from yaml import safe_load
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.check.differences import Frames
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.assembly.world import WorldMarks
 from tests.conftest import Command, Typed
+from tests.frames import Frames
 from tests.own_forms import folder_on_path, forget_modules
 
 ROOT: Final = Path(__file__).parents[2]
@@ -161,7 +161,7 @@ def test_the_path_without_it_is_refused_with_its_place(rehearsed: Command, name:
     use = USES[name]
     refused = rehearsed(ROOT / use.deployment, *use.arguments, "--for", "1s")
     assert refused.code == 2
-    assert "--set:1:" in refused.err and "cannot be imported: ModuleNotFoundError" in refused.err
+    assert "--set:1:" in refused.err and "there is no module" in refused.err
 
 
 def histories(

@@ -68,7 +68,7 @@ def problems(text: str, *sets: str) -> list[str]:
          "robots.base: unknown key (there are: model, tags, sensors, actuators, rules, x, y), 'heading'"),
         ("scenery.goods-1.surface=floor",
          "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"),
-        ("hall.rover.radius=13 m", "hall.rover.radius: more than half of the hall's least side, '13 m'"),
+        ("hall.rover.radius=9 m", "hall.rover.radius: more than half of the hall's least side, '9 m'"),
         ("hall.rover.drive.track=70 cm",
          "hall.rover.drive.track: the wheels would be outside of the rover: more than twice its radius, '70 cm'"),
         ("hall.rover.battery.empty=30 V", "hall.rover.battery.empty: not below the full battery's voltage, '30 V'"),
@@ -84,6 +84,7 @@ def test_what_does_not_fit_is_refused_with_its_place(
 ) -> None:
     elsewhere = {"'3 m, 12.4 m'": "y=12.4 m", "'-1 m, 9 m'": "y=9 m", "0 m'": "y=0 m", "'4 m, 6.5 m'": "y=6.5 m"}
     more = [f"robots.rover01.{y}" for end, y in elsewhere.items() if problem.endswith(end)]
+    more += ["hall.width=17 m"] if "radius" in setting else []
     more += ["robots.rover03.y=6.5 m", "robots.rover01.x=4.2 m"] if "rover03" in setting else []
     assert problems(fleet_text(3), setting, *more)[:1] == [problem]
 

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.assembly.misfits import models_of
 from foosim.world.forms import registry
-from foosim.world.forms.misfits import models_of
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
 from tests.own_forms import folder_on_path, problems, written
@@ -38,8 +38,8 @@ REFUSED: Final = {
     'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
     'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
     'model("own", SpecBase)': "its settings are a class derived from EntitySettings, not SpecBase",
-    'model("own", RobotSettings, variants=3)': "variants are a mapping of values of dynamics to what differs, not 3",
-    'model("own", RobotSettings, variants={"rigid": 3})': "variants are a mapping of values of dynamics to what "
+    'model("own", RobotSettings, variants=3)': "variants is a mapping of values of dynamics to what differs, not 3",
+    'model("own", RobotSettings, variants={"rigid": 3})': "variants is a mapping of values of dynamics to what "
     "differs, not a mapping of 1",
     'model("own", RobotSettings, variants={"rigid": {"is_rigid": True}})': "it has variants, and its settings have no "
     "dynamics, which chooses one",
@@ -50,7 +50,7 @@ REFUSED: Final = {
     'sensor("own", Settings, Number, needs="contacts")': "needs is a tuple of names, not 'contacts': a tuple of one is "
     "('contacts',)",
     'sensor("own", Settings, Number, needs=(3,))': "needs is a tuple of names, not a list of 1",
-    'sensor("own", Settings, Number, kit=3)': "kit is the name of a kit, not 3",
+    'sensor("own", Settings, Number, kit=3)': "kit is a name, not 3",
     'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
     'sensor("own", Settings, Number, speaks=("contacts",))': "speaks is a name, not a list of 1",
     'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, "
@@ -84,10 +84,10 @@ REFUSED: Final = {
     'motion("own", writes="position")': "writes is a tuple of names, not 'position'",
     'model("own", RobotSettings, slots={"down": 2})': "down, which foosim writes, is one number, not 2",
     'model("own", RobotSettings, tags="vehicle")': "tags is a tuple of names, not 'vehicle'",
-    'model("own", RobotSettings, motion=None)': "motion is the name of a motion, not null",
+    'model("own", RobotSettings, motion=None)': "motion is a name, not null",
     'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators, drive: settings are a mapping with "
     "a kind, not 'wheel_speeds'",
-    'kit("own", SpecBase, entities=("ball",))': "entities are a mapping of names to models, not a list of 1",
+    'kit("own", SpecBase, entities=("ball",))': "entities is a mapping of names to models, not a list of 1",
     'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
     'kit("own", SpecBase, addable="ball")': "addable is a tuple of names, not 'ball'",
     'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
@@ -100,9 +100,9 @@ def test_a_registration_that_cannot_be_is_refused_with_name_module_and_place(sit
     path = written(site, f"{registration}(Own)")
     form = registration.partition("(")[0]
     line = len(path.read_text().splitlines())
-    with pytest.raises(Refused) as error:
+    with pytest.raises(BadValue) as error:
         find(form, "own_form:Own")
-    told = str(error.value)
+    told = error.value.problem
     word = {"rule": "rule of worlds", "entity_rule": "rule of entities"}.get(form, form)
     assert told.startswith(f"cannot be imported: Refused: {word} own of own_form: {REFUSED[registration]}"), told
     assert told.endswith(f" (own_form.py:{line})")
@@ -119,8 +119,8 @@ SLOTS: Final = {
     "lambda settings, on: {'kept': 100_000}": "its slots are wrong: kept has 1 to 65536 numbers, or ENTITY, not "
     "100000, 'own'",
     "lambda settings, on: {'samples': 1}": "its slots are wrong: each sensor has a slot samples already, 'own'",
-    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero, "
-    "'own'",
+    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero "
+    "(own_form.py:LINE), 'own'",
     "lambda settings: {}": "its slots are not known: TypeError: <lambda>() takes 1 positional argument but 2 were "
     "given, 'own'",
     "refuse": "more than can be kept, '3 s'",
@@ -130,18 +130,20 @@ SLOTS: Final = {
 @pytest.mark.parametrize("slots", SLOTS)
 def test_slots_that_do_not_follow_from_settings_are_a_problem_of_the_component(site: Path, slots: str) -> None:
     refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)")
+    line = len(written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)").read_text().splitlines())
+    told = SLOTS[slots].replace("LINE", str(line))
     assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}") == (
-        [f"{PLACE}: {SLOTS[slots]}"] if SLOTS[slots] else []
+        [f"{PLACE}: {told}"] if told else []
     )
 
 
 @pytest.mark.parametrize("slots", [slots for slots in SLOTS if "samples" not in slots])
 def test_slots_of_modifiers_are_a_problem_of_the_modifier(site: Path, slots: str) -> None:
     refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    written(site, *refuse, f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)")
+    own = f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)"
+    told = SLOTS[slots].replace("LINE", str(len(written(site, *refuse, own).read_text().splitlines())))
     place = "robots.red.goal.sensors.encoder.modifiers"
-    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {SLOTS[slots]}"] if SLOTS[slots] else [])
+    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {told}"] if told else [])
 
 
 def test_a_sensor_whose_slots_follow_from_its_settings_has_them(site: Path) -> None:
@@ -155,8 +157,9 @@ def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
         site, "Own.check = staticmethod(lambda settings, numbers: 1 // 0)", "modifier('own', ModifierSettings)(Own)"
     )
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
-    assert problem.endswith("modifiers[0]: its check failed: ZeroDivisionError: integer division or modulo by zero, "
-                            "'own_form:Own'")  # fmt: skip
+    line = len((site / "own_form.py").read_text().splitlines()) - 1
+    why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
+    assert problem.endswith(f"modifiers[0]: its check failed: {why}, 'own_form:Own'")
 
 
 @pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),
@@ -221,12 +224,12 @@ def test_what_a_broken_module_has_imported_before_stays_registered(site: Path) -
     """It stays imported, so that nothing would register it again."""
     code = """
 import json
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue
 from foosim.world.forms.registry import find
 for kind in ("own_broken:Own", "own_broken:Own"):
     try:
         find("sensor", kind)
-    except Refused as error:
+    except BadValue as error:
         told = str(error)
 print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module, told]))
 """

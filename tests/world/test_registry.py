@@ -21,7 +21,7 @@ from msgspec import Struct
 from foosim.analysis.export import export_capture
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
-from foosim.common.errors import DeploymentError, Malformed, Refused, UnknownName
+from foosim.common.errors import BadValue, DeploymentError, Malformed, Refused, UnknownName
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
@@ -315,22 +315,20 @@ REFUSED: Final = {
     "own_gauges:ReachSettings": "not registered as a sensor; own_gauges registers ReachGauge",
     "own_winch:Winch": "not registered as a sensor",
     "json:dumps": "not registered as a sensor",
-    "own_gone:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
-    "(is the folder that it is in on PYTHONPATH?)",
-    "own_gauges.more:Gauge": "cannot be imported: ModuleNotFoundError: "
-    "No module named 'own_gauges.more'; 'own_gauges' is not a package",
+    "own_gone:Gauge": "there is no module own_gone (it is neither beside the deployment nor on PYTHONPATH)",
+    "own_gauges.more:Gauge": "there is no module own_gauges.more (own_gauges is a module, not a package)",
     "own_importer:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
     "own_broken:Gauge": "cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",
     "own_leaver:Gauge": "cannot be imported: SystemExit: 0 (own_leaver.py:2)",
     "own_unwritten:Gauge": "cannot be imported: SyntaxError: invalid syntax (own_unwritten.py:2)",
     "own_package.broken:Gauge": "cannot be imported: RuntimeError: two lines (own_package/broken.py:3)",
-    "own_gauges:": "not a class (module:Class)",
-    ":ReachGauge": "not a class (module:Class)",
-    "own_gauges:ReachGauge.made": "not a class (module:Class)",
-    "own_gauges::ReachGauge": "not a class (module:Class)",
-    "own gauges:ReachGauge": "not a class (module:Class)",
-    "./own_gauges:ReachGauge": "not a class (module:Class)",
-    "own_gauges:ReachGauge\n": "not a class (module:Class)",
+    "own_gauges:": "not of the form module:Class",
+    ":ReachGauge": "not of the form module:Class",
+    "own_gauges:ReachGauge.made": "not of the form module:Class",
+    "own_gauges::ReachGauge": "not of the form module:Class",
+    "own gauges:ReachGauge": "not of the form module:Class",
+    "./own_gauges:ReachGauge": "not of the form module:Class",
+    "own_gauges:ReachGauge\n": "not of the form module:Class",
 }
 
 
@@ -338,17 +336,18 @@ REFUSED: Final = {
 @pytest.mark.parametrize("path", REFUSED)
 def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
     try:
-        with pytest.raises(Refused) as error:
+        with pytest.raises(BadValue) as error:
             find("sensor", path)
     except SystemExit:
         pytest.fail("a module that leaves takes the process with it")
-    assert str(error.value) == REFUSED[path]
+    assert error.value.problem == REFUSED[path] and error.value.value == path
 
 
 @pytest.mark.usefixtures("site")
 def test_a_missing_class_names_those_that_there_are() -> None:
     with pytest.raises(
-        UnknownName, match=r"own_gauges registers no such class .*'ReachGuage', nearest is 'ReachGauge'"
+        BadValue,
+        match=r"there is no ReachGuage in own_gauges .*'own_gauges:ReachGuage', nearest is 'own_gauges:ReachGauge'",
     ):
         find("sensor", "own_gauges:ReachGuage")
 
@@ -434,8 +433,7 @@ BROKEN: Final = {
     "own_broken": "own_broken of worn 0.3 cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",
     "own_importer": "own_importer of worn 0.3 cannot be imported: "
     "ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
-    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
-    "(is the folder that it is in on PYTHONPATH?)",
+    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
     "own_leaver": "own_leaver of worn 0.3 cannot be imported: SystemExit: 0 (own_leaver.py:2)",
 }
 
@@ -639,8 +637,8 @@ WRONG: Final = (
     ("rate: 100 Hz, kind: 'own_gauges:Idle'",
      [("'own", ".kind: not registered as a sensor; own_gauges registers ReachGauge, 'own_gauges:Idle'")]),
     ("kind: 'own_gone:Idle', rate: 100 Hz",
-     [("'own", ".kind: cannot be imported: ModuleNotFoundError: No module named 'own_gone' "
-       "(is the folder that it is in on PYTHONPATH?), 'own_gone:Idle'")]),
+     [("'own", ".kind: there is no module own_gone (it is neither beside the deployment nor on PYTHONPATH), "
+       "'own_gone:Idle', nearest is 'own_gauges:Idle'")]),
     ("kind: own_gauges.ReachGauge, rate: 100 Hz",
      [("own_gauges", f".kind: unknown sensor (there are: {', '.join(names('sensor'))}, "
        "or any module:Class), 'own_gauges.ReachGauge'")]),

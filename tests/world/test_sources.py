@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.world.assembly import sources
-from foosim.world.assembly.sources import sources_of
+from foosim.world.assembly import used_forms
+from foosim.world.assembly.used_forms import sources_of
 
 FILES: Final = {
     "first_own.py": "import json, second_own\nfrom foosim.common import units\nclass Form: pass\n",
@@ -43,7 +43,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def forget() -> None:
     for module in [name for name in sys.modules if name.partition(".")[0].endswith("_own")]:
         del sys.modules[module]
-    for kept in (sources._spec, sources._source, sources._imports, sources._folder):
+    for kept in (used_forms._spec, used_forms._source, used_forms._imports, used_forms._folder):
         kept.cache_clear()
     invalidate_caches()
 
@@ -84,7 +84,7 @@ def test_in_a_library_only_the_same_distribution_counts(
     folder: Path, monkeypatch: pytest.MonkeyPatch, installed: bool
 ) -> None:
     """There all modules lie beside each other."""
-    monkeypatch.setattr(sources, "in_library", lambda file: installed)
-    monkeypatch.setattr(sources, "_distribution", lambda top: ("one",) if top in ("first_own", "second_own") else ())
+    monkeypatch.setattr(used_forms, "in_library", lambda file: installed)
+    monkeypatch.setattr(used_forms, "_distribution", lambda top: ("one",) if top in ("first_own", "second_own") else ())
     wanted = ["first_own", "second_own", *([] if installed else ["third_own"])]
     assert list(sources_of(made("first_own", "Form"))) == wanted

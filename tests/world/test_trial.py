@@ -179,18 +179,18 @@ BROKEN: Final = {
         "no such day (own_forms.py:",
     ),
     "a model without a body": ("def body(self)", "def no_body(self)", "robots:", "has no attribute 'body'"),
-    "a body without links": ("(Link(", "() and (Link(", "robots:", "a body with links is needed"),
+    "a body without links": ("(Link(", "() and (Link(", "robots:", "where a body with links is needed (own_forms.py:"),
     "a body that is none": (
         "return Body(",
         "return 3 and (lambda *a: 3)(",
         "robots:",
-        "a Body, or None is needed, not 3",
+        "body gives 3, where a Body, or None, is needed (own_forms.py:",
     ),
     "a colour of three": (
         'Shape(Box((0.1, 0.1, 0.1)), "", GREY)',
         'Shape(Box((0.1, 0.1, 0.1)), "", GREY[:3])',
         "robots:",
-        "a colour of four numbers is needed",
+        "where a colour of 4 numbers is needed (own_forms.py:",
     ),
     "a place of two": ("3.0, 2.0, 0.1)", "3.0, 2.0)", "robots:", "2 numbers for mover position, which has 3"),
     "a place that is not finite": ("3.0, 2.0, 0.1)", "3.0, float('nan'), 0.1)", "robots:", "nan"),
@@ -198,7 +198,7 @@ BROKEN: Final = {
         "return True\n\n\nclass Wanted",
         "pass\n\n\nclass Wanted",
         "robots:",
-        "True or False is needed, not None",
+        "is_plausible gives None, where True or False is needed (own_forms.py:",
     ),
     "a motion that raises": (
         "speed = asked",
@@ -212,25 +212,25 @@ BROKEN: Final = {
         "",
         "inf, 2.0, 0.1 for mover position: numbers of a frame are",
     ),
-    "a slot that is none": ('at.slot("count")', 'at.slot("cuont")', "robots.rover-1:", "cuont"),
-    "a reading of another type": ("return Reading(", "return tuple(", "robots.rover-1.sensors:", "tuple"),
+    "a slot that is none": ('at.slot("count")', 'at.slot("cuont")', "robots.mover.sensors:", "cuont"),
+    "a reading of another type": ("return Reading(", "return tuple(", "robots.mover.sensors:", "tuple"),
     "too few numbers": (
         "for value in values]",
         "for value in values[1:]]",
-        "robots.rover-1.sensors:",
+        "robots.mover.sensors:",
         "where a list of 2 numbers, or None, is needed (own_forms.py:",
     ),
     "numbers that are texts": (
         "value / 2.0",
         "'half'",
-        "robots.rover-1.sensors:",
+        "robots.mover.sensors:",
         "apply gives ['half', 'half'], where a list of 2 numbers, or None, is needed (own_forms.py:",
     ),
     "limits of no field": (
         '{"speed": (',
         '{"sped": (',
         "robots.mover.actuators",
-        "limits of fields of the command (speed)",
+        "where a mapping of fields (speed) to least and greatest value is needed (own_forms.py:",
     ),
     "no limits": ("def limits", "def no_limits", "robots.mover.actuators", "has no attribute 'limits'"),
     "a hold that raises": (
@@ -244,7 +244,7 @@ BROKEN: Final = {
         "[0], 1.0),)",
         "[0], 1.0))",
         "robots.mover.actuators",
-        "a target speed and a greatest force",
+        "where a tuple of (target, greatest force) is needed (own_forms.py:",
     ),
     "a rule that raises": ("self.ticks = at.slot", "self.ticks = at.clot", "", "clot"),
     "a rule's place that is none": (
@@ -257,7 +257,7 @@ BROKEN: Final = {
         "        view.write(self.ticks, 5.0)",
         "        view.write(self.ticks, 5.0)\n        view.numbers[0] = 0.125",
         "rule counts of the world failed",
-        "it writes mover position directly: numbers of a frame are written by view.write alone (own_forms.py:",
+        "TypeError: numbers of a frame are written by view.write alone (own_forms.py:",
     ),
     "a rule that writes nothing": (
         "[0] + 1.0)\n\n    def status",
@@ -265,12 +265,17 @@ BROKEN: Final = {
         "",
         "rule counts of the world failed",
     ),
-    "a status that is none": ('return {"ticks"', 'return 3 and {"tocks"', "", "a text is needed"),
+    "a status that is none": (
+        'return {"ticks"',
+        'return 3 and {"tocks"',
+        "",
+        "no text of Counts: KeyError: 'ticks' (own_forms.py:",
+    ),
     "a status with an object": (
         '{"ticks": view.read(self.ticks)[0]}',
         '{"ticks": 5, "self": self}',
         "",
-        "the status fails",
+        "status failed at tick 1: TypeError",
     ),
     "an entity rule of texts": (
         "abs(view.read(self.velocity)[0])",
@@ -282,7 +287,7 @@ BROKEN: Final = {
         "return (Shape(Box((0.1, 0.1, 1.0))",
         "return None and (Shape(Box((0.1, 0.1, 1.0))",
         "",
-        "a tuple of shapes is needed, not None",
+        "gives None, where a tuple of shapes is needed (own_forms.py:",
     ),
     "a scene of size 0": ("Box((0.1, 0.1, 1.0))", "Box((0.1, 0.0, 1.0))", "", "a size above 0 is needed"),
 }
@@ -295,7 +300,7 @@ def test_what_cannot_work_is_refused_at_its_place(tmp_path: Path, monkeypatch: p
     source = GOOD.replace(good, bad, 1)
     if what == "motors that are none":
         source = source.replace("[0], 1.0),)", "[0], 1.0)]")
-        said = "a tuple with what is asked of each motor is needed"
+        said = "where a tuple of (target, greatest force) is needed"
     planted(tmp_path, monkeypatch, source)
     with pytest.raises(DeploymentError) as refused:
         read_deployment(own_world().text(), NAME)

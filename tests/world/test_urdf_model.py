@@ -16,9 +16,10 @@ from foosim.deployment.assets import pin_assets, read_robot
 from foosim.deployment.loader import load_deployment, with_owners
 from foosim.deployment.schema import Deployment
 from foosim.protocol.asset_transfer import Fetching
+from foosim.world.assembly import misfits
 from foosim.world.assembly.world import build_scene, initial_numbers, models_of
 from foosim.world.edits import Push, fitting_edits
-from foosim.world.forms import misfits, registry
+from foosim.world.forms import registry
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout

@@ -12,18 +12,17 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from foosim.common.keyed_random import Slot, draw_key, draw_words
-from foosim.deployment.network.impairments import Impairments, TableJitter
 from foosim.deployment.network.link_settings import NO_RADIO, Profile, Profiles, over
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network, event_of
-from foosim.deployment.network.traces import read_opportunities, read_table
+from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.network.air import Air
 from foosim.vhub.network.custom_models import LinkModel, make_model
 from foosim.vhub.network.draw_address import DrawKeys
 from foosim.vhub.network.good_bad_periods import Times
-from foosim.vhub.network.jitter import quantiles_ns
+from foosim.vhub.network.jitter import jitter_ns
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
@@ -34,7 +33,7 @@ from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.custom_model import Own
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.queue import Queue
-from foosim.vhub.stages.stage import Stage, at_arrival, at_sending
+from foosim.vhub.stages.stage import at_arrival, at_sending
 from foosim.world.frame import Frame
 
 LinkKey = tuple[str, str, str]
@@ -45,8 +44,18 @@ RadioKey = tuple[str, str]
 _OWN_QUEUE: Final = ">"
 
 
-Settled = tuple[int, int, int, list[Stage], list[Stage], list[Stage], int, int, bool]
-"""By version of the time line, from when, until when: stages, at sending, at arrival, draws, phase, `is_apart`."""
+class Settled:
+    """The stages of a link for a time, by one version of the time line."""
+
+    def __init__(self, version: int, since_ns: int, until_ns: int, setup: LinkSetup | None, phase_ns: int = 0) -> None:
+        self.version, self.since_ns, self.until_ns, self.phase_ns = version, since_ns, until_ns, phase_ns
+        self.stages = (
+            [stage for _, make, _ in STAGES if (stage := make(setup)) is not None] if setup is not None else []
+        )
+        self.at_sending, self.at_arrival = at_sending(self.stages), at_arrival(self.stages)
+        self.slots = 0 if setup is None else slots_of(setup.settings, is_radio=setup.is_radio)
+        shares = setup is None or setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self.stages)
+        self.is_apart = not shares
 
 
 class Link:
@@ -62,16 +71,9 @@ class Link:
         self._draws = DrawKeys(fabric.seed, "link", source, destination, *via, by_channel=is_robot)
         self._key = b"" if is_robot else self._draws.key
         """Under which all its packets draw; empty where each channel has a key."""
-        self._version = -1
-        self._since_ns = self._until_ns = -1
-        self._stages: list[Stage] = []
-        self._at_sending: list[Stage] = []
-        self._at_arrival: list[Stage] = []
-        self._is_apart = False
-        self._slots = self._phase_ns = 0
         self._times = Times()
-        self._other: Settled | None = None
-        """The stages of other times: a packet arrives by the settings of its time of sending."""
+        self._now = self._other = Settled(-1, -1, -1, None)
+        """The stages of now and of another time: a packet arrives by the settings of its time of sending."""
 
     @property
     def rule(self) -> str:
@@ -95,87 +97,98 @@ class Link:
         return self._setup(self.settings_at(time_ns)[0])
 
     def _setup(self, settings: Radio) -> LinkSetup:
-        source, destination, profile = self.source, self.destination, self.profile
-        return self._fabric.setup(source, destination, profile, settings, self._draws, self.state, self._times)
+        fabric, timeline, profile, ends = self._fabric, self._timeline, self.profile, (self.source, self.destination)
+        radio = _sender(*ends, profile)
+        air, budget, own = None, None, None
+        if settings.is_on_air:
+            name = profile.radio or fabric.network.defaults.preset
+            own = fabric.profiles.base(profile.radio)
+            air = fabric.air(name, settings)
+            budget = Budget(fabric.propagation(name, settings), *ends, fabric.seed, settings.air or name)
+        return LinkSetup(
+            *ends,
+            settings,
+            profile.radio,
+            self._draws,
+            DrawKeys(fabric.seed, "sending", *radio, by_channel=self._draws.by_channel),
+            self.state,
+            self._times,
+            fabric.radios.setdefault(radio, RadioState()),
+            fabric.world,
+            profile.rule != NO_RADIO,
+            air,
+            budget,
+            tuple(timeline.cuts_of(*ends)),
+            tuple(timeline.holds_of(*ends)),
+            fabric.network.defaults.in_flight_on_partition == "drop",
+            jitter_ns(settings.jitter, fabric.deployment.asset_files),
+            fabric.opportunities(settings),
+            fabric.model(settings),
+            fabric.faults,
+            own,
+        )
 
-    def _settle(self, time_ns: int) -> None:
+    def _settle(self, time_ns: int) -> Settled:
         """Select the stages of a time; they are made anew after a change of settings."""
-        version, other = self._timeline.version, self._other
-        if self._version == version and self._since_ns <= time_ns < self._until_ns:
-            return
-        self._other = self._settled()
-        if other is not None and other[0] == version and other[1] <= time_ns < other[2]:
-            self._version, self._since_ns, self._until_ns, self._stages, self._at_sending, self._at_arrival = other[:6]
-            self._slots, self._phase_ns, self._is_apart = other[6:]
-            return
-        settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
-        self._version = version
-        setup = self._setup(settings)
-        self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
-        self._at_sending, self._at_arrival = at_sending(self._stages), at_arrival(self._stages)
-        self._slots = slots_of(settings, is_radio=setup.is_radio)
-        self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
-        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
-
-    def _settled(self) -> Settled:
-        times = self._version, self._since_ns, self._until_ns
-        stages = self._stages, self._at_sending, self._at_arrival
-        return *times, *stages, self._slots, self._phase_ns, self._is_apart
+        version, now = self._timeline.version, self._now
+        if now.version == version and now.since_ns <= time_ns < now.until_ns:
+            return now
+        now, self._other = self._other, now
+        if now.version != version or not now.since_ns <= time_ns < now.until_ns:
+            settings, since_ns, until_ns = self.settings_at(time_ns)
+            setup = self._setup(settings)
+            now = Settled(version, since_ns, until_ns, setup, self._fabric.phase_ns(self.source) * setup.is_radio)
+        self._now = now
+        return now
 
     def is_apart(self, time_ns: int) -> bool:
         """Whether packets of a time share no radio, queue, air or custom model with other links."""
-        self._settle(time_ns)
-        return self._is_apart
+        return self._settle(time_ns).is_apart
 
     def restore(self, flight: Flight) -> None:
         """Add a packet in flight of a restored state: its turn may not have begun."""
-        self._settle(flight.sent_ns)
-        for stage in self._stages:
+        for stage in self._settle(flight.sent_ns).stages:
             if isinstance(stage, Delay):
                 stage.plan(flight)
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """After a change of clogs, set the due times of packets in flight, in the order of sending."""
         judged = [(flight, self._is_late(flight)) for flight in flights]
-        self._settle(now_ns)
-        for stage in self._stages:
+        for stage in self._settle(now_ns).stages:
             if isinstance(stage, Delay):
                 stage.retime(judged, now_ns)
 
     def _is_late(self, flight: Flight) -> bool:
         """Whether later packets may overtake a packet, by the settings of its time of sending."""
-        self._settle(flight.sent_ns)
-        return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in self._stages)
+        stages = self._settle(flight.sent_ns).stages
+        return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in stages)
 
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is in flight with its due time, False when it is dropped."""
-        sent_ns, is_offered = flight.sent_ns, flight.copy == 0
-        if not self._since_ns <= sent_ns < self._until_ns or self._version != self._timeline.version:
-            self._settle(sent_ns)
+        sent_ns, is_offered, now = flight.sent_ns, flight.copy == 0, self._now
+        if not now.since_ns <= sent_ns < now.until_ns or now.version != self._timeline.version:
+            now = self._settle(sent_ns)
         if is_offered:
             self.state.offered += 1
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
         flight.due_ns = sent_ns
-        flight.phase_ns = self._phase_ns
-        if self._slots:
-            flight.slots = self._slots
+        flight.phase_ns = now.phase_ns
+        if now.slots:
+            flight.slots = now.slots
             flight.words = draw_words(self._key or self._draws.of(flight.channel), flight.draw, flight.copy)
-        for stage in self._at_sending:
+        for stage in now.at_sending:
             cause = stage.at_sending(flight)
             if cause:
-                self._drop(flight, cause)
+                self.drop(flight, cause)
                 return False
         return True
 
-    def _drop(self, flight: Flight, cause: str) -> None:
+    def drop(self, flight: Flight, cause: str) -> None:
+        """Count a packet as dropped for a cause."""
         flight.cause = cause
         if flight.copy == 0:
             self.state.dropped += 1
             self.state.causes[cause] = self.state.causes.get(cause, 0) + 1
-
-    def turn_away(self, flight: Flight, cause: str) -> None:
-        """Drop a packet that exceeds the limit of packets in flight."""
-        self._drop(flight, cause)
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
         """Judge a packet at arrival, by the settings of its time of sending, whatever was sent on the link since.
@@ -183,13 +196,13 @@ class Link:
         True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
         it does.
         """
-        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._timeline.version:
-            self._settle(flight.sent_ns)
-        state, is_offered = self.state, flight.copy == 0
-        for stage in self._at_arrival:
+        state, is_offered, now = self.state, flight.copy == 0, self._now
+        if not now.since_ns <= flight.sent_ns < now.until_ns or now.version != self._timeline.version:
+            now = self._settle(flight.sent_ns)
+        for stage in now.at_arrival:
             cause = stage.at_arrival(flight, hindered)
             if cause:
-                self._drop(flight, cause)
+                self.drop(flight, cause)
                 break
         else:
             state.delivered += is_offered
@@ -238,8 +251,7 @@ class Fabric:
         self._phases: dict[str, int] = {}
         self._propagations: dict[str, Propagation] = {}
         for rule in (*self.network.links, *self.network.radios.values()):
-            if rule.jitter is not None:  # the tables are made before the run starts: they would delay a tick
-                quantiles_ns(rule.jitter, self._table(rule))
+            jitter_ns(rule.jitter, deployment.asset_files)  # before the run starts: tables would delay a tick
 
     def turn_to(self, frame: Frame) -> None:
         """Set the newest committed frame. Links are made anew where bodies leave or enter service in it."""
@@ -296,55 +308,8 @@ class Fabric:
         profile = self.profiles.find(flight.source, flight.destination, flight.channel)
         settings, name = profile.settings, profile.radio or self.network.defaults.preset
         if settings.is_on_air:
-            self._air(name, settings).restore(flight, self._propagation(name, settings))
+            self.air(name, settings).restore(flight, self.propagation(name, settings))
             self.link(flight.source, flight.destination, flight.channel).restore(flight)
-
-    def setup(
-        self,
-        source: str,
-        destination: str,
-        profile: Profile,
-        settings: Radio,
-        draws: DrawKeys,
-        memory: LinkState,
-        times: Times,
-    ) -> LinkSetup:
-        """Return the context of a link's stages, valid for some time."""
-        timeline = self.timeline
-        radio = _sender(source, destination, profile)
-        sender = self.radios.get(radio)
-        if sender is None:
-            sender = self.radios[radio] = RadioState()
-        air, budget, own = None, None, None
-        if settings.is_on_air:
-            name = profile.radio or self.network.defaults.preset
-            own = self.profiles.base(profile.radio)
-            propagation = self._propagation(name, settings)
-            air = self._air(name, settings)
-            budget = Budget(propagation, source, destination, self.seed, settings.air or name)
-        return LinkSetup(
-            source,
-            destination,
-            settings,
-            profile.radio,
-            draws,
-            DrawKeys(self.seed, "sending", *radio, by_channel=draws.by_channel),
-            memory,
-            times,
-            sender,
-            self.world,
-            profile.rule != NO_RADIO,
-            air,
-            budget,
-            tuple(timeline.cuts_of(source, destination)),
-            tuple(timeline.holds_of(source, destination)),
-            self.network.defaults.in_flight_on_partition == "drop",
-            self._table(settings),
-            self._opportunities(settings),
-            self._model(settings),
-            self.faults,
-            own,
-        )
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:
         """Return how long what is sent on a link now waits before its turn comes."""
@@ -354,21 +319,23 @@ class Fabric:
         found = next((self.radios[sender] for sender in senders if sender in self.radios), None)
         return 0 if found is None else max(0, found.free_ns - now_ns)
 
-    def _propagation(self, name: str, settings: Radio) -> Propagation:
+    def propagation(self, name: str, settings: Radio) -> Propagation:
+        """Return what becomes of a radio's signals, by the radio's name."""
         found = self._propagations.get(name)
         if found is None:
             key = draw_key(self.seed, "shadowing", settings.air or name)
             found = self._propagations[name] = Propagation(settings, self.world, key)
         return found
 
-    def _air(self, name: str, settings: Radio) -> Air:
+    def air(self, name: str, settings: Radio) -> Air:
+        """Return the air of a radio, by the radio's name."""
         name = settings.air or name
         found = self.airs.get(name)
         if found is None:
             found = self.airs[name] = Air(AirState(), self.radios)
         return found
 
-    def _model(self, settings: Radio) -> LinkModel | None:
+    def model(self, settings: Radio) -> LinkModel | None:
         """Return the link model that settings name, one for equal parameters; raises ModelError."""
         if settings.model is None:
             return None
@@ -377,15 +344,11 @@ class Fabric:
             self._models[key] = make_model(settings.model)
         return self._models[key]
 
-    def _table(self, settings: Impairments) -> tuple[int, ...]:
-        jitter = settings.jitter
-        return read_table(self._text(jitter.file)) if isinstance(jitter, TableJitter) else ()
-
-    def _opportunities(self, settings: Radio) -> tuple[int, ...]:
-        return () if settings.trace is None else read_opportunities(self._text(settings.trace.file))
-
-    def _text(self, path: str) -> str:
-        return self.deployment.asset_files[path].decode("ascii", "replace")
+    def opportunities(self, settings: Radio) -> tuple[int, ...]:
+        """Return the times (ms) of the trace of capacity that settings name; none without one."""
+        if settings.trace is None:
+            return ()
+        return read_opportunities(self.deployment.asset_files[settings.trace.file].decode("ascii", "replace"))
 
 
 def _sender(source: str, destination: str, profile: Profile) -> RadioKey:

@@ -12,17 +12,16 @@ from dataclasses import dataclass, replace
 from math import exp, inf
 from typing import Final
 
-from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
+from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4
 from foosim.deployment.network.link_settings import NO_RADIO, Profiles, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network.traces import read_opportunities, read_table
+from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.radio_checks import unheeded
 from foosim.deployment.schema import Deployment
-from foosim.vhub.links.offered_load import flows_of, offered_hz, used_links
-from foosim.vhub.links.packet_sizes import long_packets
+from foosim.vhub.links.offered_load import flows_of, long_packets, offered_hz, used_links
 from foosim.vhub.links.phase import phase_warnings
-from foosim.vhub.network.jitter import interpolate_ns, moments_ns, quantiles_ns
+from foosim.vhub.network.jitter import interpolate_ns, jitter_ns, moments_ns
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
     LRWPAN_OVERHEAD_BYTES,
@@ -291,8 +290,7 @@ def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, in
     jitter = settings.jitter
     if jitter is None:
         return base_ns, 0, base_ns
-    table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
-    quantiles = quantiles_ns(jitter, table)
+    quantiles = jitter_ns(jitter, files)
     mean_ns, sd_ns = moments_ns(quantiles)
     p99_ns = interpolate_ns(quantiles, int(0.99 * 2**64))
     return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
@@ -307,11 +305,8 @@ def reordered_of(settings: Impairments, files: Mapping[str, bytes]) -> float | N
     reorder, jitter = settings.reorder, settings.jitter
     if reorder is None and (settings.order == "fifo" or jitter is None):
         return None
-    drawn_ns = [0]
-    if jitter is not None:
-        table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
-        quantiles = quantiles_ns(jitter, table)
-        drawn_ns = [interpolate_ns(quantiles, (2 * n + 1) << 54) for n in range(512)]
+    quantiles = jitter_ns(jitter, files)
+    drawn_ns = [interpolate_ns(quantiles, (2 * n + 1) << 54) for n in range(512)] if quantiles else [0]
 
     def overtaken(extra_ns: int) -> float:
         later = sum(bisect_left(drawn_ns, one + extra_ns - SPACING_NS) for one in drawn_ns)
@@ -430,7 +425,7 @@ def _queue_ns(settings: Radio, carried: Sequence[Throughput]) -> int | None:
 
 
 def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
-    settings = use.settings
+    settings, has_queue = use.settings, "queue" in use.settings.model_fields_set
     if summary.loss > 0.5:
         yield f"more than half of all packets is lost: {100.0 * summary.loss:.1f} %"
     if settings.ttl_ns is not None and summary.delay_mean_ns > settings.ttl_ns:
@@ -449,14 +444,10 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
             yield f"{key} {what}"
     if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
         yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
-    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):
+    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and has_queue:
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
         yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
-
-
-def _has_queue(settings: Radio) -> bool:
-    return "queue" in settings.model_fields_set
 
 
 def _capacity_hz(summary: LinkSummary) -> float | None:

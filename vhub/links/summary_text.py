@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from foosim.common.format import range_text, rate_text, time_text
-from foosim.vhub.links.summary import MANY, SPACING_NS, LinkSummary, Throughput
+from foosim.vhub.links.summary import MANY, SPACING_NS, LinkSummary
 
 LINES_MAX: Final = 12
 """Lines of the effective model at the start of a run."""
@@ -37,11 +37,6 @@ def delay_text(summary: LinkSummary) -> str:
     return "{}, sd {}, p99 {}".format(*times)
 
 
-def _goodput_text(carried: Throughput) -> str:
-    one = rate_text(carried.goodput_bps)
-    return one if carried.shared_bps is None else f"{one}, {MANY} stations {rate_text(carried.shared_bps)}"
-
-
 def summary_line(summary: LinkSummary) -> str:
     """Return the summary of settings in one line."""
     parts = [summary.medium if summary.medium != "none" else "no medium"]
@@ -57,7 +52,8 @@ def summary_line(summary: LinkSummary) -> str:
     if summary.rate_bps:
         parts.append(f"at {rate_text(summary.rate_bps)}")
     for carried in summary.carried:
-        parts.append(f"{carried.size} B: {time_text(carried.airtime_ns)}, {_goodput_text(carried)}")
+        many = "" if carried.shared_bps is None else f", {MANY} stations {rate_text(carried.shared_bps)}"
+        parts.append(f"{carried.size} B: {time_text(carried.airtime_ns)}, {rate_text(carried.goodput_bps)}{many}")
     if summary.range_los_m is not None:
         walls = "as they allow" if summary.range_nlos_m is None else range_text(summary.range_nlos_m)
         parts.append(f"range {range_text(summary.range_los_m)} in sight, behind walls {walls}")

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, NoReturn, Pro
 
 from foosim.common.errors import Refused
 from foosim.common.finding import Finding, Location
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import nearest_quoted
 from foosim.deployment.loader import Text, refuse_findings
 from foosim.deployment.network.impairments import OwnModel
 from foosim.deployment.network.rules import Network
@@ -127,7 +126,7 @@ def make_model(model: OwnModel) -> LinkModel:
     entries = known.get(model.name, [])
     if not entries:
         names = ", ".join(known) or "none"
-        nearest = quoted(nearest_name(model.name, known))
+        nearest = nearest_quoted(model.name, known)
         raise ModelError("name", f"not a link model that is installed here, there are {names}", model, nearest)
     if len(entries) > 1:
         givers = " and ".join(map(giver_of, entries))

@@ -11,7 +11,7 @@ Functions, 6.5.29 (incomplete gamma).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import pairwise
 from typing import Final
@@ -29,6 +29,7 @@ from foosim.deployment.network.impairments import (
     TableJitter,
     UniformJitter,
 )
+from foosim.deployment.network.traces import read_table
 from foosim.vhub.network.series_math import exp, ln, ln_gamma, power
 
 CELLS: Final = 4096
@@ -225,6 +226,14 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
         p = below
         quantiles.append(round(x * scale_ns))
     return tuple(quantiles)
+
+
+def jitter_ns(jitter: Jitter | None, files: Mapping[str, bytes]) -> tuple[int, ...]:
+    """Return the quantiles (ns) of a jitter, none without one; `files` has the table that it may name, by path."""
+    if jitter is None:
+        return ()
+    text = files[jitter.file].decode("ascii", "replace") if isinstance(jitter, TableJitter) else ""
+    return quantiles_ns(jitter, read_table(text) if text else ())
 
 
 def interpolate_ns(quantiles_ns: tuple[int, ...], word: int) -> int:

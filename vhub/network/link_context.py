@@ -46,8 +46,8 @@ class LinkSetup:
     holds: tuple[tuple[int, int], ...] = ()
     """Times of its cuts, and of its clogs."""
     in_flight_dropped: bool = True
-    table: tuple[int, ...] = ()
-    """The content of the jitter's file, if it has one."""
+    jitter_ns: tuple[int, ...] = ()
+    """The quantiles of its jitter (`jitter.jitter_ns`); none without one."""
     opportunities_ms: tuple[int, ...] = ()
     """The times of a trace of capacity."""
     model: LinkModel | None = None

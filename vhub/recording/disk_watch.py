@@ -1,21 +1,50 @@
 """Watches the disk space of the vHub's capture, and of its journal, without which no run continues.
 
-It says once what gets little, and when the run has to end: while what is left to be written still fits.
+It says once what gets little, and when the run has to end: while what is left to be written still fits. While one
+`fdatasync` of a capture that is closed lasts, nothing else moves: whether the disk goes on is told by what the kernel
+has written of a block device. Of what has no such account (a network file system, memory) the call itself counts: it
+ends, or fails, when the kernel says so.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any, Final
 
 from foosim.protocol.run_status import CLOSING, NOT_RECORDED
 from foosim.runtime.disk import Level, room_on_disk
-from foosim.vhub.recording.disk_progress import DiskProgress
 from foosim.vhub.recording.writer import CaptureState, CaptureWriter
 
 LOOK_NS: Final = 1_000_000_000
 """How often the journal's disk is checked."""
 _STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
+DEVICES: Final = Path("/sys/dev/block")
+WRITES, SECTORS_WRITTEN = 4, 6
+"""Where a device's `stat` has how many writes it has completed, and how many sectors with them."""
+COUNT_NS: Final = 1_000_000_000
+
+
+class DiskProgress:
+    """The disk of one existing file."""
+
+    def __init__(self, path: Path, devices: Path = DEVICES) -> None:
+        device = path.stat().st_dev
+        self._account = devices / f"{os.major(device)}:{os.minor(device)}" / "stat"
+        self._counted = 0
+        self._count_ns = 0
+
+    def look(self, is_syncing: bool, now_ns: int) -> int:
+        """Return a number that changes while a sync of the file (`is_syncing`) makes progress."""
+        if not is_syncing:
+            return 0
+        try:
+            fields = self._account.read_text("ascii").split()
+            return int(fields[WRITES]) + int(fields[SECTORS_WRITTEN])
+        except (OSError, ValueError, IndexError):
+            if now_ns >= self._count_ns:
+                self._counted, self._count_ns = self._counted + 1, now_ns + COUNT_NS
+            return self._counted
 
 
 class RoomWatch:

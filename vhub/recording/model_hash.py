@@ -61,7 +61,8 @@ def model_hash(deployment: Deployment) -> str:
 
 @cache
 def _formulas() -> bytes:
-    return json.encode([list(_losses()), list(_errors()), list(_airtimes()), _lora(), list(_lte()), list(_draws())])
+    lora = LORA_SENSITIVITY_DBM, LORA_GATEWAY_SENSITIVITY_DBM, LORA_ISOLATION_DB
+    return json.encode([list(_losses()), list(_errors()), list(_airtimes()), lora, list(_lte()), list(_draws())])
 
 
 def _losses() -> Iterator[object]:
@@ -109,10 +110,6 @@ def _turns() -> Iterator[int]:
     turns = [Turn(transmission, RadioState()) for transmission in known]
     for backoff_ns in range(0, 150_000, 15_000):
         yield Contest(0, 3, 0, list(turns), []).turn_ns(backoff_ns, WIFI_5.slot_ns)
-
-
-def _lora() -> object:
-    return LORA_SENSITIVITY_DBM, LORA_GATEWAY_SENSITIVITY_DBM, LORA_ISOLATION_DB
 
 
 def _lte() -> Iterator[object]:

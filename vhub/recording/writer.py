@@ -50,7 +50,6 @@ class CaptureStatistics:
     refused: int
     queued_rows: int
     waits: int
-    written_tick: int
     synced_tick: int
 
 
@@ -171,7 +170,7 @@ class CaptureWriter:
 
     def statistics(self) -> CaptureStatistics:
         counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
-        return CaptureStatistics(self._file.total_bytes, *counts, self._file.done.tick, self.synced_tick)
+        return CaptureStatistics(self._file.total_bytes, *counts, self.synced_tick)
 
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)
@@ -250,10 +249,7 @@ class CaptureWriter:
         if self.state.level is Level.OUT:
             return
         try:
-            if self._syncer.error is not None:
-                raise self._syncer.error
-            self._file.end_chunk()
-            self._note_written()
+            self._end_chunk()
             room = self._file.room()
         except OSError as error:
             self._give_up(str(self._file.disk_error(error)))
@@ -263,7 +259,10 @@ class CaptureWriter:
         elif room.level > self.state.level:
             self._come_to(CaptureState(room.level, f"{self.path}: {room}"))
 
-    def _note_written(self) -> None:
+    def _end_chunk(self) -> None:
+        if self._syncer.error is not None:
+            raise self._syncer.error
+        self._file.end_chunk()
         self._written += self._pending
         self._pending = 0
         self._syncer.written(self._file.done.tick)
@@ -288,10 +287,7 @@ class CaptureWriter:
     def _finish(self, ending: Mapping[str, str]) -> None:
         try:
             self._syncer.end()
-            if self._syncer.error is not None:
-                raise self._syncer.error
-            self._file.end_chunk()
-            self._note_written()
+            self._end_chunk()
             self._file.finish(ending)
             self._syncer.tick = self._file.done.tick
         except OSError as error:

@@ -13,29 +13,35 @@ from collections.abc import Callable
 from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.stages.admission import Admit
+from foosim.vhub.radio.propagation import BLOCKED, OUT_OF_RANGE
+from foosim.vhub.stages.admission import NO_ROUTE, NODE_DOWN, TOO_BIG, Admit
 from foosim.vhub.stages.channel import Channel
-from foosim.vhub.stages.corruption import Mangle
-from foosim.vhub.stages.custom_model import Own
+from foosim.vhub.stages.corruption import CRC_FAIL, Mangle
+from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED, Own
 from foosim.vhub.stages.delay import Delay
-from foosim.vhub.stages.duty import Duty
-from foosim.vhub.stages.medium import make_medium
-from foosim.vhub.stages.policy import Policy
-from foosim.vhub.stages.queue import Queue
-from foosim.vhub.stages.receiver import Receiver
-from foosim.vhub.stages.residual import make_residual
+from foosim.vhub.stages.duty import DUTY_CYCLE, Duty
+from foosim.vhub.stages.medium import COLLISION, SNR, make_medium
+from foosim.vhub.stages.policy import EXPIRED, FILTERED, PARTITION, Policy
+from foosim.vhub.stages.queue import CODEL, QUEUE_FULL, Queue
+from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL, Receiver
+from foosim.vhub.stages.residual import BURST_LOSS, RANDOM_LOSS, make_residual
 from foosim.vhub.stages.stage import Stage
 
-STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
-    Admit.for_link,
-    Policy.for_link,
-    Duty.for_link,
-    Queue.for_link,
-    make_medium,
-    Channel.for_link,
-    make_residual,
-    Own.for_link,
-    Mangle.for_link,
-    Delay.for_link,
-    Receiver.for_link,
+STAGES: Final[tuple[tuple[str, Callable[[LinkSetup], Stage | None], tuple[str, ...]], ...]] = (
+    ("admission", Admit.for_link, (TOO_BIG, NODE_DOWN, NO_ROUTE)),
+    ("policy", Policy.for_link, (PARTITION, FILTERED, EXPIRED)),
+    ("duty", Duty.for_link, (DUTY_CYCLE,)),
+    ("queue", Queue.for_link, (QUEUE_FULL, CODEL, EXPIRED)),
+    ("medium", make_medium, (COLLISION,)),
+    ("channel", Channel.for_link, (OUT_OF_RANGE, BLOCKED, SNR, COLLISION)),
+    ("residual", make_residual, (RANDOM_LOSS, BURST_LOSS)),
+    ("custom_model", Own.for_link, (MODEL, MODEL_FAILED)),
+    ("corruption", Mangle.for_link, (CRC_FAIL,)),
+    ("delay", Delay.for_link, ()),
+    ("receiver", Receiver.for_link, (RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL)),
 )
+"""Each with its name and the causes of its drops.
+
+`expired` is the policy's at arrival and the queue's at sending; `collision` the medium's while stations contend, else
+the channel's.
+"""

@@ -11,6 +11,7 @@ from typing import Final
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told
 
 TOO_BIG: Final = "too_big"
 NODE_DOWN: Final = "node_down"
@@ -35,9 +36,17 @@ class Admit(Stage):
             return TOO_BIG
         return NODE_DOWN if self._is_down else ""
 
+    def explain(self, seen: Seen, told: Told) -> None:
+        row, limit = seen.row, "any size" if self._longest is None else f"at most {self._longest} B"
+        state = seen.out_of_service(row.source) if row.cause == NODE_DOWN else "in service"
+        told.say("{size} B of {}, sender {sender}", limit, size=row.size, mtu=self._longest, sender=state)
+
 
 class NoRoute(Admit):
     """The ends have no radio in common, or not that of their rule."""
 
     def at_sending(self, flight: Flight) -> str:
         return NO_ROUTE
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        told.say("the ends have no radio in common, or not that of their rule", routed=False)

@@ -14,6 +14,7 @@ from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.series_math import exp, ln, ln_gamma
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told, beside
 
 CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
@@ -43,7 +44,7 @@ class Mangle(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         words, bits = flight.words, 8 * len(flight.payload)
-        if self._error_rate and bits and words[Slot.CORRUPT] < self.threshold(bits):
+        if self._error_rate and bits and words[Slot.CORRUPT] < self._threshold(bits):
             if not self._delivers:
                 return CRC_FAIL
             self._flip(flight, bits)
@@ -52,7 +53,23 @@ class Mangle(Stage):
             self._setup.memory.copies += 1
         return ""
 
-    def threshold(self, bits: int) -> int:
+    def explain(self, seen: Seen, told: Told) -> None:
+        row, words = seen.row, seen.flight.words
+        told.facts["bits_flipped"] = row.bits_flipped
+        parts = []
+        if seen.settings.corrupt is not None:
+            rate, bits, draw = self._error_rate, 8 * row.size, words[Slot.CORRUPT]
+            threshold = self._threshold(bits) if rate else 0
+            flipped = "some" if row.cause == CRC_FAIL else str(row.bits_flipped)
+            told.facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
+            parts.append(f"{flipped} bits flipped: {beside(draw, threshold)}, {rate:g} a bit in {bits}")
+        if self._doubled and row.copy == 0 and row.cause != CRC_FAIL:
+            draw = words[Slot.DUPLICATE]
+            copied = "a copy" if draw < self._doubled else "no copy"
+            parts.append(f"{copied}: draw {draw / UNIT:g}, {seen.settings.duplicate:g}")
+        told.text = ", ".join(parts) or "a copy is not copied again"
+
+    def _threshold(self, bits: int) -> int:
         """Return the probability of any error in so many bits, in units of 2^-64."""
         found = self._thresholds.get(bits)
         if found is None:

@@ -15,11 +15,12 @@ from msgspec import msgpack
 from foosim.common import limits
 from foosim.common.errors import show
 from foosim.vhub.line_of_sight.occlusion import Trace
-from foosim.vhub.network.custom_models import End, Judged, LinkModel, Passage, Wall
+from foosim.vhub.network.custom_models import VERSION_KEY, End, Judged, LinkModel, Passage, Wall
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.propagation import crossing_db
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told
 
 MODEL: Final = "model"
 MODEL_FAILED: Final = "model_failed"
@@ -62,6 +63,14 @@ class Own(Stage):
         memory.model = kept
         flight.model_ns = judged.extra_ns
         return MODEL if judged.is_dropped else ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        model = self._setup.settings.model
+        assert model is not None, "a link with a model of one's own"
+        package = seen.evidence.versions.get(VERSION_KEY + model.name, "")
+        told.say("{model} of {package}", model=model.name, parameters=dict(model.parameters), package=package)
+        failed = ", which failed" if seen.row.cause == MODEL_FAILED else ""
+        told.say("{}, {extra_ns} more delay", failed, extra_ns=seen.row.model_ns)
 
     def _passage(self, flight: Flight) -> Passage:
         source, destination = self._end(flight.source), self._end(flight.destination)

@@ -11,10 +11,11 @@ from collections.abc import Iterable
 from typing import Final
 
 from foosim.common.keyed_random import Slot, chance_threshold
-from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
+from foosim.vhub.network.jitter import interpolate_ns
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told, exact
 
 _JITTER: Final = int(Slot.JITTER)
 
@@ -27,7 +28,7 @@ class Delay(Stage):
         self._memory = setup.memory
         self._delay_ns = settings.delay_ns
         self._fifo = settings.order == "fifo"
-        self._quantiles_ns = () if settings.jitter is None else quantiles_ns(settings.jitter, setup.table)
+        self._quantiles_ns = setup.jitter_ns
         self._holds = setup.holds
         self._bad_ns = 0 if settings.burst is None else settings.burst.bad_extra_delay_ns
         reorder = settings.reorder
@@ -69,6 +70,26 @@ class Delay(Stage):
         if self._air is not None:
             self.plan(flight)
         return ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        row = seen.row
+        parts = {
+            "phase": row.phase_ns,
+            "queue": row.queue_ns,
+            "access": row.access_ns,
+            "airtime": row.airtime_ns,
+            "way": row.propagation_ns,
+            "constant": self._delay_ns,
+            "link model": row.model_ns,
+            "jitter": row.jitter_ns,
+            "bad time": self._bad_ns if row.is_bad else 0,
+            "reordered": self._extra_ns if self.is_late(seen.flight) else 0,
+            "clog": row.held_ns,
+        }
+        parts["order, behind the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
+        told.facts = {what: ns for what, ns in parts.items() if ns}
+        text = " + ".join(f"{what} {exact(ns)}" for what, ns in told.facts.items()) or "no delay"
+        told.say("{} = due {due_ns}", text, due_ns=row.due_ns)
 
     def plan(self, flight: Flight) -> None:
         """Delay a packet whose turn on the air is deferred."""

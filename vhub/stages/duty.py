@@ -15,6 +15,7 @@ from foosim.vhub.network.memory import RadioState, Sending
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told
 
 DUTY_CYCLE: Final = "duty_cycle"
 RUNS_MAX: Final = 1_024
@@ -67,6 +68,13 @@ class Duty(Stage):
                 sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE, decided_by=flight.decided_by)
             return DUTY_CYCLE
         return ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        row, share = seen.row, self._settings.duty_cycle
+        told.say("{} of any {window_ns} on air", f"{100 * share:g} %", window_ns=self._window_ns, duty_cycle=share)
+        told.say(", the packet takes {airtime_ns}", airtime_ns=self.airtime_ns(row.size, row.published))
+        if row.cause == DUTY_CYCLE:
+            told.say(", {left_ns} is left of the one that ends with it", left_ns=row.decided_by.duty_left_ns)
 
     def airtime_ns(self, size: int, published: bool) -> int:
         """Return the airtime of a payload of `size` bytes."""

@@ -7,9 +7,10 @@ IEEE 802.15.4 looks before it sends. LoRa sends at once. What is out of range is
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
+from itertools import groupby
 from typing import Final
 
 from foosim.common.keyed_random import UNIT, Slot, draw_words
@@ -28,8 +29,9 @@ from foosim.vhub.radio.airtime import (
     lrwpan_airtime_ns,
     serialisation_ns,
 )
-from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, wifi_access
+from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, sensing, wifi_access, wifi_contention
 from foosim.vhub.radio.frames import WifiFrames
+from foosim.vhub.radio.propagation import BLOCKED, OUT_OF_RANGE
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -42,6 +44,7 @@ from foosim.vhub.radio.timings import (
 )
 from foosim.vhub.stages.duty import note_sent
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -77,6 +80,9 @@ class Wire(Stage):
         sender.free_ns = end_ns
         sender.waiting.append((end_ns, size))
         return ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        _tell_airtime(seen, told, "wire")
 
     def _opportunity_ns(self, ready_ns: int, size: int) -> int:
         """Return when the last byte leaves; the next packet uses the rest of the opportunity."""
@@ -134,6 +140,39 @@ class OnAir(Stage):
         if cause:
             flight.outcome = cause
         return COLLISION if flight.outcome == COLLISION else ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        row = seen.row
+        others = "no other station" if row.contenders <= 1 else f"{row.contenders} stations contend"
+        told.say("{how}: {}", others, how="broadcast, once" if seen.is_broadcast else "unicast")
+        told.say(", access {access_ns}, {retries} retries, ", access_ns=row.access_ns, retries=row.retries)
+        told.facts["contenders"] = row.contenders
+        _tell_airtime(seen, told, "air")
+        odds = self.odds(max(1, row.contenders), row.size, seen.is_broadcast)
+        if odds is None:
+            return
+        chance = odds[0] / UNIT
+        told.facts |= {"collision_chance": chance, "attempts": (attempts := [*self._attempts(seen, *odds)])}
+        runs = [(what, len([*those])) for what, those in groupby(attempts)]
+        told.text += "; " + ", ".join(what if count == 1 else f"{count} x {what}" for what, count in runs)
+        told.text += f" (an attempt collides with {chance:g})" if chance else ""
+
+    def _attempts(self, seen: Seen, threshold: int, access_threshold: int) -> Iterator[str]:
+        """Yield the result of each attempt of a captured packet: an attempt has four of eight words of a block."""
+        row, words = seen.row, self._words(seen.flight, seen.is_broadcast)
+        is_lost = row.decided_by.collision == "contention" or row.cause in (SNR, OUT_OF_RANGE, BLOCKED)
+        for attempt in range(row.retries + 1):
+            block, at = words(attempt >> 1), (attempt & 1) << 2
+            if block[at + 3] < access_threshold:
+                yield "the channel was never free"
+            elif block[at + 1] < threshold:
+                yield "collision"
+            else:
+                yield "error" if attempt < row.retries or (is_lost and not seen.is_broadcast) else "got across"
+
+    def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int] | None:
+        """Return below which words an attempt collides, and finds no free channel; None where nobody contends."""
+        return None
 
     def _note(self, flight: Flight, shared: Sending) -> None:
         """Store the result of a broadcast's first receiver for the others."""
@@ -208,6 +247,12 @@ class OnAir(Stage):
         draws = self._setup.sending if broadcast else self._setup.draws
         key, number, copy = draws.of(flight.channel), flight.draw, flight.copy
         return lambda block: draw_words(key, number, copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
+
+
+def _tell_airtime(seen: Seen, told: Told, where: str) -> None:
+    row = seen.row
+    told.say("{airtime_ns} on the {}", where, airtime_ns=row.airtime_ns)
+    told.say(" at {rate_bps}" if row.rate_bps else "", rate_bps=row.rate_bps)
 
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:
@@ -306,6 +351,9 @@ class WiFi(OnAir):
         words, airtime_ns = self._words(flight, broadcast), frame.airtime_ns
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
+    def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int]:
+        return wifi_contention(contenders, self._timing, unicast=not broadcast).threshold, 0
+
 
 class LrWpan(OnAir):
     """IEEE 802.15.4 at 2.4 GHz without beacons."""
@@ -329,6 +377,10 @@ class LrWpan(OnAir):
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
+
+    def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int]:
+        point = sensing(contenders, lrwpan_airtime_ns(size, self._timing), not broadcast, self._timing)
+        return point.threshold, point.access_threshold
 
 
 class LoRa(OnAir):

@@ -10,7 +10,9 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.timeline import FOREVER_NS
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told, exact
 
 PARTITION: Final = "partition"
 FILTERED: Final = "filtered"
@@ -42,3 +44,23 @@ class Policy(Stage):
             return PARTITION
         late = self._ttl_ns is not None and flight.due_ns - flight.sent_ns > self._ttl_ns
         return EXPIRED if late else ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        row = seen.row
+        event, text = _cut(seen, row.sent_ns)
+        told.say("at sending {}", text, cut_at_sending=event, allow=self._allow, ttl_ns=self._ttl_ns)
+        told.text += "" if self._allow else ", nothing may pass (allow is off)"
+        if row.arrival_tick >= 0:
+            event, text = _cut(seen, row.due_ns)
+            told.say(", at arrival {}", text, cut_at_arrival=event)
+            if self._ttl_ns is not None:
+                told.text += f", {exact(row.due_ns - row.sent_ns)} old of at most {exact(self._ttl_ns)}"
+
+
+def _cut(seen: Seen, at_ns: int) -> tuple[str, str]:
+    """Return the event that cuts the link at a time, and a text of it."""
+    cut = seen.timeline.cut_at(seen.row.source, seen.row.destination, at_ns)
+    if cut is None:
+        return "", "no partition"
+    until = f" to {exact(cut.end_ns)}" if cut.end_ns < FOREVER_NS else " on"
+    return cut.event, f"cut by {cut.event}, from {exact(cut.start_ns)}{until}"

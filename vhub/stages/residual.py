@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.common.keyed_random import Slot, chance_threshold, draw_key
+from foosim.common.keyed_random import UNIT, Slot, chance_threshold, draw_key
 from foosim.deployment.network.impairments import Burst, GilbertElliott, Markov4
 from foosim.vhub.network.good_bad_periods import Episodes
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import LinkState
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.stages.told import Seen, Told, beside
 
 _LOSS: Final = int(Slot.LOSS)
 RANDOM_LOSS: Final = "random_loss"
@@ -45,14 +46,6 @@ class Residual(Stage):
         """Whether the packet meets the link in its bad state."""
         return False
 
-    def is_out(self, sent_ns: int) -> bool:
-        """Whether a time is one of the link's outages, in which all is lost."""
-        return self._outages is not None and self._outages.is_bad(sent_ns)
-
-    def threshold(self, *, bad: bool) -> int:
-        """Return the number below which a packet's draw loses it, in the good or the bad state."""
-        return self._any[bad]
-
     def at_sending(self, flight: Flight) -> str:
         bad = flight.is_bad = self.is_bad(flight)
         if self._outages is not None and self._outages.is_bad(flight.sent_ns):
@@ -62,6 +55,14 @@ class Residual(Stage):
         if word >= self._any[bad]:
             return ""
         return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        if self._outages is not None and self._outages.is_bad(seen.row.sent_ns):
+            told.say("an outage, in which all is lost", outage=True)
+            return
+        threshold, draw = self._any[seen.row.is_bad], seen.flight.words[_LOSS]
+        told.say("{state} state", state="bad" if seen.row.is_bad else "good")
+        told.say(", loss {}", beside(draw, threshold), loss_rate=threshold / UNIT, loss_draw=draw / UNIT)
 
 
 class InTime(Residual):

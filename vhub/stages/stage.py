@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from mypy_extensions import mypyc_attr
 
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.told import Seen, Told
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -23,6 +24,9 @@ class Stage:
         `hindered` is why its receiver does not take it; empty when it does.
         """
         return ""
+
+    def explain(self, seen: Seen, told: Told) -> None:
+        """Tell what the stage looked at in a captured packet; what its row does not have is computed again."""
 
 
 def at_sending(stages: Iterable[Stage]) -> list[Stage]:

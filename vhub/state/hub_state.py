@@ -23,10 +23,9 @@ from foosim.vhub.network.ages import Ages
 from foosim.vhub.network.draw_address import counts_within_channels, robot_number
 from foosim.vhub.network.memory import Age, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
-from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
-from foosim.vhub.state.in_flight_limit import TRANSIT_FULL, InFlightLimit
+from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL
+from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
 from foosim.vhub.state.members import Here, Member
-from foosim.vhub.state.receive_limit import ReceiveBudget
 from foosim.vhub.state.send_order import SendOrder
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import Frame
@@ -307,7 +306,7 @@ class HubState:
             is_under_way = link.send(flight)
             if is_under_way and not self._transit.takes(flight):
                 is_under_way = False
-                link.turn_away(flight, TRANSIT_FULL)
+                link.drop(flight, TRANSIT_FULL)
             if not is_under_way:
                 self.packets.dropped += is_offered
                 fates.append(flight)
@@ -341,7 +340,7 @@ class HubState:
                 link = self.fabric.link(flight.source, flight.destination, flight.channel)
                 on_links.setdefault(link, []).append(flight)
             else:
-                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                self._put(flight, flight.arrival_tick)
         for link, those in on_links.items():
             due_ns = [flight.due_ns for flight in those]
             link.retime(those, now_ns)
@@ -354,8 +353,10 @@ class HubState:
         """Schedule a packet's arrival at its due time, at that tick at the earliest."""
         member = self.members.get(flight.destination)
         arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
-        if member is not None:
-            arrival = member.release_tick(arrival)
+        self._put(flight, arrival if member is None else member.release_tick(arrival))
+
+    def _put(self, flight: Flight, arrival: int) -> None:
+        """Add a packet to those that arrive at a tick."""
         flight.arrival_tick = arrival
         flights = self._flights.get(arrival)
         if flights is None:
@@ -406,13 +407,11 @@ class HubState:
         for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
-                flight.arrival_tick = member.release_tick(tick)
-                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                self._put(flight, member.release_tick(tick))
                 continue
             is_call = flight.destination in turns and self._here.calls(flight)
             if flight.destination in turns and not is_call and turns[flight.destination].called_tick != tick:
-                flight.arrival_tick = tick + 1
-                self._flights.setdefault(tick + 1, []).append(flight)
+                self._put(flight, tick + 1)
                 continue
             down = member is None or not member.active or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
@@ -494,7 +493,7 @@ class HubState:
                 raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
             state.fabric.restore_flight(flight)
             state._transit.restored(flight)
-            state._flights.setdefault(flight.arrival_tick, []).append(flight)
+            state._put(flight, flight.arrival_tick)
         return state
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.world.components.entities import Motors
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.quantities import Volts
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.rod_drives import RodLimits, RodSetPoint, RodVoltageSettings

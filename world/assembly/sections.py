@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import Final
 
 from foosim.common.finding import Finding, Location
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import nearest_quoted
 from foosim.world.fixed_scenery import kits_of
 from foosim.world.forms import registry
 from foosim.world.matter.physics import Physics, physics_from
@@ -70,5 +69,5 @@ def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
         for surface in dict.fromkeys(surfaces):
             if surface != FELT_BY_NOBODY and surface not in known:
                 valid = f"there are: {', '.join(sorted(known))}; and '' of what no rigid body feels"
-                nearest = quoted(nearest_name(surface, known))
+                nearest = nearest_quoted(surface, known)
                 yield Finding(location, f"{what} has an unknown surface ({valid})", surface, nearest)

@@ -35,7 +35,7 @@ from foosim.world.components.view import (
     component_error,
     has_together,
 )
-from foosim.world.components.watching import Watched, places_of, watched_actuator
+from foosim.world.components.watching import watched, watched_actuator
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult, failure_of
@@ -47,6 +47,7 @@ from foosim.world.spec import WorldSpec
 
 NO_FORCE: Final = (0.0, 0.0)
 """What is asked of the motor of a joint that nothing drives."""
+NO_STATUS: Final = "no status of"
 NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose marks cannot be told."""
@@ -92,20 +93,6 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     return rules
 
 
-def _watched_rules(spec: WorldSpec, layout: Layout, rules: Mapping[str, Rule]) -> dict[str, Any]:
-    """Return the rules of a world, each with what compares frames around it."""
-    watched: dict[str, Any] = {}
-    for label, settings in world_rules(spec).items():
-        writes = find_rule(settings).writes
-        places = [
-            place
-            for entity in layout.entities
-            for place in places_of(entity, *(entity.offsets if entity.model in writes else ()), component=label)
-        ]
-        watched[label] = Watched(rules[label], layout, places)
-    return watched
-
-
 def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies in the deployment's world. Raises ComponentError."""
     bodies: dict[str, Body] = {}
@@ -137,12 +124,12 @@ def initial_numbers(
         if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
             for label, own in _entity_rules_of(spec, layout, robot):
                 if hasattr(own, "place"):
-                    watched = _watched_entity_rule(spec, layout, robot, label, own) if is_watched else own
-                    called(f"rule {label}", robot.name, 0, watched.place, view)
-    rules = rules_of(spec, layout)
-    for label, rule in (_watched_rules(spec, layout, rules) if is_watched else rules).items():
+                    placed = watched(own) if is_watched else own
+                    called(f"rule {label}", robot.name, 0, placed.place, view)
+    for label, rule in rules_of(spec, layout).items():
         if hasattr(rule, "place"):
-            called(f"rule {label}", WORLD, 0, rule.place, view)
+            placed = watched(rule) if is_watched else rule
+            called(f"rule {label}", WORLD, 0, placed.place, view)
     return numbers
 
 
@@ -184,7 +171,7 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # noqa: BLE001  # a run goes on without it
-                status |= {"failed": f"status of {what}: {failure_of(error)}"}
+                status |= {"failed": f"{NO_STATUS} {what}: {failure_of(error)}"}
     return status
 
 
@@ -199,7 +186,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     `world_status` returned."""
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [registry.find("kit", name).made for name in sorted(spec.kits)]
-    found = [f"no {failed}" for failed in [status.get("failed")] if failed]
+    found = [status["failed"]] if "failed" in status else []
     for one in dict.fromkeys(made):
         if hasattr(one, "text"):
             try:
@@ -300,27 +287,15 @@ class World:
         }
 
     def _watch(self) -> None:
-        """Put what compares frames around all forms."""
-        spec, layout = self._spec, self._layout
-        entities = layout.entities
-        self.models = {
-            index: Watched(model, layout, places_of(entities[index], *entities[index].offsets))
-            for index, model in self.models.items()
-        }
-        self._rules = _watched_rules(spec, layout, self._rules)
-        self.actuators = {
-            index: tuple(watched_actuator(one, layout) for one in its) for index, its in self.actuators.items()
-        }
+        """Give all forms numbers of the frame that they can only read."""
+        self.models = {index: watched(model) for index, model in self.models.items()}
+        self._rules = {label: watched(rule) for label, rule in self._rules.items()}
+        self.actuators = {index: tuple(map(watched_actuator, its)) for index, its in self.actuators.items()}
         self._only = {index: self.actuators[index][0] for index in self._only}
-        for name, motion in self._motions.items():
-            moved = [entity for entity in entities if self._motion_of.get(entity.index) == name]
-            writes = find_motion(moved[0].kind).writes
-            places = [place for entity in moved for place in places_of(entity, *writes, component="motion")]
-            self._motions[name] = Watched(motion, layout, places)
-        for index, its in self._entity_rules.items():
-            self._entity_rules[index] = tuple(
-                (label, _watched_entity_rule(spec, layout, entities[index], label, rule)) for label, rule in its
-            )
+        self._motions = {name: watched(motion) for name, motion in self._motions.items()}
+        self._entity_rules = {
+            index: tuple((label, watched(rule)) for label, rule in its) for index, its in self._entity_rules.items()
+        }
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
         """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
@@ -460,7 +435,7 @@ class World:
                 continue
             count = entity.counts.get("joint_positions") if entity.is_rigid else None
             what = "a tuple of (target, greatest force)" + ("" if count is None else f" for {count} motors")
-            if not _are_motors(motors, count):
+            if not are_motors(motors, count):
                 error = WrongResult(actuators[0].actuator.command, what, motors)
                 raise actuators[0].failed(tick, error) from error
 
@@ -558,20 +533,15 @@ def _without_power(one: FittedActuator, view: View) -> Motors:
     return asked
 
 
-def _watched_entity_rule(spec: WorldSpec, layout: Layout, robot: Entity, label: str, rule: EntityRule) -> Any:
-    """Return a rule of a robot with what compares frames around it."""
-    written = find_entity_rule(spec.robots[robot.name].rules[label]).written
-    return Watched(rule, layout, places_of(robot, *written, component=label))
-
-
-def _are_motors(asked: object, count: int | None) -> bool:
+def are_motors(asked: object, count: int | None) -> bool:
     """Whether that is what an actuator can ask of so many motors of a rigid body, or of any number of a motion's."""
     lengths = (2,) if count is None else (2, 3)
     return (
         isinstance(asked, tuple)
         and count in (None, len(asked))
         and all(isinstance(one, tuple) and len(one) in lengths for one in asked)
-        and all(isinstance(number, int | float) for one in asked for number in one)
+        and all(isinstance(number, int | float) and isfinite(number) for one in asked for number in one)
+        and all(one[1] >= 0.0 for one in asked)
     )
 
 

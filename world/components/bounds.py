@@ -28,21 +28,26 @@ class Clamped(NamedTuple):
 NONE_CLAMPED: Final[Sequence[Clamped]] = ()
 
 
-def limits_of(made: Any) -> Mapping[str, Bound]:
-    """Return the least and the greatest value of the fields of a component. Raises WrongResult."""
+def limits_of(made: Any, fields: Sequence[Field]) -> Mapping[str, Bound]:
+    """Return the least and the greatest value of fields of a component's values. Raises WrongResult."""
     if not hasattr(made, "limits"):
         return NO_LIMITS
     limits = made.limits()
-    if not (isinstance(limits, Mapping) and all(isinstance(its, tuple) and len(its) == 2 for its in limits.values())):
-        raise WrongResult(made.limits, "a mapping of fields to least and greatest value", limits)
+    names = [field.name for field in fields]
+    if not (isinstance(limits, Mapping) and {*limits} <= {*names} and all(map(_is_bound, limits.values()))):
+        raise WrongResult(made.limits, f"a mapping of fields ({', '.join(names)}) to least and greatest value", limits)
     return limits
+
+
+def _is_bound(value: object) -> bool:
+    return isinstance(value, tuple) and len(value) == 2 and all(isinstance(one, int | float) for one in value)
 
 
 def bounds_of(made: Any, fields: Sequence[Field], size: int) -> list[Bound]:
     """Return the least and the greatest of each of `size` numbers: `bounds()` of a component, else its `limits()`."""
     if hasattr(made, "bounds"):
         return list(made.bounds())
-    limits = limits_of(made)
+    limits = limits_of(made, fields)
     return [limits.get(field_at(fields, size, place).name, (-inf, inf)) for place in range(size)]
 
 
@@ -51,7 +56,7 @@ class CommandBounds:
 
     def __init__(self, made: Any, codec: PayloadCodec) -> None:
         """Raises WrongResult for limits that are none."""
-        self._made, self._codec, self._limits = made, codec, limits_of(made)
+        self._made, self._codec, self._limits = made, codec, limits_of(made, codec.fields)
         self._within: Callable[[Any], Any] | None = getattr(made, "within", None)
         self._size = -1
         self._ends: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())

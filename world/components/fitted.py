@@ -295,7 +295,7 @@ def _modifiers(
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = NO_LIMITS
     if component.form == "sensor":
-        limits = called(f"sensor {channel}", robot.name, 0, limits_of, made)
+        limits = called(f"sensor {channel}", robot.name, 0, limits_of, made, numbers.fields)
     bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foosim.common.names import nearest_name
-from foosim.common.plain_data import quoted
+from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats
@@ -29,7 +27,7 @@ def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -
     for place, name in enumerate(named):
         if name not in names:
             what = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-            raise Misfit((setting, place), what, name, quoted(nearest_name(name, names)))
+            raise Misfit((setting, place), what, name, nearest_quoted(name, names))
         if name in named[:place]:
             raise Misfit((setting, place), "named twice", name)
     return tuple([names.index(name) for name in named])
@@ -133,5 +131,5 @@ def link_index(body: Body, name: str | None) -> int:
     name = name.removeprefix(f"{body.name}/")
     if name not in names:
         what = f"{body.name} has no such link; there are {', '.join(names)}"
-        raise Misfit(("at", "link"), what, name, quoted(nearest_name(name, names)))
+        raise Misfit(("at", "link"), what, name, nearest_quoted(name, names))
     return names.index(name)

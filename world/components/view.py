@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from foosim.common.errors import Failed
+from foosim.common.errors import BadValue, Failed
+from foosim.common.finding import Location
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
@@ -34,6 +35,14 @@ class ComponentError(Failed):
     def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
         super().__init__(f"{called_of(component, entity)} failed at tick {tick}: {failure_of(cause)}")
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
+
+
+class Misfit(BadValue):
+    """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
+
+    def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
+        super().__init__(what, value, nearest)
+        self.path = path
 
 
 def called_of(component: str, entity: str) -> str:

@@ -11,8 +11,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.forms.settings import EntityRuleSettings, Tag
 from foosim.world.layout import Entity
 from foosim.world.models.rover import Charge, RoverRobot

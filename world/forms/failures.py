@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from inspect import unwrap
+from functools import cache
+from inspect import findsource, getsourcefile, unwrap
 from traceback import walk_tb
 from types import FrameType
 from typing import Any, Final
@@ -16,20 +17,13 @@ TEXT_LENGTH_MAX: Final = 500
 VALUE_LENGTH_MAX: Final = 80
 
 
-class Misdeed(Exception):
-    """What a method of a form has done is wrong. `method` is where that is to be changed."""
-
-    def __init__(self, method: Callable[..., Any], text: str) -> None:
-        super().__init__(text)
-        self.method = method
-
-
-class WrongResult(Misdeed):
-    """A method of a form has returned something else than it must."""
+class WrongResult(Exception):
+    """A method of a form has returned something else than it must. `method` is where that is to be changed."""
 
     def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
         name = getattr(method, "__name__", type(method).__name__)
-        super().__init__(method, f"{name} gives {_value(given)}, where {needed} is needed")
+        super().__init__(f"{name} gives {_value(given)}, where {needed} is needed")
+        self.method = method
 
 
 def _value(given: object) -> str:
@@ -50,8 +44,8 @@ def failure_of(error: BaseException, module: str = "") -> str:
         said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
         text = " ".join(said.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
-    if isinstance(error, Misdeed):
-        return text + place_of_method(error.method)
+    if isinstance(error, WrongResult):
+        return text + place_of_code(error.method)
     return (f"{kind}: {text}" if text else kind) + _place_of(error, module)
 
 
@@ -64,15 +58,18 @@ def _place_of(error: BaseException, module: str) -> str:
     if own:
         frame, line = own[-1]
         return f" ({_shown(frame.f_code.co_filename)}:{line})"
-    top = module.partition(".")[0]
-    is_missing = isinstance(error, ModuleNotFoundError) and error.name == top
-    return " (is the folder that it is in on PYTHONPATH?)" if is_missing else ""
+    return ""
 
 
-def place_of_method(method: Callable[..., Any]) -> str:
-    """Return ` (file:line)` of the first line of a method; empty of one that is not of Python."""
-    code = getattr(unwrap(getattr(method, "__func__", method)), "__code__", None)
-    return "" if code is None else f" ({_shown(code.co_filename)}:{code.co_firstlineno})"
+def place_of_code(made: Any) -> str:
+    """Return ` (file:line)` of the first line of a method or class; empty of one that is not of Python."""
+    with suppress(OSError, TypeError):  # without source
+        made = unwrap(getattr(made, "__func__", made))
+        code = getattr(made, "__code__", None)
+        if code is not None:
+            return f" ({_shown(code.co_filename)}:{code.co_firstlineno})"
+        return f" ({_shown(getsourcefile(made) or '')}:{findsource(made)[1] + 1})"
+    return ""
 
 
 def _package(frame: FrameType) -> str:
@@ -80,20 +77,27 @@ def _package(frame: FrameType) -> str:
 
 
 def _is_own(frame: FrameType, module: str) -> bool:
-    """Whether a frame is in the package of a module, or in no library and not in foosim."""
+    """Whether a frame is in a module's package, in no library and not in foosim, or in that very module of foosim's."""
     package = _package(frame)
     if package == OURS:
-        return False
+        return frame.f_globals.get("__name__") == module
     file = frame.f_code.co_filename
     return package == module.partition(".")[0] or not (file.startswith("<") or in_library(file))
 
 
 def in_library(file: str) -> bool:
     """Whether a file is one of Python's own modules or of an installed package."""
-    import sysconfig  # takes longer than all else here, and few processes ask
+    return file.startswith(_libraries())
+
+
+@cache
+def _libraries() -> tuple[str, ...]:
+    import site  # takes longer than all else here, and few processes ask
+    import sysconfig
 
     paths = sysconfig.get_paths()
-    return file.startswith(tuple(f"{paths[key]}/" for key in ("stdlib", "platstdlib", "purelib", "platlib")))
+    own = {paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")}
+    return tuple(f"{folder}/" for folder in {*own, *site.getsitepackages(), site.getusersitepackages()})
 
 
 def _shown(file: str) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from foosim.common.errors import BadValue, show
 from foosim.common.names import NAME_RULE, is_name
+from foosim.world.forms.failures import failure_of
 
 if TYPE_CHECKING:
     from msgspec import Struct
@@ -139,7 +140,7 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     except (BadValue, KeyboardInterrupt):
         raise
     except BaseException as error:  # SystemExit, too: a function may do anything
-        raise BadValue(f"its slots are not known: {type(error).__name__}: {error}", name) from error
+        raise BadValue(f"its slots are not known: {failure_of(error)}", name) from error
     problem = slots_problem(found, is_sensor=is_sensor)
     if problem:
         raise BadValue(f"its slots are wrong: {problem}", name)
@@ -167,6 +168,11 @@ class Form:
     def module(self) -> str:
         """The module that it is in."""
         return self.made.__module__
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is foosim's own, and not of another package."""
+        return self.module.startswith("foosim.")
 
     @property
     def summary(self) -> str:

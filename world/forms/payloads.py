@@ -240,23 +240,23 @@ def _info(kind: type[Struct]) -> inspect.StructType:
 def _field(field: inspect.Field) -> Field:
     unit = ""
     found = field.type
-    is_several = isinstance(_plain(found), inspect.VarTupleType)
+    is_several = isinstance(plain_type(found), inspect.VarTupleType)
     if is_several:
-        found = _plain(found).item_type  # type: ignore[attr-defined]
+        found = plain_type(found).item_type  # type: ignore[attr-defined]
     if isinstance(found, inspect.Metadata):
         unit = str((found.extra or {}).get("unit", ""))
-    is_number = isinstance(_plain(found), inspect.FloatType)
+    is_number = isinstance(plain_type(found), inspect.FloatType)
     return Field(field.name, unit, is_number and not is_several, is_several and is_number)
 
 
 def _bounds(kind: inspect.Type) -> tuple[int, int]:
     """Return the least and the greatest length of a tuple of numbers."""
-    several = _plain(kind)
+    several = plain_type(kind)
     assert isinstance(several, inspect.VarTupleType)
     return several.min_length or 0, MANY_MAX if several.max_length is None else several.max_length
 
 
-def _plain(kind: inspect.Type) -> inspect.Type:
+def plain_type(kind: inspect.Type) -> inspect.Type:
     """Return a type without its annotations."""
     while isinstance(kind, inspect.Metadata):
         kind = kind.type

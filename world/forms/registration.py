@@ -1,11 +1,12 @@
-"""What a form says of itself when it is registered: refused where it contradicts itself, with its name and module.
+"""What a form declares when it is registered: refused where it contradicts itself, with its name and module.
 
 It is found here, when the module is imported, and not as a strange failure of a deployment or a run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from typing import Any, Final
 
 from msgspec import Struct
@@ -13,30 +14,29 @@ from msgspec import Struct
 from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
-from foosim.world.forms.forms import (
-    OF_ROBOTS,
-    OF_SOLVED,
-    Component,
-    EntityRule,
-    Form,
-    Kit,
-    Model,
-    Motion,
-    WorldRule,
-    slots_problem,
-    with_article,
-    word_of,
-)
+from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, Model, slots_problem, with_article, word_of
+from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
-from foosim.world.forms.shown import shown_problems
+from foosim.world.forms.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """What the values of a form are called."""
+NAMES: Final = ("needs", "writes", "shared", "tags", "addable")
+TEXTS: Final = ("kit", "motion", "several", "speaks", "joints")
+MAPPINGS: Final = {
+    "actuators": "names to settings",
+    "rules": "names to settings",
+    "each": "models to slots",
+    "entities": "names to models",
+    "per_field": "settings to least values",
+    "variants": "values of dynamics to what differs",
+}
+"""What the fields of a description are."""
 
 
-def check_form(found: Form) -> None:
-    """Refuse what a form says of itself where it cannot be so. Raises Refused."""
-    word, name = word_of(found.form), _anything(found.name)
+def check_form(found: Any) -> None:
+    """Refuse a form whose description cannot be so. Raises Refused."""
+    word, name = word_of(found.form), found.name
     if not (isinstance(name, str) and is_name(name)):
         raise Refused(f"{found.module} registers {with_article(word)} as {name!r}: {NAME_RULE}")
     problem = next(_problems(found), "")
@@ -44,141 +44,110 @@ def check_form(found: Form) -> None:
         raise Refused(f"{word} {found.name} of {found.module}: {problem}")
 
 
-def _problems(found: Form) -> Iterator[str]:
-    yield from _settings(found)
-    kit = _anything(found.kit)
-    if not isinstance(kit, str):
-        yield f"kit is the name of a kit, not {show(kit)}"
-    match found:
-        case Component():
-            yield from _component(found)
-        case Model():
-            yield from _model(found)
-        case Motion() | EntityRule():
-            yield from _slots(found.slots)
-            yield from _names("needs", found.needs)
-            yield from _names("writes", found.writes)
-            if isinstance(found, EntityRule):
-                yield from _names("shared", found.shared)
-        case WorldRule():
-            yield from _world_rule(found)
-        case Kit():
-            yield from _kit(found)
-
-
-def _anything(value: Any) -> Any:
-    """Return a value of which nobody has made sure that it is what it should be."""
-    return value
-
-
-def _settings(found: Any) -> Iterator[str]:
+def _problems(found: Any) -> Iterator[str]:
+    """Yield what is wrong with the fields of a description. Each is read only where those before it are right."""
     base = BASES.get(found.form, SpecBase)
-    settings = found.settings
-    if not (isinstance(settings, type) and issubclass(settings, base)):
-        yield f"its settings are a class derived from {base.__name__}, not {_shown(settings)}"
+    if not (isinstance(found.settings, type) and issubclass(found.settings, base)):
+        yield f"its settings are a class derived from {base.__name__}, not {_shown(found.settings)}"
+    for field in fields(found):
+        key, value = field.name, getattr(found, field.name)
+        if key in NAMES and not (isinstance(value, tuple) and all(isinstance(name, str) for name in value)):
+            hint = f": a tuple of one is ({show(value)},)" if isinstance(value, str) else ""
+            yield f"{key} is a tuple of names, not {_shown(value)}{hint}"
+        if key in TEXTS and not (isinstance(value, str) or (key == "several" and callable(value))):
+            yield f"{key} is a name, not {show(value)}"
+        if key in MAPPINGS and not isinstance(value, Mapping):
+            yield f"{key} is a mapping of {MAPPINGS[key]}, not {_shown(value)}"
+        if key in OF_FIELD:
+            yield from OF_FIELD[key](found, key)
 
 
-def _component(found: Any) -> Iterator[str]:
-    word = VALUES.get(found.form)
-    value = found.value
+def _value(found: Any, key: str) -> Iterator[str]:
+    word, value = VALUES.get(found.form), found.value
     if word is not None and not (isinstance(value, type) and issubclass(value, Struct)):
         yield f"its {word} is a class derived from msgspec.Struct, not {_shown(value)}"
     elif word is not None and not value.__struct_fields__:
         yield f"its {word} {value.__name__} has no fields"
-    if not callable(found.slots):
-        yield from _slots(found.slots, is_sensor=found.form == "sensor")
-    yield from _names("needs", found.needs)
-    for key in ("several", "speaks", "joints"):
-        if not isinstance(getattr(found, key), str) and not (key == "several" and callable(found.several)):
-            yield f"{key} is a name, not {show(getattr(found, key))}"
-    yield from shown_problems(found)
-    for key in ("several", "joints"):
-        name = getattr(found, key)
-        if isinstance(name, str) and name and name not in found.settings.model_fields:
-            yield f"{key} names no setting, {show(name)}"
-    if not isinstance(found.per_field, Mapping):
-        yield f"per_field is a mapping of settings to least values, not {show(found.per_field)}"
+
+
+def _slots(found: Any, key: str) -> Iterator[str]:
+    slots = getattr(found, key)
+    if callable(slots) and found.form in ("model", "sensor", "actuator", "modifier"):
         return
+    problem = slots_problem(slots, is_sensor=found.form == "sensor")
+    if problem:
+        yield f"{key}: {problem}"
+    for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, Model) else ():
+        if slots.get(slot, 1) != 1:
+            yield f"{slot}, which foosim writes, is one number, not {show(slots[slot])}"
+
+
+def _setting(found: Any, key: str) -> Iterator[str]:
+    name = getattr(found, key)
+    if isinstance(name, str) and name and name not in found.settings.model_fields:
+        yield f"{key} names no setting, {show(name)}"
+
+
+def _shown_as(found: Any, key: str) -> Iterator[str]:
+    """Yield what is wrong with the message that a sensor names, if it names one."""
+    if found.shown_as == "":
+        return
+    if found.shown_as not in tuple(MESSAGES):  # whatever it is
+        yield f"shown_as is one of {', '.join(MESSAGES)}, not {show(found.shown_as)}"
+        return
+    needed = MESSAGES[found.shown_as]
+    having = PayloadCodec(found.value, found.name).fields
+    there = {field.name for field in having if (field.is_several if needed.is_several else field.is_number)}
+    if not any(there.issuperset(choice) for choice in needed.choices):
+        what = "tuples of numbers" if needed.is_several else "numbers"
+        choices = " or ".join(", ".join(choice) for choice in needed.choices)
+        yield f"its reading {found.value.__name__} lacks the {what} that {found.shown_as} shows: {choices}"
+    for name in needed.settings:
+        if name not in found.settings.model_fields and not hasattr(found.settings, name):
+            yield f"its settings {found.settings.__name__} lack {name}, which {found.shown_as} shows"
+
+
+def _per_field(found: Any, key: str) -> Iterator[str]:
     keys = [field.alias or name for name, field in found.settings.model_fields.items()]
-    for key, least in found.per_field.items():
-        if key not in keys:
-            yield f"per_field names no setting, {show(key)} (there are: {', '.join(keys)})"
+    for name, least in found.per_field.items():
+        if name not in keys:
+            yield f"per_field names no setting, {show(name)} (there are: {', '.join(keys)})"
         elif least is not None and (isinstance(least, bool) or not isinstance(least, int | float)):
-            yield f"the least value of the setting {key} is a number or None, not {show(least)}"
+            yield f"the least value of the setting {name} is a number or None, not {show(least)}"
 
 
-def _model(found: Any) -> Iterator[str]:
-    if not callable(found.slots):
-        yield from _slots(found.slots)
-    yield from _slots(found.on_demand, "on_demand")
-    for slot in () if callable(found.slots) else (*OF_ROBOTS, *OF_SOLVED):
-        if found.slots.get(slot, 1) != 1:
-            yield f"{slot}, which foosim writes, is one number, not {show(found.slots[slot])}"
-    if not isinstance(found.motion, str):
-        yield f"motion is the name of a motion, not {show(found.motion)}"
-    yield from _kinds("actuators", found.actuators)
-    yield from _kinds("rules", found.rules)
-    yield from _names("tags", found.tags)
-    yield from _variants(found)
-
-
-def _variants(found: Any) -> Iterator[str]:
+def _variants(found: Any, key: str) -> Iterator[str]:
     variants = found.variants
-    if not isinstance(variants, Mapping) or not all(isinstance(one, Model) for one in variants.values()):
-        yield f"variants are a mapping of values of dynamics to what differs, not {_shown(variants)}"
-        return
+    if not all(isinstance(one, Model) for one in variants.values()):
+        yield f"{key} is a mapping of {MAPPINGS[key]}, not {_shown(variants)}"
     if variants and "dynamics" not in found.settings.model_fields:
         yield "it has variants, and its settings have no dynamics, which chooses one"
     for value, variant in variants.items():
         if variant.module != found.module:
             yield f"its variant {show(value)} is of another module, {variant.module}"
-        yield from (f"its variant {show(value)}: {problem}" for problem in _model(variant))
+        yield from (f"its variant {show(value)}: {problem}" for problem in _problems(variant))
 
 
-def _world_rule(found: Any) -> Iterator[str]:
-    yield from _slots(found.slots)
-    yield from _names("writes", found.writes)
-    if not isinstance(found.each, Mapping):
-        yield f"each is a mapping of models to slots, not {show(found.each)}"
-        return
+def _each(found: Any, key: str) -> Iterator[str]:
     for model, slots in found.each.items():
         if not isinstance(model, str):
             yield f"each is a mapping of models to slots, and a model is a name, not {show(model)}"
-        yield from _slots(slots, f"each {model}")
+        problem = slots_problem(slots)
+        if problem:
+            yield f"each {model}: {problem}"
 
 
-def _kit(found: Any) -> Iterator[str]:
-    if not isinstance(found.entities, Mapping):
-        yield f"entities are a mapping of names to models, not {show(found.entities)}"
-        return
+def _entities(found: Any, key: str) -> Iterator[str]:
     for name, model in found.entities.items():
         if not (isinstance(name, str) and is_robot_name(name)):
             yield f"the entity {show(name)}: {NAME_RULE}"
         if not isinstance(model, str):
             yield f"the model of the entity {name} is a name, not {show(model)}"
-    yield from _names("addable", found.addable)
-    yield from _kinds("rules", found.rules)
 
 
-def _slots(slots: object, what: str = "slots", *, is_sensor: bool = False) -> Iterator[str]:
-    problem = slots_problem(slots, is_sensor=is_sensor)
-    if problem:
-        yield f"{what}: {problem}"
-
-
-def _names(key: str, names: object) -> Iterator[str]:
-    if not (isinstance(names, tuple) and all(isinstance(name, str) for name in names)):
-        shown = show(names) if isinstance(names, str) else _shown(names)
-        hint = f": a tuple of one is ({show(names)},)" if isinstance(names, str) else ""
-        yield f"{key} is a tuple of names, not {shown}{hint}"
-
-
-def _kinds(key: str, settings: object) -> Iterator[str]:
+def _kinds(found: Any, key: str) -> Iterator[str]:
     """Yield what is wrong with settings by name, each with its kind."""
-    if not isinstance(settings, Mapping):
-        yield f"{key} is a mapping of names to settings, not {_shown(settings)}"
-        return
-    for name, its in settings.items():
+    for name, its in getattr(found, key).items():
         if not (isinstance(name, str) and is_name(name)):
             yield f"{key}, {show(name)}: {NAME_RULE}"
         elif not (isinstance(its, Mapping) and isinstance(its.get("kind"), str)):
@@ -187,3 +156,20 @@ def _kinds(key: str, settings: object) -> Iterator[str]:
 
 def _shown(value: object) -> str:
     return value.__name__ if isinstance(value, type) else show(value)
+
+
+OF_FIELD: Final[Mapping[str, Callable[[Any, str], Iterator[str]]]] = {
+    "value": _value,
+    "slots": _slots,
+    "on_demand": _slots,
+    "several": _setting,
+    "joints": _setting,
+    "shown_as": _shown_as,
+    "per_field": _per_field,
+    "variants": _variants,
+    "each": _each,
+    "entities": _entities,
+    "actuators": _kinds,
+    "rules": _kinds,
+}
+"""Further checks of a field that has the right type."""

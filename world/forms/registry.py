@@ -17,9 +17,9 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from foosim.common.errors import Refused, UnknownName
-from foosim.common.names import CLASS_PATTERN
-from foosim.world.forms.failures import failure_of
+from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name, quoted
+from foosim.world.forms.failures import failure_of, in_library
 from foosim.world.forms.forms import (
     NO_SETTINGS,
     NO_SLOTS,
@@ -240,7 +240,7 @@ def _registering(describe: Callable[[Callable[..., Any]], Form]) -> Callable[[Ma
 def find(form: str, kind: str) -> Form:
     """Return what a deployment calls `kind`: a registered name, or `module:Class`.
 
-    Raises UnknownName, which says what is nearest, and Refused for a module that cannot be imported, or a class in it
+    Raises UnknownName, which says what is nearest, and BadValue for a module that cannot be imported, or a class in it
     that is not registered.
     """
     found = lookup(form, kind)
@@ -255,7 +255,7 @@ def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
 
 
 def lookup(form: str, kind: str) -> Form | None:
-    """Return what `find` does, or None where nothing has that name; raises Refused for a class as `find` does."""
+    """Return what `find` does, or None where nothing has that name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
     found = _known.get((form, kind)) or _own(form, kind)
@@ -357,10 +357,13 @@ def _own_modules(form: str) -> Mapping[str, str]:
     return found
 
 
-def _of_class(form: str, path: str) -> Form:
-    """Return the one that `module:Class` registered."""
+def class_at(path: str) -> Any:
+    """Return what `module:Class` is, of a form or a player.
+
+    Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
+    """
     if not re.fullmatch(CLASS_PATTERN, path):
-        raise Refused(f"not a class ({BY_CLASS})")
+        raise BadValue(f"not of the form {BY_CLASS}", path, quoted(class_path_of(path)))
     module_name, _, class_name = path.partition(":")
     known = dict(_known)
     try:
@@ -369,17 +372,43 @@ def _of_class(form: str, path: str) -> Form:
         raise
     except BaseException as error:  # SystemExit, too: a module may do anything
         _forget_new(known)
-        raise Refused(f"cannot be imported: {failure_of(error, module_name)}") from error
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            raise _not_found(path, missing) from error
+        raise BadValue(f"cannot be imported: {failure_of(error, module_name)}", path) from error
     if not hasattr(module, class_name):
-        there = [component.made.__qualname__ for component in _known.values() if component.module == module_name]
-        raise UnknownName(f"{module_name} registers no such class", class_name, there)
-    made = getattr(module, class_name)
-    for component in _known.values():
-        if component.form == form and component.made is made:
-            return component
-    there = [one.made.__qualname__ for one in _known.values() if one.module == module_name and one.form == form]
-    hint = f"; {module_name} registers {', '.join(sorted(there))}" if there else ""
-    raise Refused(f"not registered as {with_article(word_of(form))}{hint}")
+        own = (one for one, its in vars(module).items() if getattr(its, "__module__", "") == module_name)
+        there = [one for one in own if not one.startswith("_")]
+        refused = UnknownName(f"there is no {class_name} in {module_name}", class_name, there)
+        nearest = nearest_name(class_name, there)
+        raise BadValue(refused.problem, path, quoted(nearest and f"{module_name}:{nearest}"))
+    return getattr(module, class_name)
+
+
+def _not_found(path: str, missing: str) -> BadValue:
+    """Return the error for a path whose module, or a package of it, cannot be found."""
+    parent, dot, last = missing.rpartition(".")
+    if dot:
+        folders: Iterable[str] = getattr(sys.modules.get(parent), "__path__", ())
+        hint = "" if folders else f" ({parent} is a module, not a package)"
+    else:
+        folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
+        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
+    nearest = nearest_name(last, [module.name for module in iter_modules(folders)] if folders else ())
+    found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
+    return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
+
+
+def _of_class(form: str, path: str) -> Form:
+    """Return the one that `module:Class` registered."""
+    made, module = class_at(path), path.partition(":")[0]
+    of_form = [one for one in _known.values() if one.form == form]
+    for one in of_form:
+        if one.made is made:
+            return one
+    there = sorted(one.made.__qualname__ for one in of_form if one.module == module)
+    hint = f"; {module} registers {', '.join(there)}" if there else ""
+    raise BadValue(f"not registered as {with_article(word_of(form))}{hint}", path)
 
 
 def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:

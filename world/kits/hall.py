@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
-from foosim.common.plain_data import PlainData
 from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
 from foosim.world.forms.registry import kit
@@ -52,9 +51,9 @@ class HallKit:
         return found
 
     @staticmethod
-    def check(data: PlainData) -> Iterator[Finding]:
+    def check(section: Hall, spec: WorldSpec) -> Iterator[Finding]:
         """Yield parts of a rover that do not fit each other, or the hall."""
-        return hall_findings(data)
+        return hall_findings(section)
 
     def status(self, frame: Frame) -> dict[str, Any]:
         """Return how many rovers there are and drive, and which has the least charge (a share)."""

@@ -7,7 +7,6 @@ from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
-from foosim.common.plain_data import PlainData
 from foosim.world.forms.registry import kit
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
@@ -68,9 +67,9 @@ class TableKit:
             yield from clearance_findings(self._spec)
 
     @staticmethod
-    def check(data: PlainData) -> Iterator[Finding]:
+    def check(section: Table, spec: WorldSpec) -> Iterator[Finding]:
         """Yield lengths that make no table, and lines with two rods."""
-        return table_findings(data)
+        return table_findings(section, spec)
 
     def status(self, frame: Frame) -> dict[str, Any]:
         """Return where the ball is (m)."""

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field
 
 from foosim.common import units
 from foosim.common.errors import BadValue
-from foosim.common.names import nearest_name
+from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Length, SpecBase
 from foosim.common.units import Quantity, custom_error
 
@@ -59,9 +59,8 @@ def _from_text(value: object) -> object:
         return {"loss": "0 dB"}
     if value not in MATERIALS:
         choices = (*MATERIALS, NONE)
-        nearest = nearest_name(value, choices)
         problem = f"not one of {', '.join(choices)}, and no mapping with is or loss"
-        raise custom_error(BadValue(problem, value, None if nearest is None else repr(nearest)))
+        raise custom_error(BadValue(problem, value, nearest_quoted(value, choices)))
     return {"is": value}
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.energy.battery import batteries_of, cell_of, is_rover
 from foosim.world.forms.quantities import Share, Volts
 from foosim.world.forms.registry import sensor

@@ -7,9 +7,8 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
-from foosim.world.components.misfit import Misfit
 from foosim.world.components.mounted import Mounted
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.earth import Geodesy
 from foosim.world.forms.quantities import Degrees, Metres
 from foosim.world.forms.registry import sensor

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
-from foosim.world.components.misfit import Misfit
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.quantities import Amperes
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings

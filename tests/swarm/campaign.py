@@ -24,7 +24,12 @@ from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.swarm.faults import (
+from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.trace import Traced
+from foosim.runtime.roles.bus import CALM, Weather
+from foosim.supervisor.settings import RunSettings
+from foosim.world.frame import Frame
+from tests.swarm.faults import (
     CHANGES_THE_WORLD,
     FAULT_OF,
     HEALED_TICK,
@@ -41,14 +46,9 @@ from foosim.rehearsal.swarm.faults import (
     revive,
     when_answered,
 )
-from foosim.rehearsal.swarm.invariants import Laws
-from foosim.rehearsal.swarm.memory_bounds import too_large
-from foosim.rehearsal.swarm.packet_invariants import hold
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
-from foosim.runtime.roles.bus import CALM, Weather
-from foosim.supervisor.settings import RunSettings
-from foosim.world.frame import Frame
+from tests.swarm.invariants import Laws
+from tests.swarm.memory_bounds import too_large
+from tests.swarm.packet_invariants import hold
 
 FAULTS: Final[tuple[int, ...]] = (8, 20)
 NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)

@@ -15,8 +15,8 @@ from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch
 from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
-from foosim.launcher.journal_check import check_journals, supervisor_records
-from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.plan import make_plan
+from foosim.launcher.resume import check_journals, plan_again, supervisor_records
 from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
 from foosim.rehearsal.run import rehearse

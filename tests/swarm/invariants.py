@@ -18,8 +18,6 @@ from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
 from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.swarm.packet_invariants import PacketLaws, hold
-from foosim.rehearsal.swarm.world_bounds import strays
 from foosim.rehearsal.system import System
 from foosim.rehearsal.trace import Traced
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
@@ -30,6 +28,8 @@ from foosim.vhub.state.records import fold as fold_hub
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
+from tests.swarm.packet_invariants import PacketLaws, hold
+from tests.swarm.world_bounds import strays
 
 
 class Laws:

@@ -1,1 +1,0 @@
-"""Makes certificates, and brings them to hosts."""

@@ -1,1 +1,0 @@
-"""Random faults against invariants, by seed."""

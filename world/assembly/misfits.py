@@ -1,0 +1,299 @@
+"""What forms do not find in the world that they are to be in: models, fields, motions, kits, what their settings name.
+
+A problem is a text without a place: a deployment names the robot, rule or kit that has the form. A finding has one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
+from foosim.common.finding import Finding, Location
+from foosim.common.keyed_random import draw_key
+from foosim.common.names import nearest_name
+from foosim.world.components.view import Misfit, Mounting
+from foosim.world.forms import registry
+from foosim.world.forms.forms import (
+    ROBOTS,
+    Component,
+    EntityRule,
+    Form,
+    Kit,
+    Model,
+    Motion,
+    WorldRule,
+    with_article,
+    word_of,
+)
+from foosim.world.forms.settings import ComponentSettings, RobotSettings
+from foosim.world.layout import (
+    Declaring,
+    Layout,
+    build_layout,
+    declaring,
+    find_rule,
+    kits_named,
+    of_motion,
+    slot_that_speaks,
+    world_rules,
+)
+from foosim.world.spec import WorldSpec
+
+REACHED: Final = ("rod", "ball")
+"""The rigid models that may share a solve (`assembly.islands.table_reach_of`)."""
+PLACED_BY: Final = ("check_place", "place_at")
+"""The methods of a model of which a running world can have more."""
+SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
+"""The sections of a robot that have components, and their form."""
+
+# --- models and components -------------------------------------------------------------------------------------------
+
+
+def find_kit_model(name: str) -> Model | None:
+    """Return a model that a kit names, None where there is none."""
+    try:
+        found = registry.lookup("model", name)
+    except Refused:
+        return None
+    assert found is None or isinstance(found, Model), found
+    return found
+
+
+def models_of(*, robots: bool) -> list[Model]:
+    """Return the models of robots, or of objects, that are installed here, in name order."""
+    found = map(registry.find_model, registry.names("model"))
+    return [model for model in found if model.is_robot == robots]
+
+
+def needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str]:
+    """Yield that the world is without the kit that a form is of."""
+    if form.kit and form.kit not in kits:
+        yield f"{noun or word_of(form.form)} of {with_article(form.kit)} in a world without one"
+
+
+def model_problems(model: Model, kits: Collection[str], having: Mapping[str, int] | None = None) -> Iterator[str]:
+    """Yield why entities of a model would not be solved in a world with these kits.
+
+    `having` are the fields of its state, where they follow from settings; without them nothing is missing.
+    """
+    if model.is_rigid and not model.couples and model.name not in REACHED:
+        yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
+    if not model.motion:
+        return
+    try:
+        motion = registry.find("motion", model.motion)
+    except BadValue as error:
+        yield f"a model without its motion: {error}"
+        return
+    assert isinstance(motion, Motion), motion
+    has = model.declared if having is None else having
+    for verb, fields in (("needs", motion.needs), ("writes", motion.writes)):
+        missing = [] if has is None else [field for field in fields if field not in has]
+        if missing:
+            yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {_fields_of(model, missing, has)}"
+    for problem in needs_kit(motion, kits, motion.name):
+        yield f"a model whose motion is {problem}"
+
+
+def component_problems(form: Form, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
+    """Yield what a robot of a model does not have that a component or rule of it needs; `having` as above."""
+    has = model.declared if having is None else having
+    word = word_of(form.form)
+    needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
+    if isinstance(form, Component) and _speaks_by_model(form) and form.speaks not in needs:
+        needs = (*needs, form.speaks)
+    missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
+    if missing:
+        fitting = ", ".join(_having(needs))
+        valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
+        yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
+    if not isinstance(form, EntityRule):
+        return
+    written = [] if has is None else [field for field in form.writes if field not in has]
+    if written:
+        yield f"{word} that writes {', '.join(written)}: {_fields_of(model, written, has)}"
+    if not model.is_solved:
+        yield f"{word} that would never apply: {with_article(model.name)} is neither rigid nor has a motion"
+
+
+def _having(fields: Collection[str]) -> Iterator[str]:
+    """Yield the names of the models of robots whose state has these fields, and of their variants that alone do."""
+    for model in models_of(robots=True):
+        if {*fields} <= {*(model.declared or ()), *model.on_demand}:
+            yield model.name
+            continue
+        for dynamics, variant in model.variants.items():
+            if {*fields} <= {*(variant.declared or ())}:
+                yield f"{model.name} with dynamics: {dynamics}"
+
+
+def _speaks_by_model(sensor: Component) -> bool:
+    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`unheard`)."""
+    is_own = callable(sensor.slots) or sensor.speaks in sensor.slots
+    return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
+
+
+def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
+    """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
+    fields = [*(having or ())]
+    shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
+    nearest = nearest_name(missing[0], fields)
+    near = "" if nearest is None else f", nearest to {missing[0]} is {nearest}"
+    return f"{with_article(model.name)} has {shown or 'no fields'}{near}"
+
+
+# --- rules of the world and kits -------------------------------------------------------------------------------------
+
+
+def rule_problems(rule: WorldRule) -> Iterator[str]:
+    """Yield the models that a rule of worlds names, and that there are not."""
+    for word, models in (("remembers something of each", rule.each), ("writes", rule.writes)):
+        for model in models:
+            if (model != ROBOTS or word == "writes") and (":" in model or registry.lookup("model", model) is None):
+                error = UnknownName("unknown model", model, registry.names("model"))
+                yield f"{word_of('rule')} that {word} {model}: {error}"
+
+
+def kit_problems(name: str, kit: Kit, kits: Mapping[str, Kit], reserved: Sequence[str]) -> Iterator[str]:
+    """Yield what a kit puts into a world with these kits that cannot be there.
+
+    `reserved` are names that no entity can have.
+    """
+    for entity, model in kit.entities.items():
+        if entity in reserved:
+            yield f"its entity {entity} has a reserved name"
+        for other in kits:
+            if other < name and entity in kits[other].entities:
+                yield f"its entity {entity} has a name that is also one of the kit {other}'s"
+        for problem in _not_there(model, kits):
+            yield f"its entity {entity} is {problem}"
+    for model in kit.addable:
+        for problem in (*_not_there(model, kits), *_not_placed(model)):
+            yield f"what can be added is {problem}"
+
+
+def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
+    """Yield why an entity without an owner cannot be of a model."""
+    try:
+        model = registry.find_model(name)
+    except BadValue as error:
+        yield f"of a model that is not there: {error}"
+        return
+    if model.is_robot:
+        yield f"of the model {model.name}, which is one of robots: these have owners, and are in robots:"
+    for problem in needs_kit(model, kits, model.name):
+        yield f"of a model that cannot be there: {problem}"
+    yield from model_problems(model, kits)
+
+
+def _not_placed(name: str) -> Iterator[str]:
+    """Yield why a running world cannot have one more of a model."""
+    model = find_kit_model(name)
+    if model is not None and not model.is_robot:
+        missing = [f"method {method}" for method in PLACED_BY if not hasattr(model.made, method)]
+        missing += ["field position"] if "position" not in (model.declared or ()) else []
+        if missing:
+            yield f"of the model {model.name}, which has no {' and no '.join(missing)}"
+
+
+# --- a world with its files ------------------------------------------------------------------------------------------
+
+
+def components_of(robot: RobotSettings) -> Iterator[tuple[str, str, ComponentSettings, Form]]:
+    """Yield the components and rules of a robot: section, name, settings and form of each."""
+    for section, form in SECTIONS.items():
+        for name, settings in getattr(robot, section).items():
+            yield section, name, settings, registry.find(form, settings.kind)
+
+
+def field_findings(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield settings of which no state follows, and components that need what it does not have.
+
+    Robots whose state is that of their model are checked with the file; of these, the files must have been given.
+    """
+    for name, robot in spec.robots.items():
+        model, place = registry.model_of(robot), ("robots", name)
+        if model.declared is not None:
+            continue
+        try:
+            having = model.fields_of(robot, spec)
+        except BadValue as bad:
+            value = robot.model if bad.value is ABSENT else bad.value
+            yield Finding((*place, "model"), bad.problem, value, bad.nearest)
+            continue
+        for problem in model_problems(model, spec.kits, having):
+            yield Finding((*place, "model"), problem, robot.model)
+        for section, label, its, form in components_of(robot):
+            for problem in component_problems(form, model, having):
+                yield Finding((*place, section, label, "kind"), problem, its.kind)
+
+
+def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield components whose settings their robots or the world do not fit: a joint that is not there, for one."""
+    checked = [
+        (name, *component)
+        for name, robot in spec.robots.items()
+        for component in components_of(robot)
+        if hasattr(component[-1].made, "check")
+    ]
+    layout = build_layout(spec) if checked else None
+    for name, section, channel, settings, form in checked:
+        assert layout is not None
+        key = draw_key(spec.seed, form.form, name, channel)
+        at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
+        made: Any = form.made
+        try:
+            made.check(settings, at)
+        except Misfit as error:
+            place: Location = ("robots", name, section, channel, *error.path)
+            yield Finding(place, error.problem, error.value, error.nearest)
+
+
+def unheard(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the sensors that speak by a slot that their robot does not have."""
+    layout: Layout | None = None
+    for name, robot in spec.robots.items():
+        for channel, settings in robot.sensors.items():
+            speaks = registry.find_component("sensor", settings.kind).speaks
+            if not speaks:
+                continue
+            layout = layout or build_layout(spec)
+            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
+                valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
+                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
+                yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
+
+
+def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield what declares a slot of an entity that something else has declared: it would be in one place for both."""
+    of_rules: list[tuple[str, Declaring]] = []
+    for label, settings in world_rules(spec).items():
+        kits = tuple(kit.name for kit in kits_named(spec) if label in kit.rules)
+        place: Location = ("rules", label) if label in spec.rules else kits
+        for model, slots in find_rule(settings).each.items():
+            named = {f"{label}.{slot}": count for slot, count in slots.items()}
+            of_rules.append((model, Declaring(f"rule {label} of the world", place, named)))
+    seen: set[tuple[int, tuple[tuple[str, int], ...]]] = set()
+    for name, robot in spec.robots.items():
+        parts = (*robot.actuators.items(), *robot.rules.items(), *robot.sensors.items())
+        alike = id(registry.model_of(robot)), tuple([(label, id(settings)) for label, settings in parts])
+        if alike not in seen:  # many robots of a fleet are
+            seen.add(alike)
+            remembered = [one for model, one in of_rules if model in (registry.model_of(robot).name, ROBOTS)]
+            yield from _doubled([*remembered, *declaring(spec, name, robot)], name)
+    for kit in kits_named(spec):
+        for name, model in kit.entities.items():
+            kind = registry.find_model(model)
+            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
+            yield from _doubled([motion, *(one for its, one in of_rules if its == kind.name)], name)
+
+
+def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
+    first: dict[str, Declaring] = {}
+    for one in all_of_it:
+        for slot in one.slots:
+            other = first.setdefault(slot, one)
+            if other is not one:
+                what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
+                yield Finding(one.location, what, slot.partition(".")[2], at="key")
