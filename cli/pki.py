@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -122,14 +123,15 @@ def show(folder: Folder, json: JsonOption = False) -> None:
             }
         )
     else:
+        now = wall_clock.now_utc()
         for its in shown:
-            print(_line(its))
+            print(_line(its, now))
     raise typer.Exit(FAILED if any(its.problem for its in shown) else DONE)
 
 
-def _line(its: Shown) -> str:
+def _line(its: Shown, now: datetime) -> str:
     if its.problem:
         return f"{its.identity:24} {its.problem}"
-    days = (its.ends - wall_clock.now_utc()).total_seconds() / 86_400
+    days = (its.ends - now).total_seconds() / 86_400
     hosts = ", ".join(its.hosts) or "issues certificates"
     return f"{its.identity:24} until {its.ends:%Y-%m-%d} ({days:.0f} days), {hosts}"

@@ -240,7 +240,8 @@ def _signed(
     root, root_key = authority
     is_ca = root is None
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-    begins = wall_clock.now_utc() - SLACK
+    now = wall_clock.now_utc()
+    begins = now - SLACK
     usage = x509.KeyUsage(
         digital_signature=not is_ca,
         content_commitment=False,

@@ -199,7 +199,8 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
     if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
         remedy = case.provide(f" --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
-    if soon := credentials.ends_soon(wall_clock.now_utc()):
+    soon = credentials.ends_soon(wall_clock.now_utc())
+    if soon:
         return who, "warning", soon, case.provide()
     return who, "fine", f"until {credentials.until:%Y-%m-%d}", ""
 
