@@ -14,7 +14,7 @@ from pathlib import Path
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import About, CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
 from foosim.deployment.loader import load_deployment
-from foosim.node.physics.mesh_trial import check_models
+from foosim.node.physics.making import check_shapes
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.assembly.initial_state import added_to, first_chain, start_with
@@ -105,7 +105,7 @@ def replica_of(text: str, name: str, files: Mapping[str, bytes], start: Start | 
     """Return a deployment's world on so many nodes, at its start. Raises AssetError for a file of an unfit model."""
     text = with_nodes(text, name, nodes)
     deployment = load_deployment(text, name).with_assets(files)
-    check_models(deployment, name, text)
+    check_shapes(deployment, name, text)
     return Replica(text, name, deployment, start=start)
 
 

@@ -66,7 +66,8 @@ def _across(corners: Floats) -> Floats:
 
 
 def _length(vectors: Floats) -> Floats:
-    return np.sqrt((vectors * vectors).sum(axis=-1))
+    found: Floats = np.sqrt((vectors * vectors).sum(axis=-1))
+    return found
 
 
 def _pieces(middles: Floats, rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:

@@ -85,7 +85,8 @@ def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
 
 def _pose(entity: Entity, numbers: Sequence[float]) -> list[float]:
     """Return what `still_pose` holds: position, orientation and the positions of joints, as far as there are such."""
-    offsets, found = entity.offsets, []
+    offsets = entity.offsets
+    found: list[float] = []
     for field in POSE:
         at = offsets.get(field)
         if at is not None:
