@@ -47,6 +47,9 @@ HEAVY: Final = 1e7
 IMPRATIO: Final = 200.0
 """Friction is this much stiffer than a contact is normal to it. At 100 a box creeps by 86 um/s on a slope of 15
 degrees, at 200 by 43; at 1000 wheels shake at substeps of 10 ms, and stacks rock."""
+NOSLIP: Final = 3
+"""Iterations that take creep from friction, where motors may hold another body: 200 g in a grip that is shaken for 10 s
+slips by 0.01 mm, and by 16 mm without."""
 TOLERANCE: Final = 1e-10
 """At 1e-8 wheels that hold each other slip."""
 LINE_SEARCHES: Final = 50
@@ -126,6 +129,7 @@ class ModelBuilder:
             self._add_body(number, body)
         if self._joints:
             self._add_motors()
+            self._spec.option.noslip_iterations = NOSLIP if len(everybody) > 1 else 0
         self._add_pairs()
         self.m = m = self._spec.compile()
         self.d = mujoco.MjData(m)

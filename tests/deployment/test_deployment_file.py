@@ -178,7 +178,7 @@ def test_a_file_that_is_no_mapping_is_refused(text: str) -> None:
 
 def test_an_empty_mapping_lacks_every_required_key() -> None:
     missing = [problem.rpartition(" ")[2] for problem in problems_of("{}")]
-    keys = ["engine", "format", "nodes", "pace", "robots", "seed", "substeps", "tick", "world"]
+    keys = ["format", "nodes", "pace", "robots", "seed", "substeps", "tick", "world"]
     assert sorted(missing) == [f"'{key}'" for key in keys]
 
 

@@ -16,7 +16,6 @@ from foosim.deployment.assets import pin_assets, read_robot
 from foosim.deployment.loader import load_deployment, with_owners
 from foosim.deployment.schema import Deployment
 from foosim.protocol.asset_transfer import Fetching
-from foosim.world.assembly import misfits
 from foosim.world.assembly.world import build_scene, initial_numbers, models_of
 from foosim.world.edits import Push, fitting_edits
 from foosim.world.forms import registry
@@ -26,10 +25,11 @@ from foosim.world.layout import build_layout
 from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.models.urdf import arms_of
 from foosim.world.scene import from_rpy
+from tests.kinematic_yard import yard_text
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-NAME: Final = "table.yaml"
-TEXT: Final = (DEPLOY / NAME).read_text()
+NAME: Final = "yard.yaml"
+TEXT: Final = yard_text({"post": {"model": "differential_drive", "at": {"x": "-9 m"}}}, engine="mujoco", tick="2 ms")
 ARM: Final = (DEPLOY / "models" / "arm.urdf").read_bytes()
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
 MASS: Final = '<inertial><origin xyz="0.1 0 0"/><mass value="1"/><inertia ixx="0.02" ixy="0.01" iyy="0.02" izz="0.03"/>'
@@ -49,12 +49,6 @@ ROBOTS: Final = (
 )
 
 
-@pytest.fixture(autouse=True)
-def solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A world that takes rigid models whose reach its islands do not know: nothing is solved here."""
-    monkeypatch.setattr(misfits, "REACHED", (*misfits.REACHED, "urdf"))
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for path, content in FILES.items():
@@ -64,7 +58,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def text_with(*sets: str) -> str:
-    return with_owners(TEXT, NAME, {"n1": ["*"]}, ["players={}", *sets])
+    return with_owners(TEXT, NAME, {"n1": ["*"]}, sets)
 
 
 @pytest.fixture
@@ -181,7 +175,7 @@ def test_without_the_file_there_is_no_state(deployment: Deployment) -> None:
     with pytest.raises(Malformed, match=r"urdf: a URDF file whose content is not there, 'models/\w+\.urdf'"):
         build_layout(lacking)
     encoder = CommandEncoder(lacking)
-    assert encoder.actuators("arm") == () and encoder.actuators("red.goal"), "clients command robots without files"
+    assert encoder.actuators("arm") == () and encoder.actuators("post"), "clients command robots without files"
 
 
 def test_robots_start_where_they_are_placed(deployment: Deployment) -> None:
@@ -250,7 +244,7 @@ def test_a_state_is_within_limits_speeds_and_bounds(
 def test_nothing_gets_farther_in_a_tick_than_its_speed_allows(
     deployment: Deployment, robot: str, field: str, way: float, is_plausible: bool
 ) -> None:
-    """The table's tick is 2 ms: at ten times 2.2 rad/s 0.044 rad, at 20 m/s 4 cm."""
+    """The tick is 2 ms: at ten times 2.2 rad/s 0.044 rad, at 20 m/s 4 cm."""
     assert deployment.tick_ns == 2_000_000
     layout = build_layout(deployment)
     entity = layout[robot]
