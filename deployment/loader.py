@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import chain, islice
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -51,11 +51,10 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
-from foosim.world.assembly.misfits import doubled_slots, field_findings, unfit_components, unheard
+from foosim.world.assembly.misfits import doubled_slots, engine_findings, field_findings, unfit_components, unheard
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Kit, with_article
 from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32
@@ -285,54 +284,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     if not between and not within:
         states = () if deployment.lacks_files else _state_findings(deployment)
         rules = rule_findings(network, ends.endpoints, deployment.carriers())
-        whole = chain(findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment))
+        whole = chain(findings_of(deployment), engine_findings(deployment), rules, place_findings(deployment))
         between = next(filter(None, map(first, chain(states, [whole]))), [])
     return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
-
-
-def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
-    """Rigid bodies that the engine does not have, and those of which no engine has both."""
-    engine = registry.find("engine", deployment.engine)
-    assert isinstance(engine, Engine), engine
-    body, rod = next(rigid_bodies(deployment), None), next(_rods(deployment), None)
-    if body is not None and rod is not None:
-        for one, other in ((body, rod), (rod, body)):
-            what = f"{one.what}, which no engine solves beside {'.'.join(other.location)}, {other.what}"
-            yield Finding(one.location, what, one.location[-1], at="key")
-    elif body is not None and not engine.islands:
-        what = f"the engine solves rods and balls of a table; {'.'.join(body.location)} is {body.what}"
-        yield Finding(("engine",), what, engine.name, "'mujoco'")
-    elif rod is not None and engine.islands:
-        what = f"the engine solves no rods and balls of a table; {'.'.join(rod.location)} is {rod.what}"
-        yield Finding(("engine",), what, engine.name, "'bullet'")
-
-
-class _Rigid(NamedTuple):
-    """Where something rigid is declared, and what it is."""
-
-    location: tuple[str, str]
-    what: str
-
-
-def _rods(deployment: Deployment) -> Iterator[_Rigid]:
-    """Yield the robots, or else the objects of kits, that are rods and balls of a table."""
-    for name, robot in deployment.robots.items():
-        if (model := registry.model_of(robot)).shares_solve:
-            yield _Rigid(("robots", name), with_article(model.name))
-    for key in deployment.kits:
-        kit = registry.find("kit", key)
-        for name, model_name in kit.entities.items() if isinstance(kit, Kit) else ():
-            if registry.find_model(model_name).shares_solve:
-                yield _Rigid((key, name), with_article(model_name))
-
-
-def rigid_bodies(deployment: Deployment) -> Iterator[_Rigid]:
-    """Yield the robots and objects that need an engine with bodies of any kind."""
-    for section, entities in (("robots", deployment.robots), ("objects", deployment.objects)):
-        for name, settings in entities.items():
-            model = registry.model_of(settings)
-            if model.is_rigid and model.couples:
-                yield _Rigid((section, name), with_article(model.name))
 
 
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:

@@ -21,10 +21,11 @@ from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import VHUB, Deployment, places
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher.run_options import RunOptions
-from foosim.node.physics.making import check_shapes
 from foosim.protocol import identity
 from foosim.runtime.transport.certificates import load_credentials, operator_credentials
 from foosim.world.assembly.sections import findings_of
+from foosim.world.layout import build_layout
+from foosim.world.scenery import SceneryMesh
 
 if TYPE_CHECKING:
     from foosim.capture.start_frame import Branch
@@ -136,7 +137,11 @@ def make_plan(options: RunOptions) -> Plan:
     text = apply_sets(read_source_file(options.file), name, options.all_sets)
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
-    check_shapes(deployment, name, text)
+    has_meshes = any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values())
+    if has_meshes or build_layout(deployment).couples:
+        from foosim.node.physics.mesh_trial import check_shapes
+
+        check_shapes(deployment, name, text)
     _refuse(options, findings_of(deployment))  # meshes that bodies start in or pass through
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)

@@ -18,7 +18,7 @@ from foosim.common.units import Pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, with_owners
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.making import check_shapes
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Answer, Epoch
 from foosim.rehearsal.attendant import Attendant

@@ -22,7 +22,7 @@ from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
-from foosim.node.physics.making import check_shapes
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.messages import Received, Sent
 from foosim.rehearsal.stepping.carriers import Bypass, Carrier, EmulatedNetwork
 from foosim.rehearsal.stepping.world import SteppedWorld

@@ -14,7 +14,7 @@ from pathlib import Path
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import About, CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
 from foosim.deployment.loader import load_deployment
-from foosim.node.physics.making import check_shapes
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.assembly.initial_state import added_to, first_chain, start_with

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @engine("bullet", meshes=True)
 class Bullet:
-    """Rods and balls of a football table by the Bullet library, with scenery of any shape."""
+    """Bodies whose joints do not couple, by the Bullet library, with scenery of any shape."""
 
     def make(self, deployment: Deployment, layout: Layout) -> AnyEngine:
         """Return an engine, built at once."""

@@ -8,8 +8,7 @@ from typing import Final
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine, EngineKind
 from foosim.world.forms import registry
-from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.scenery import SceneryMesh
+from foosim.world.layout import Entity, Layout
 
 SPARES: Final = 2
 """Engines that a node may build before the first one is given back: the next layout's, and the one after that."""
@@ -63,17 +62,3 @@ def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, No
         return (yield from kind_of(deployment).in_steps(deployment, layout))
     yield
     return NoEngine()
-
-
-def check_shapes(deployment: Deployment, name: str, text: str) -> None:
-    """Try what an engine makes of somebody's numbers: meshes of scenery, and bodies. Files must have been read.
-
-    `text` is that of the deployment. Raises AssetError.
-    """
-    layout = build_layout(deployment)
-    if layout.couples:
-        make_engine(deployment, layout).close()
-    elif any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values()):
-        from foosim.node.physics.mesh_trial import check_meshes
-
-        check_meshes(deployment, name, text)

@@ -1,4 +1,4 @@
-"""Meshes of a table's scenery meet Bullet in a throw-away process first, and only then in one that matters.
+"""Meshes of the scenery meet Bullet in a throw-away process first, and only then in one that matters.
 
 What Python can check is checked before (`world.mesh_files`); what is left is that Bullet may crash, hang or use up the
 memory. The throw-away process has 1 GiB of address space, 5 s of processor time for each, and can open nothing. It
@@ -24,7 +24,7 @@ import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Engine, IslandEngine
-from foosim.node.physics.making import kind_of
+from foosim.node.physics.making import kind_of, make_engine
 from foosim.protocol.codec import decode_any, encode
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
@@ -42,6 +42,18 @@ DONE: Final = "done"
 _passed: Final = deque[bytes](maxlen=100)
 """The last worlds that this process has seen pass, by digest: the engine is deterministic."""
 COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
+
+
+def check_shapes(deployment: Deployment, name: str, text: str) -> None:
+    """Try what an engine makes of somebody's numbers: meshes of scenery, and bodies. Files must have been read.
+
+    `text` is that of the deployment. Raises AssetError.
+    """
+    layout = build_layout(deployment)
+    if layout.couples:
+        make_engine(deployment, layout).close()
+    else:
+        check_meshes(deployment, name, text)
 
 
 def check_meshes(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
@@ -89,7 +101,7 @@ def _digest(deployment: Deployment, command: Sequence[str]) -> bytes:
 
 
 def _meshes(deployment: Deployment) -> dict[str, SceneryMesh]:
-    """Return the meshes that balls meet: motions meet the box around one, which is checked."""
+    """Return the meshes that free bodies meet: motions meet the box around one, which is checked."""
     found = {thing: spec for thing, spec in sorted(deployment.scenery.items()) if isinstance(spec, SceneryMesh)}
     return found if build_layout(deployment).free else {}
 

@@ -12,6 +12,8 @@ from itertools import chain
 from math import fsum, inf
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mesh_pieces import MeshPieces
@@ -29,7 +31,7 @@ from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
 
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were used last."""
-NO_CONTACT: Final = (0.0, 0.0, -1.0)
+NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
 
 Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 """The kinds of an island's bodies, in name order, those of movers in their way, and the pieces of meshes in reach."""
@@ -114,6 +116,7 @@ class _Touch:
         self.substeps = 0
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CompositionEngine:
     """A model with scenery and the bodies of one composition, and its data."""
 
