@@ -87,7 +87,7 @@ def sizes(core: object) -> list[tuple[str, int]]:
             found.append((where, len(value)))
             inside = value.values() if isinstance(value, dict) else value
             todo += [(where, item) for item in inside if type(item) not in SIMPLE]
-        elif kind.__module__.startswith("foosim."):
+        elif kind.__module__.startswith(("foosim.", "tests.swarm.")):
             todo += [(f"{kind.__name__}.{name}", held) for name, held in _attributes(value) if type(held) not in SIMPLE]
     return found
 
