@@ -56,6 +56,16 @@ def test_a_ball_stays_on_a_plate_of_a_millimetre(case: int) -> None:
     assert one.get("a", "position")[2] == pytest.approx(radius + 0.0005, abs=0.001)
 
 
+def test_each_of_many_shapes_of_a_link_is_felt() -> None:
+    """A bar of forty boxes: a ball lies on the last one."""
+    boxes = tuple([shape(Box((0.05, 0.05, 0.05)), position=(0.1 * number, 0.0, 0.0)) for number in range(40)])
+    bar = Body("bar", "bar", (0.0, 0.0, 1.0), (Link("bar", "fixed", boxes, 1.0, (0.1,) * 3),))
+    one = Solids([ball("a", 0.05, 0.1), bar], scenery=())
+    one.put("a", (3.9, 0.0, 1.11))
+    one.run(100)
+    assert one.get("a", "position")[2] == pytest.approx(1.1, abs=0.001)
+
+
 def test_a_mover_carries_what_stands_on_it() -> None:
     """At 0.5 m/s for 4 s: a box on top goes along, after what it slides until it has the speed, v^2 / (2 mu g)."""
     top = Body("m", "mover", ORIGIN, (Link("m", "free", (shape(Box((0.5, 0.5, 0.1))),), 0.0, ORIGIN),))

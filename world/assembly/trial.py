@@ -26,7 +26,6 @@ from foosim.world.assembly.world import (
     world_status,
     world_texts,
 )
-from foosim.world.bodies.limits import size_problem
 from foosim.world.components.entities import Model
 from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
@@ -172,8 +171,6 @@ def _check_body(model: Model, entity: Entity) -> None:
         raise WrongResult(method, "a body that is not free, of a model without position or orientation", body)
     for link in body.links:
         _check_shapes(method, link.shapes)
-    problem = size_problem([link.shapes for link in body.links]) if entity.is_rigid else ""
-    assert not problem, problem
 
 
 def _check_readings(sensors: Sequence[FittedSensor], numbers: Sequence[float]) -> None:
