@@ -66,7 +66,7 @@ class Rest:
                 continue
             numbers[at] += 1.0
             if numbers[at] == self.ticks:
-                _stop(entity, numbers)
+                stop(entity, numbers)
 
 
 def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
@@ -109,7 +109,8 @@ def is_still(entity: Entity, numbers: Sequence[float]) -> bool:
     return all(abs(a - b) <= STILL_RAD for a, b in zip(kept[joints:], pose[joints:], strict=True))
 
 
-def _stop(entity: Entity, numbers: list[float]) -> None:
+def stop(entity: Entity, numbers: list[float]) -> None:
+    """Set the velocities of a body to 0."""
     for field in ("linear_velocity", "angular_velocity", "joint_velocities"):
         at = entity.offsets.get(field)
         if at is not None:

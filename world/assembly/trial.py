@@ -120,7 +120,8 @@ def _try_tick(world: World, layout: Layout, start: list[float]) -> None:
     moved = [entity for entity in layout.entities if entity.is_solved]
     world.move(moved, before, numbers, TICK)
     world.apply_entity_rules(moved, before, numbers, TICK)
-    world.plausible(moved, numbers, before, TICK)
+    for entity in moved:
+        world.problem(entity, numbers, before, TICK)
     for entity in layout.entities:
         values = numbers[entity.start : entity.stop]
         assert all(map(isfinite, values)), f"{entity.name} is {values} after a tick"

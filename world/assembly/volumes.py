@@ -1,6 +1,7 @@
 """Bounding volumes of rigid bodies of any kind, and the islands that follow from them.
 
-The volume of a body is the box around its shapes, grown by its declared speed limit x tick; that of a body on a fixed
+The volume of a body is the box around its shapes, grown by its declared speed limit x tick, or by twice its present
+speed x tick where that is more; that of a body on a fixed
 base is the box around all that its joints let it reach. Bodies whose volumes overlap are an island. Movers (bodies that
 go on by a motion) are in no island: each island has those in whose way it is. Everything follows from the frame; only
 + - x / sqrt and comparisons, element by element, so that all CPUs agree.
@@ -11,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
+from math import sqrt
 from operator import itemgetter
 from typing import Final, NamedTuple, TypeAlias
 
@@ -28,6 +30,8 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+PRESENT_SPEED: Final = 2.0
+"""Within a tick a body gets no farther than at its declared speed limit, or at so many times its present speed."""
 FEW: Final = 16
 """Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
 SKIN_M: Final = 0.05
@@ -104,7 +108,11 @@ class Volumes:
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
         self._middles = np.array(middles).reshape(-1, 1, 3)
         self._halves = np.array(halves).reshape(-1, 1, 3)
-        self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
+        self._moves = itemgetter(*[at for _, entity, _ in free for at in _move_places(entity)]) if free else None
+        """Returns the velocity and the spin of each free body."""
+        self._radii = np.array([radius_of(body) for _, _, body in free])
+        self._limits = np.array([body.speed_limit for _, _, body in free])
+        self._tick_s = tick_s
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
             if not body.is_free:
@@ -184,10 +192,20 @@ class Volumes:
             along = turned * self._middles
             spread = np.abs(turned) * self._halves
             middle = poses[:, :3] + (along[:, :, 0] + along[:, :, 1] + along[:, :, 2])
-            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown
+            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown(numbers)
             boxes[self._free, 0] = middle - half
             boxes[self._free, 1] = middle + half
         return boxes
+
+    def _grown(self, numbers: Sequence[float]) -> Numbers:
+        """Return by how much the volumes of free bodies grow (m), shape (bodies, 1)."""
+        assert self._moves is not None
+        moves = np.array(self._moves(numbers)).reshape(-1, 2, 3)
+        square = moves * moves
+        lengths = np.sqrt(square[:, :, 0] + square[:, :, 1] + square[:, :, 2])
+        speeds = np.maximum(self._limits, PRESENT_SPEED * (lengths[:, 0] + lengths[:, 1] * self._radii))
+        grown: Numbers = (speeds * self._tick_s + MARGIN_M)[:, None]
+        return grown
 
     def _nearest(self, entities: Sequence[Entity], numbers: Sequence[float]) -> str:
         """Return the robot nearest to an object of an island, ties by name; the first robot without an object."""
@@ -241,6 +259,24 @@ def _pose_places(entity: Entity) -> list[int]:
     """Return the places of a free body's position and of its quaternion's parts."""
     at, turned = entity.offsets["position"], entity.offsets["orientation"]
     return [*range(at, at + 3), *range(turned, turned + 4)]
+
+
+def _move_places(entity: Entity) -> list[int]:
+    """Return the places of a free body's velocity and spin."""
+    at, spin = entity.offsets["linear_velocity"], entity.offsets["angular_velocity"]
+    return [*range(at, at + 3), *range(spin, spin + 3)]
+
+
+def reach_speed(speed_limit: float, present: float) -> float:
+    """Return the speed (m/s) with which a body may go on for a tick, from its promise and its present speed."""
+    return max(speed_limit, PRESENT_SPEED * present)
+
+
+def radius_of(body: Body) -> float:
+    """Return how far a part of a free body can be from its centre of mass (m)."""
+    middle, half = _own_box(body)
+    x, y, z = (abs(a) + b for a, b in zip(middle, half, strict=True))
+    return sqrt(x * x + y * y + z * z)
 
 
 def _own_box(body: Body) -> tuple[Vector, Vector]:
