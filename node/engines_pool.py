@@ -144,7 +144,7 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     """Return the digest of a fixed small run: the stirred world, 32 ticks.
 
     It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
-    as they were read here, are part of it.
+    as they were read here, are part of it, and the version of an engine that has one.
     """
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
@@ -159,4 +159,5 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     stepper.quarantined.clear()  # of a run that is none
     content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
     meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
-    return blake2b(np.array(content).tobytes() + b"".join(meshes), digest_size=32).digest()
+    version = getattr(engine, "version", "").encode()
+    return blake2b(np.array(content).tobytes() + b"".join(meshes) + version, digest_size=32).digest()

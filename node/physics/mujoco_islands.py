@@ -17,7 +17,7 @@ from mypy_extensions import mypyc_attr
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mesh_pieces import MeshPieces
-from foosim.node.physics.mujoco_model import SCENERY, ModelBuilder, Placed, step, without_names
+from foosim.node.physics.mujoco_model import SCENERY, VERSION, ModelBuilder, Placed, step, without_names
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
@@ -39,6 +39,9 @@ Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 class MujocoIslands:
     """The rigid bodies of one layout, island by island."""
+
+    version = VERSION
+    """Another one may compute other bits, in worlds that the small run of the fingerprint has not."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._physics = physics_of(deployment)

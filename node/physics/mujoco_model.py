@@ -72,6 +72,7 @@ GEOMS: Final = {Box: "BOX", Sphere: "SPHERE", Cylinder: "CYLINDER", Capsule: "CA
 SCENERY: Final = -1
 """The place of what is no body."""
 
+VERSION: Final = f"mujoco {mujoco.__version__}"
 step = mujoco.mj_step
 mujoco.set_mju_user_warning(lambda text: None)  # by default MuJoCo writes MUJOCO_LOG.TXT into the working folder
 
