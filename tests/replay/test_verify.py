@@ -25,7 +25,7 @@ from foosim.node.physics.interface import Engine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify, verify_capture
+from foosim.replay.verify import Verified, verify, verify_capture
 from foosim.world.layout import Layout
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
