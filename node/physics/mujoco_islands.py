@@ -32,6 +32,8 @@ from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were used last."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
+NOBODY: tuple[float, ...] = (NO_ENTITY,) * PARTNERS_MAX
+NO_IMPULSES: tuple[float, ...] = (0.0,) * PARTNERS_MAX
 
 Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 """The kinds of an island's bodies, in name order, those of movers in their way, and the pieces of meshes in reach."""
@@ -109,6 +111,23 @@ class MujocoIslands:
         self._models.clear()
 
 
+class _Slots:
+    """Where the numbers of an entity are in a frame; -1 for those that it does not have."""
+
+    __slots__ = (
+        "contacts", "joint_efforts", "joint_positions", "joint_velocities", "orientation", "partner_impulses",
+        "partners", "position", "spin", "velocity",
+    )  # fmt: skip
+
+    def __init__(self, entity: Entity) -> None:
+        at = entity.offsets.get
+        self.position, self.orientation = at("position", -1), at("orientation", -1)
+        self.velocity, self.spin = at("linear_velocity", -1), at("angular_velocity", -1)
+        self.joint_positions, self.joint_velocities = at("joint_positions", -1), at("joint_velocities", -1)
+        self.joint_efforts, self.contacts = at("joint_efforts", -1), at("contacts", -1)
+        self.partners, self.partner_impulses = at("partners", -1), at("partner_impulses", -1)
+
+
 class _Touch:
     """The contacts of two bodies within a tick: their normal forces (N), and a bit for each substep with one."""
 
@@ -145,6 +164,8 @@ class CompositionEngine:
         self._governed: list[tuple[Placed, int, Motor, float]] = []
         """Motors whose force falls with the speed: their body, joint, and the slope as its mean over a substep."""
         self._is_applied = False
+        self._slots: dict[int, _Slots] = {}
+        """By the index of an entity: all that a model meets are of one layout."""
         if self._motors:
             self._clock = clock, int(self.m.jnt_qposadr[self.m.dof_jntid[clock]])
             self._friction, self._speeds = self.m.tendon_frictionloss, self.m.wrap_prm[1::2]
@@ -153,23 +174,20 @@ class CompositionEngine:
         """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
         qpos, qvel = self._q, self._v
         for placed, entity, body in zip(self._placed, (*island.bodies, *island.movers), bodies, strict=True):
-            offsets = entity.offsets
             if placed.is_mover:
                 self._load_mover(placed, entity, body, start)
-            elif placed.is_free:
-                q, v = placed.q, placed.v
-                at, turned = offsets["position"], offsets["orientation"]
-                x, y, z, w = numbers[turned : turned + 4]
-                qpos[q : q + 3] = numbers[at : at + 3]
-                qpos[q + 3 : q + 7] = w, x, y, z
-                at, spin = offsets["linear_velocity"], offsets["angular_velocity"]
-                qvel[v : v + 3] = numbers[at : at + 3]
+                continue
+            slots = self._slots_of(entity)
+            if placed.is_free:
+                q, v, at, spin = placed.q, placed.v, slots.position, slots.spin
+                x, y, z, w = numbers[slots.orientation : slots.orientation + 4]
+                qpos[q : q + 7] = *numbers[at : at + 3], w, x, y, z
                 a, b, c = numbers[spin : spin + 3]
-                qvel[v + 3 : v + 6] = rotate((-x, -y, -z, w), (a, b, c))
+                qvel[v : v + 6] = *numbers[slots.velocity : slots.velocity + 3], *rotate((-x, -y, -z, w), (a, b, c))
             elif placed.stands is not body:
                 self._stand(placed, body)
             if placed.qs:
-                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
+                at, speed = slots.joint_positions, slots.joint_velocities
                 for number, (i, j) in enumerate(zip(placed.qs, placed.vs, strict=True)):
                     qpos[i], qvel[j] = numbers[at + number], numbers[speed + number]
         if self._motors:
@@ -177,6 +195,12 @@ class CompositionEngine:
         self._qpos[:], self._qvel[:] = qpos, qvel
         self._warm[:] = 0.0
         self.d.time = 0.0
+
+    def _slots_of(self, entity: Entity) -> _Slots:
+        slots = self._slots.get(entity.index)
+        if slots is None:
+            slots = self._slots[entity.index] = _Slots(entity)
+        return slots
 
     def _load_mover(self, placed: Placed, entity: Entity, body: Body, start: Sequence[float]) -> None:
         q, v = placed.q, placed.v
@@ -263,22 +287,21 @@ class CompositionEngine:
         efforts = self._efforts() if self._motors else []
         met = self._met()
         for number, entity in enumerate(island.bodies):
-            placed, offsets = self._placed[number], entity.offsets
+            placed, slots = self._placed[number], self._slots_of(entity)
             if placed.is_free:
-                q, v = placed.q, placed.v
-                at, turned = offsets["position"], offsets["orientation"]
+                q, v, at, turned = placed.q, placed.v, slots.position, slots.orientation
                 w, x, y, z = qpos[q + 3 : q + 7]
                 numbers[at : at + 3], numbers[turned : turned + 4] = qpos[q : q + 3], (x, y, z, w)
-                at, turned = offsets["linear_velocity"], offsets["angular_velocity"]
+                at, spin = slots.velocity, slots.spin
                 a, b, c = qvel[v + 3 : v + 6]
-                numbers[at : at + 3], numbers[turned : turned + 3] = qvel[v : v + 3], rotate((x, y, z, w), (a, b, c))
+                numbers[at : at + 3], numbers[spin : spin + 3] = qvel[v : v + 3], rotate((x, y, z, w), (a, b, c))
             if placed.qs:
-                count = len(placed.qs)
-                at, speed, effort = (offsets[f"joint_{what}"] for what in ("positions", "velocities", "efforts"))
+                count, at = len(placed.qs), slots.joint_positions
+                speed, effort = slots.joint_velocities, slots.joint_efforts
                 numbers[at : at + count] = [qpos[i] for i in placed.qs]
                 numbers[speed : speed + count] = [qvel[i] for i in placed.vs]
                 numbers[effort : effort + count] = efforts[placed.motor : placed.motor + count]
-            self._write_log(entity, island, met.get(number), numbers)
+            self._write_log(slots, island, met.get(number), numbers)
 
     def _efforts(self) -> list[float]:
         """Return what each motor applied in the last substep (N or N m)."""
@@ -302,10 +325,10 @@ class CompositionEngine:
         return found
 
     def _write_log(
-        self, entity: Entity, island: Island, met: Sequence[tuple[int, _Touch]] | None, numbers: list[float]
+        self, slots: _Slots, island: Island, met: Sequence[tuple[int, _Touch]] | None, numbers: list[float]
     ) -> None:
         """Write what a body touched: how many touches began, the impulse (N s), and the last substep with a contact."""
-        at, dt, offsets = entity.offsets["contacts"], self._dt, entity.offsets
+        at, dt = slots.contacts, self._dt
         impulses: dict[int, float] = {}
         if met is None:
             numbers[at : at + 3] = NO_CONTACT
@@ -319,13 +342,16 @@ class CompositionEngine:
             before = substeps << 1 | (numbers[at + 2] == self._substeps - 1.0)
             began = (substeps & ~before).bit_count()
             numbers[at : at + 3] = float(began), fsum(impulses.values()), substeps.bit_length() - 1.0
-        if "partners" not in offsets:
+        if slots.partners < 0:
+            return
+        at, to = slots.partners, slots.partner_impulses
+        if not impulses:
+            numbers[at : at + PARTNERS_MAX], numbers[to : to + PARTNERS_MAX] = NOBODY, NO_IMPULSES
             return
         kept = sorted([(-impulse, one) for one, impulse in impulses.items() if one != SCENERY])[:PARTNERS_MAX]
         everybody = (*island.bodies, *island.movers)
         found = sorted([(float(everybody[one].index), -impulse) for impulse, one in kept])
         missing = PARTNERS_MAX - len(found)
-        at, to = offsets["partners"], offsets["partner_impulses"]
         numbers[at : at + PARTNERS_MAX] = [index for index, _ in found] + [NO_ENTITY] * missing
         numbers[to : to + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing
 
