@@ -24,7 +24,7 @@ FLOOR: Final = Shape(Box((50.0, 50.0, 0.5)), "floor", WHITE, (0.0, 0.0, -0.5))
 def physics(gravity: float = GRAVITY, erp: float = 0.05, **sides: Side) -> Physics:
     """What bodies feel: friction 0.5 and no restitution between any two, unless sides say otherwise."""
     plain = Side(0.0, 0.5**0.5)
-    return Physics(gravity, {}, Contact(0.0, 0.0), 50, erp, {"default": plain, "floor": plain, **sides})
+    return Physics(gravity, {}, Contact(0.0, 0.0), 200, erp, {"default": plain, "floor": plain, **sides})
 
 
 def shape(geometry: Geometry, surface: str = "default", **placed: Vector | Quaternion) -> Shape:

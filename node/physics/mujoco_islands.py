@@ -17,7 +17,7 @@ from mypy_extensions import mypyc_attr
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mesh_pieces import MeshPieces
-from foosim.node.physics.mujoco_model import SCENERY, VERSION, ModelBuilder, Placed, step, without_names
+from foosim.node.physics.mujoco_model import SCENERY, VERSION, ModelBuilder, Placed, step, warnings, without_names
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
@@ -256,6 +256,7 @@ class CompositionEngine:
             step(m, d)
             if d.ncon:
                 self._note(1 << substep)
+        assert not warnings, f"MuJoCo has warned: {'; '.join(warnings)}"
 
     def _apply(self, pushed: Sequence[tuple[Placed, tuple[Any, Any]]]) -> None:
         """Set the forces on bases, which turn with them, and those of motors whose force falls with the speed."""

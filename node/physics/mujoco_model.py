@@ -74,7 +74,16 @@ SCENERY: Final = -1
 
 VERSION: Final = f"mujoco {mujoco.__version__}"
 step = mujoco.mj_step
-mujoco.set_mju_user_warning(lambda text: None)  # by default MuJoCo writes MUJOCO_LOG.TXT into the working folder
+warnings: Final[list[str]] = []
+"""What MuJoCo has warned of: with a full arena it drops contacts, for one."""
+
+
+def _warned(text: str) -> None:
+    if not text.startswith("Nan, Inf"):  # of numbers that are not finite, which come into quarantine
+        warnings.append(text)
+
+
+mujoco.set_mju_user_warning(_warned)  # by default MuJoCo writes MUJOCO_LOG.TXT into the working folder
 
 
 def is_mover(body: Body) -> bool:

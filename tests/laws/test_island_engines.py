@@ -12,12 +12,14 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Final
 
+import mujoco
 import numpy as np
 import pytest
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import CompositionEngine
+from foosim.node.physics.mujoco_model import ModelBuilder, warnings
 from foosim.world.assembly.volumes import overlapping
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.layout import Entity
@@ -297,3 +299,20 @@ class HoldsAnothers(Comparison):
 def test_a_rule_that_is_broken_is_seen(kind: type[Comparison]) -> None:
     outcome = compared(SEEN_TICKS, kind, until_it_differs=True)
     assert outcome.differing, outcome
+
+
+def test_a_full_arena_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo would drop contacts and go on."""
+    options = ModelBuilder._set_options
+
+    def with_little_memory(self: ModelBuilder) -> None:
+        options(self)
+        self._spec.memory = 60_000
+
+    monkeypatch.setattr(ModelBuilder, "_set_options", with_little_memory)
+    made = world()
+    for number in range(4):
+        made.put(f"stack{number}", (5.0, 0.0, 0.1 + 0.2 * number))
+    with pytest.raises((AssertionError, mujoco.FatalError), match=r"has warned: |out of memory"):
+        made.run(20)
+    warnings.clear()
