@@ -311,22 +311,17 @@ class Many(Own):
     def __init__(self, settings, at):
         self.name = at.robot.name
     def body(self):
-        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range({count}))
+        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range(40))
         return Body(self.name, "many", (0.0, 0.0, 0.0), (Link("a", "fixed", shapes, 1.0, (0.1,) * 3),))
-    def is_plausible(self, numbers, before):
-        return True
     def place(self, view):
         pass
 model("many", RobotSettings, is_rigid=True, slots=CONTACTS)(Many)
 """
 
 
-@pytest.mark.parametrize(("count", "is_valid"), [(16, True), (17, False)])
-def test_a_rigid_model_has_no_more_shapes_than_the_engine_keeps(site: Path, count: int, is_valid: bool) -> None:
-    written(site, "from foosim.world.forms.forms import CONTACTS", MANY.format(count=count))
-    found = problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="mujoco"))
-    assert any("a link with 17 boxes" in one for one in found) != is_valid, found
-    assert not found or not is_valid
+def test_a_rigid_model_has_as_many_shapes_as_it_likes_and_no_check_of_its_own(site: Path) -> None:
+    written(site, "from foosim.world.forms.forms import CONTACTS", MANY)
+    assert problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="mujoco")) == []
 
 
 @pytest.mark.parametrize(
