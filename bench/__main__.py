@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import distributed, env, fleet, lateness, machine, realtime, table_one_process, verdict
+from bench import bodies, distributed, env, fleet, lateness, machine, realtime, table_one_process, verdict
 from bench.runs import BenchError
 
 
@@ -46,6 +46,7 @@ BENCHES: Final = (
     ),
     Bench("realtime", "the table as processes in real time", with_default(realtime.realtime), realtime.lines),
     Bench("fleet", "kinematic robots with their poses, in one process", with_default(fleet.fleet), fleet.lines),
+    Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),

@@ -23,10 +23,11 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
+from bench import bodies
 from bench.bare_tick import bare_tick_us
 from bench.runs import ROOT, BenchError
 
-TICKS: Final = {"table": 500, "warehouse": 150, "yard": 150, "fleet": 60}
+TICKS: Final = {"table": 500, "warehouse": 150, "yard": 150, "fleet": 60, "rigid fleet": 60}
 """Of each deployment in deploy/ and of the fleet of `bench.fleet`, for each seed."""
 STARTS: Final = ("table", "warehouse")
 SEEDS: Final = 3
@@ -117,6 +118,9 @@ def run_in(tree: Path, command: Sequence[str]) -> str:
 def tick_s(tree: Path, world: str) -> float:
     """Return the processor time of a tick of a world's rehearsal, in seconds."""
     file = tree / "deploy" / f"{world}.yaml"
+    if world == "rigid fleet":
+        file = tree.parent / f"{tree.name}-fleet.yaml"
+        file.write_text(bodies.fleet_text("mujoco" if (tree / "node" / "engines" / "mujoco.py").exists() else "bullet"))
     numbers = [str(number) for number in (TICKS[world], SEEDS, RUNS, START_TICKS)]
     return float(run_in(tree, [sys.executable, "-c", OF_TICKS, str(file), *numbers]))
 

@@ -38,7 +38,8 @@ VERSIONS: Final = "versions.json"
 CHUNK_BYTES: Final = 4 * 1024 * 1024
 """A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
 _LIBRARIES: Final = (
-    *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
+    *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "mujoco-core", "numpy", "pybullet", "pydantic"),
+    "zstandard",
 )
 NO_READINGS: Final[Mapping[str, TopicSchema]] = MappingProxyType({})
 CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"

@@ -55,8 +55,8 @@ def rehearse_command(
     run waited for the longest. Ctrl-C ends the rehearsal in order, a second Ctrl-C at once; the last line has the last
     tick and the capture's path. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
-    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its disk is full, 130
-    second Ctrl-C.
+    Exit codes: 0 done, 1 failed or something is in quarantine at the end, 2 bad input, 3 the capture exists or cannot
+    be created, or its disk is full, 130 second Ctrl-C.
     """
     if options.duration is None:
         raise BadValue("--for is missing: the simulated time, e.g. --for 20s")
@@ -88,7 +88,7 @@ def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
             print_json(result, file=output)
         else:
             print(_told(result), file=output, flush=True)
-        return FAILED if result["failed"] else DONE
+        return FAILED if result["failed"] or result["quarantined"] else DONE
 
     def stuck(result: dict[str, Any]) -> None:
         _note(result["reason"])

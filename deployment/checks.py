@@ -285,7 +285,7 @@ def _scenery(deployment: Deployment) -> Iterator[Finding]:
             if "surface" in thing.model_fields_set:
                 yield Finding(("scenery", name, "surface"), "a surface for free bodies, in a world without any")
         elif not engine.meshes and isinstance(thing, SceneryMesh):
-            valid = "boxes and cylinders it has, and the engine bullet has all"
+            valid = "boxes and cylinders it has; bullet and mujoco have all"
             what = f"the engine {deployment.engine} has no meshes ({valid})"
             yield Finding(("scenery", name, "shape"), what, nearest="'box'")
         if thing.radio is not None:

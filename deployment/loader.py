@@ -51,11 +51,10 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
-from foosim.world.assembly.misfits import doubled_slots, field_findings, unfit_components, unheard
+from foosim.world.assembly.misfits import doubled_slots, engine_findings, field_findings, unfit_components, unheard
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Model
 from foosim.world.moving.upright import stands_upright
 
 DEPLOYMENTS_KEPT: Final = 32
@@ -285,29 +284,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     if not between and not within:
         states = () if deployment.lacks_files else _state_findings(deployment)
         rules = rule_findings(network, ends.endpoints, deployment.carriers())
-        whole = chain(findings_of(deployment), _engine_findings(deployment), rules, place_findings(deployment))
+        whole = chain(findings_of(deployment), engine_findings(deployment), rules, place_findings(deployment))
         between = next(filter(None, map(first, chain(states, [whole]))), [])
     return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
-
-
-def _engine_findings(deployment: Deployment) -> Iterator[Finding]:
-    """A rigid body that the engine does not have."""
-    engine = registry.find("engine", deployment.engine)
-    assert isinstance(engine, Engine), engine
-    if engine.islands:
-        return
-    for name, model in rigid_bodies(deployment):
-        what = f"the engine has no rigid bodies such as {name}, a {model.name} (bullet has bodies of any kind)"
-        yield Finding(("engine",), what, engine.name)
-        return
-
-
-def rigid_bodies(deployment: Deployment) -> Iterator[tuple[str, Model]]:
-    """Yield the robots and objects that need an engine with bodies of any kind, with their models."""
-    for name, settings in (*deployment.robots.items(), *deployment.objects.items()):
-        model = registry.model_of(settings)
-        if model.is_rigid and model.couples:
-            yield name, model
 
 
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:

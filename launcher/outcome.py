@@ -30,6 +30,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     "moves": 0,
     "handovers": 0,
     "summary": [],
+    "quarantined": [],
     "solvers": {},
     "capture": None,
     "reason": None,
@@ -55,7 +56,7 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        return bool(self.result["failed"])
+        return bool(self.result["failed"] or self.result["quarantined"])
 
 
 def ended_outcome(folder: RunFolder) -> Outcome:

@@ -138,11 +138,11 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     has_meshes = any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values())
-    if has_meshes or build_layout(deployment).couples:  # bodies of any kind: some may have hulls
-        from foosim.node.physics.mesh_trial import check_models
+    if has_meshes or build_layout(deployment).couples:
+        from foosim.node.physics.mesh_trial import check_shapes
 
-        check_models(deployment, name, text)
-        _refuse(options, findings_of(deployment))  # meshes that bodies start in or pass through
+        check_shapes(deployment, name, text)
+    _refuse(options, findings_of(deployment))  # meshes that bodies start in or pass through
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else read_at("--pace", parse_pace, options.pace)

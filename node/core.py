@@ -267,22 +267,6 @@ class NodeCore:
         frame, term = self.frame, self._term
         return -1 if frame is None or term is None else frame.tick
 
-    def islands_ahead(self, ticks: int) -> list[tuple[tuple[Entity, ...], tuple[Entity, ...]]]:
-        """Return the bodies and movers of islands that this node may have to solve within some ticks."""
-        frame, term = self.frame, self._term
-        if frame is None or term is None:
-            return []
-        entities = term.assignment.layout.entities
-        if term.assignment.layout.digest != frame.layout.digest:
-            return []
-        return [
-            (
-                tuple([entities[index] for index in island.entities]),
-                tuple([entities[index] for index in island.movers]),
-            )
-            for island in term.assignment.approaching(frame.numbers, self.name, ticks)
-        ]
-
     def slow_tick(self, text: str) -> Publish:
         """Return what tells the supervisor of what takes long at a tick. Any thread may call this."""
         tick = max(0, self.present_tick())

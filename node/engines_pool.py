@@ -13,7 +13,7 @@ import numpy as np
 
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
-from foosim.node.physics.interface import AnyEngine, ForesightedEngine
+from foosim.node.physics.interface import AnyEngine
 from foosim.node.physics.making import build_in_steps, make_engine, prepare_spares
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import initial_numbers
@@ -24,14 +24,6 @@ from foosim.world.matter.mesh import Mesh
 FINGERPRINT_TICKS: Final = 32
 ENGINES_KEPT: Final = 3
 """The layout of the tick, the one before (an epoch may go back to it), and the next one."""
-AHEAD_TICKS: Final = 50
-"""How far an engine of islands looks ahead."""
-LOOK_TICKS: Final = 10
-"""How often it looks."""
-SHOWN_MAX: Final = 200
-"""Characters of the names of its bodies that are told."""
-TOLD_TICKS: Final = 100
-"""How often a node tells at most that engines of islands were built within a tick."""
 
 
 class Solver:
@@ -48,13 +40,6 @@ class Solver:
         self._told = 0
         """The number of the core's layouts whose engine has been reported."""
         self._building: tuple[Layout, Generator[None, None, AnyEngine]] | None = None
-        self._looked = -LOOK_TICKS
-        """The tick of the last look ahead."""
-        self._is_foreseeing = False
-        self._missed = 0
-        self._missed_tick = -TOLD_TICKS
-        self.on_miss: Callable[[str], None] | None = None
-        """Is told in words of engines that had to be built within a tick, before the tick's part is sent."""
         self.fingerprint = fingerprint
         """The digest of the fixed small run, empty before the first engine is built."""
 
@@ -86,26 +71,9 @@ class Solver:
             self._core.fail(error)
         return True
 
-    def build_ahead(self) -> bool:
-        """Do one step of getting ready for islands that may come; False when there is nothing to do."""
-        frame = self._core.frame
-        if frame is None or not frame.layout.couples:
-            return False
-        looks = abs(frame.tick - self._looked) >= LOOK_TICKS
-        if not looks and not self._is_foreseeing:
-            return False
-        engine = self._engines.get(frame.layout.digest)
-        self._is_foreseeing = False
-        if isinstance(engine, ForesightedEngine):
-            if looks:
-                self._looked = frame.tick
-                engine.expect(self._core.islands_ahead(AHEAD_TICKS))
-            self._is_foreseeing = engine.build_some()
-        return self._is_foreseeing
-
     @property
     def is_building(self) -> bool:
-        return self._building is not None or self._is_foreseeing
+        return self._building is not None
 
     def _steps(self, layout: Layout) -> Generator[None, None, AnyEngine]:
         deployment = self._core.deployment
@@ -125,8 +93,6 @@ class Solver:
             stepper = self._core.stepper(layout)
             if not self.fingerprint:
                 self.fingerprint = engine_fingerprint(engine, stepper)
-                if isinstance(engine, ForesightedEngine):
-                    engine.missed = ""  # of a run that is none
         except ComponentError as error:
             self._core.fail(error)
             return
@@ -166,20 +132,7 @@ class Solver:
         except ComponentError as error:
             self._core.fail(error)
         else:
-            if work.layout.couples and self.on_miss is not None:
-                self._tell_missed(engine, work.tick, self.on_miss)
             self._core.solved(work)
-
-    def _tell_missed(self, engine: AnyEngine, tick: int, tell: Callable[[str], None]) -> None:
-        """Tell of engines that were built within this tick, and how many since the last time that was told."""
-        if not isinstance(engine, ForesightedEngine) or not engine.missed:
-            return
-        who, engine.missed = engine.missed, ""
-        self._missed += 1
-        if abs(tick - self._missed_tick) >= TOLD_TICKS:
-            self._missed_tick, count, self._missed = tick, self._missed, 0
-            shown = who if len(who) <= SHOWN_MAX else f"{who[:SHOWN_MAX]}..."
-            tell(f"tick {tick} has built the engine of an island that nobody expected: {shown} ({count} so far)")
 
     def close(self) -> None:
         for engine in self._engines.values():
@@ -191,7 +144,7 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     """Return the digest of a fixed small run: the stirred world, 32 ticks.
 
     It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
-    as they were read here, are part of it.
+    as they were read here, are part of it, and the version of an engine that has one.
     """
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
@@ -206,4 +159,5 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     stepper.quarantined.clear()  # of a run that is none
     content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
     meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
-    return blake2b(np.array(content).tobytes() + b"".join(meshes), digest_size=32).digest()
+    version = getattr(engine, "version", "").encode()
+    return blake2b(np.array(content).tobytes() + b"".join(meshes) + version, digest_size=32).digest()

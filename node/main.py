@@ -39,7 +39,6 @@ class NodeShell:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self._orphan = Orphan()
         self._solver = Solver(self.core)
-        self._solver.on_miss = self._name_miss
         self._is_present = self._is_stopped = False
         self._shell = RoleShell(process, name, self.core, self._deadline_ns, credentials)
         self.role: Final = self._shell.role
@@ -108,10 +107,6 @@ class NodeShell:
         else:
             self._slow.append(text)
 
-    def _name_miss(self, text: str) -> None:
-        """Log that an engine was built within a tick, and tell the supervisor, which names it if the tick is late."""
-        self.core.actions += [Log("info", text), self.core.slow_tick(text)]
-
     def _work(self, now_ns: int) -> bool:
         """Solve the current tick, if there is one to be solved."""
         work = self.core.work
@@ -123,14 +118,13 @@ class NodeShell:
         return True
 
     def _build(self) -> None:
-        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout, or
-        for islands that may come."""
+        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout."""
         if self.core.work is not None:
             return
         if self.core.frame is None:
             self._solver.build_wanted()
-        elif not self._solver.build_some():
-            self._solver.build_ahead()
+        else:
+            self._solver.build_some()
 
     def _deadline_ns(self, now_ns: int) -> int:
         return now_ns if self._solver.is_building else self.core.deadline_ns()

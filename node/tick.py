@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import cast
+from typing import Final, cast
 
 import msgspec
 import numpy as np
@@ -21,7 +21,8 @@ from foosim.node.due_sensors import DueSensors, Turn
 from foosim.node.edited_frame import edit, moved_reference
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
 from foosim.node.physics.touch_log import clear_touches
-from foosim.world.assembly.rest import Rest, wake_edited
+from foosim.world.assembly.body_limits import BodyLimits
+from foosim.world.assembly.rest import Rest, stop, wake_edited
 from foosim.world.assembly.standing import Standing
 from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
@@ -35,6 +36,12 @@ from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
 
 ECHO = "echo"
+RETRIES: Final = 3
+"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is removed."""
+RETRY_NS: Final = 1_000_000_000
+ATTEMPTS: Final = 8
+"""The field `quarantined` is this many times the ticks that are left, plus how often the body has come into quarantine;
+minus that number, of a body that is solved again; 0 of one that never was."""
 
 _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()
@@ -71,6 +78,7 @@ class Stepper:
         self._is_watched = is_watched
         self.substeps = deployment.substeps
         self.rest = Rest(deployment, layout)
+        self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
         self._standing = Standing(layout, self.world.actuators, self.world.ruled)
         self._alone: frozenset[int] = frozenset()
@@ -209,7 +217,7 @@ class Stepper:
         world.apply_entity_rules(bodies, start, numbers, work.tick)
         if not self._by_island:
             self._standing.note(bodies, numbers, before)
-        if not (isfinite(sum(numbers)) and world.plausible(changed, numbers, before, work.tick)):
+        if not isfinite(sum(numbers)) or any(self._problem(entity, before, work) for entity in changed):
             self._quarantine(work, before)
 
     def _awake(self, work: Work) -> tuple[list[Entity], bool]:
@@ -224,9 +232,10 @@ class Stepper:
         is_partial = any(map(numbers.__getitem__, self._quarantined))
         if is_partial:
             for entity in bodies:
-                if numbers[entity.offsets["quarantined"]] != 0.0:
+                if numbers[entity.offsets["quarantined"]] > 0.0:
                     _clear_results(entity, numbers)
-            bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
+                    _wait(entity, numbers)
+            bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] <= 0.0]
         if not self._by_island:
             bodies = self._standing.awake(bodies, self._alone, numbers, work.start or numbers)
         return bodies, is_partial
@@ -260,8 +269,8 @@ class Stepper:
             self._divided = work.islands, self._rigid_islands(work)
         for members, in_the_way, is_driven in self._divided[1]:
             bodies = members
-            if is_partial and any(numbers[entity.offsets["quarantined"]] != 0.0 for entity in members):
-                bodies = tuple([entity for entity in members if numbers[entity.offsets["quarantined"]] == 0.0])
+            if is_partial and any(numbers[entity.offsets["quarantined"]] > 0.0 for entity in members):
+                bodies = tuple([entity for entity in members if numbers[entity.offsets["quarantined"]] <= 0.0])
                 if not bodies:
                     continue
             may_rest = rest.may_rest(bodies, in_the_way, numbers, start)
@@ -285,16 +294,17 @@ class Stepper:
         return found
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
-        """An island with a result that cannot be keeps its edited state; the bad entities are marked.
+        """An island with a result that cannot be keeps its edited state; the bad entities stop, and are marked.
 
-        Who was in quarantine before was copied: its state, which may be as bad as ever, says nothing of the others.
+        Who was in quarantine before was copied: its state, which may be as bad as ever, says nothing of the others. A
+        body is solved again after `RETRY_NS`, at most `RETRIES` times.
         """
         numbers = work.numbers
         for island in work.islands:
             bad = [
                 (entity, why)
                 for entity in island
-                if before[entity.offsets["quarantined"]] == 0.0 and (why := self._what_is_bad(entity, before, work))
+                if before[entity.offsets["quarantined"]] <= 0.0 and (why := self._what_is_bad(entity, before, work))
             ]
             if not bad:
                 continue
@@ -302,15 +312,32 @@ class Stepper:
                 numbers[entity.start : entity.split] = before[entity.start : entity.split]
                 _clear_results(entity, numbers)
             for entity, why in bad:
-                numbers[entity.offsets["quarantined"]] = 1.0
-                self.quarantined.append(f"tick {work.tick}: {entity.name} stands in quarantine from here on: {why}")
+                until = self._hold(entity, numbers)
+                self.quarantined.append(f"tick {work.tick}: {entity.name} is in quarantine {until}: {why}")
+
+    def _hold(self, entity: Entity, numbers: list[float]) -> str:
+        """Mark an entity, and return in words until when it is not solved. Where joints do not couple, a rule of the
+        world says what comes of it."""
+        at = entity.offsets["quarantined"]
+        if entity.index not in self._limits:
+            numbers[at] = 1.0
+            return "until a rule or an order ends it"
+        stop(entity, numbers)
+        attempt = 1 - numbers[at]
+        if attempt > RETRIES:
+            numbers[at] = attempt
+            return "until it is removed"
+        numbers[at] = attempt - ATTEMPTS * (-RETRY_NS // self.deployment.tick_ns)
+        return f"for 1 s, then it is solved again ({attempt:.0f} of {RETRIES})"
+
+    def _problem(self, entity: Entity, before: Sequence[float], work: Work) -> str:
+        """Return in words why an entity's new, finite state cannot be; empty where it can."""
+        numbers = work.numbers
+        return self._limits.problem(entity, numbers, before) or self.world.problem(entity, numbers, before, work.tick)
 
     def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
         """Return in words why an entity's new state cannot be; empty where it can."""
-        why = _not_finite(entity, work.numbers)
-        if not why and not self.world.plausible((entity,), work.numbers, before, work.tick):
-            why = "its new state is not within its bounds, speed limits and reach"
-        return why
+        return _not_finite(entity, work.numbers) or self._problem(entity, before, work)
 
 
 def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:
@@ -320,6 +347,14 @@ def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:
         if at < entity.split and not all(map(isfinite, values)):
             return f"its new {field_name} is {', '.join(map(str, values))}"
     return ""
+
+
+def _wait(entity: Entity, numbers: list[float]) -> None:
+    """Let a tick of a body's time in quarantine pass; at its end it is solved again."""
+    at = entity.offsets["quarantined"]
+    if numbers[at] > ATTEMPTS:
+        left = numbers[at] - ATTEMPTS
+        numbers[at] = left if left > ATTEMPTS else -left
 
 
 def _clear_results(entity: Entity, numbers: list[float]) -> None:

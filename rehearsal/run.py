@@ -18,7 +18,7 @@ from foosim.common.units import Pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, with_owners
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Answer, Epoch
 from foosim.rehearsal.attendant import Attendant
@@ -88,7 +88,7 @@ def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
     text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
     text, files = pin_assets(text, name, folder or Path())
     deployment = load_deployment(text, name).with_assets(files)
-    check_models(deployment, name, text)
+    check_shapes(deployment, name, text)
     settings = settings or Settings()
     rehearsed = Rehearsed({})
     on_commit = settings.on_commit

@@ -22,7 +22,7 @@ from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
-from foosim.node.physics.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.messages import Received, Sent
 from foosim.rehearsal.stepping.carriers import Bypass, Carrier, EmulatedNetwork
 from foosim.rehearsal.stepping.world import SteppedWorld
@@ -49,7 +49,7 @@ def read_for_stepping(path: str | Path, sets: Sequence[str] = ()) -> Deployment:
     text = apply_sets(read_deployment_text(path), path.name, sets)
     text, files = pin_assets(text, path.name, path.parent)
     deployment = load_deployment(text, path.name).with_assets(files)
-    check_models(deployment, path.name, text)
+    check_shapes(deployment, path.name, text)
     return deployment
 
 

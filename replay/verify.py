@@ -10,16 +10,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
+from foosim.capture.contents import library_versions
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import About, CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
 from foosim.deployment.loader import load_deployment
-from foosim.node.physics.mesh_trial import check_models
+from foosim.node.physics.mesh_trial import check_shapes
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
 from foosim.world.assembly.initial_state import added_to, first_chain, start_with
 from foosim.world.frame import CHAIN_START, Frame, chain_next
 from foosim.world.start import Start
+
+COMPUTING: Final = ("mujoco-core", "numpy", "pybullet")
+"""Libraries of which another version may compute another world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,8 @@ class Verified:
     """This machine's digest of the fixed small run of an engine, in hex."""
     other_arithmetic: tuple[str, ...] = ()
     """Those that the capture has and that are others."""
+    other_versions: tuple[str, ...] = ()
+    """Libraries that compute worlds and have another version here: `LIBRARY VERSION, here VERSION`."""
     first_tick: int = 0
     finished: bool = True
     """Whether the capture has its end: ticks of the run may follow one that has none."""
@@ -65,7 +72,15 @@ def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool =
     found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)
     kept = {epoch.arithmetic for epoch in capture.epochs}
     others = tuple(sorted(kept - {"", found.arithmetic}))
-    return replace(found, other_arithmetic=others, finished=capture.finished)
+    here = library_versions()
+    versions = tuple(
+        [
+            f"{name} {about.versions.get(name)}, here {here[name]}"
+            for name in COMPUTING
+            if about.versions.get(name) != here[name]
+        ]
+    )
+    return replace(found, other_arithmetic=others, other_versions=versions, finished=capture.finished)
 
 
 def start_of(capture: CaptureData) -> Start | None:
@@ -105,7 +120,7 @@ def replica_of(text: str, name: str, files: Mapping[str, bytes], start: Start | 
     """Return a deployment's world on so many nodes, at its start. Raises AssetError for a file of an unfit model."""
     text = with_nodes(text, name, nodes)
     deployment = load_deployment(text, name).with_assets(files)
-    check_models(deployment, name, text)
+    check_shapes(deployment, name, text)
     return Replica(text, name, deployment, start=start)
 
 

@@ -15,6 +15,7 @@ from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
 from foosim.world.assembly.world import world_status, world_texts
+from foosim.world.frame import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,12 @@ DISRUPTIONS_SHOWN: Final = 16
 """The last requested events of the network that a status has."""
 
 
+def in_quarantine(frame: Frame) -> list[str]:
+    """Return the entities of a frame that are not solved, by name."""
+    marked = [(entity.name, entity.offsets.get("quarantined", -1)) for entity in frame.layout.entities]
+    return [name for name, at in marked if at >= 0 and frame.numbers[at] > 0.0]
+
+
 def result(state: RunState) -> dict[str, Any]:
     """Return the result of a run, or of a run so far."""
     frame = state.frame
@@ -42,9 +49,11 @@ def result(state: RunState) -> dict[str, Any]:
     wall_ns = state.committed_ns - state.started_ns
     origin = state.settings.origin
     shown = world_status(state.deployment, frame)
+    out = in_quarantine(frame)
     return {
         **shown,
-        "summary": world_texts(state.deployment, shown),
+        "summary": [*world_texts(state.deployment, shown), *([f"in quarantine: {', '.join(out)}"] if out else [])],
+        "quarantined": out,
         "solvers": state.account.solvers,
         "run": state.settings.run,
         "world": state.deployment.world,

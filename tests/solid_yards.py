@@ -41,7 +41,7 @@ def _text(**sections: Any) -> str:
         "seed": 1,
         "tick": "10 ms",
         "substeps": 4,
-        "engine": "bullet",
+        "engine": "mujoco",
         "pace": "fast",
         "assets": "models",
         "scene": {"kind": "empty"},
@@ -80,6 +80,10 @@ PUSHED: Final[tuple[Push, ...]] = (
     (60, "ram", (5.0, 0.0, 0.0)),
     (90, "ram", (5.0, 0.0, 0.0)),
     (120, "ram", (5.0, 0.0, 0.0)),
+    (135, "ram", (0.6, 0.0, 0.0)),
+    (150, "ram", (0.6, 0.0, 0.0)),
+    (165, "ram", (0.6, 0.0, 0.0)),
+    (180, "ram", (0.6, 0.0, 0.0)),
 )
 """The ram is thrown at the box, and pushes it on."""
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.node.physics.bullet_islands import CompositionEngine
 from foosim.node.physics.interface import Island
+from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.world.components.drives import NO_DRIVES, Drives
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS, NO_ENTITY, PARTNERS, PARTNERS_MAX, Model
 from foosim.world.forms.settings import EntitySettings
@@ -24,7 +24,7 @@ FLOOR: Final = Shape(Box((50.0, 50.0, 0.5)), "floor", WHITE, (0.0, 0.0, -0.5))
 def physics(gravity: float = GRAVITY, erp: float = 0.05, **sides: Side) -> Physics:
     """What bodies feel: friction 0.5 and no restitution between any two, unless sides say otherwise."""
     plain = Side(0.0, 0.5**0.5)
-    return Physics(gravity, {}, Contact(0.0, 0.0), 50, erp, {"default": plain, "floor": plain, **sides})
+    return Physics(gravity, {}, Contact(0.0, 0.0), 200, erp, {"default": plain, "floor": plain, **sides})
 
 
 def shape(geometry: Geometry, surface: str = "default", **placed: Vector | Quaternion) -> Shape:

@@ -45,6 +45,7 @@ PACKAGES = sorted(LEVELS)
 ONLY_IN = {
     "zenoh": "runtime/transport/session.py",
     "pybullet": "node/physics/bullet_client.py",
+    "mujoco": "node/physics/mujoco_model.py",
     "websockets": "console/server/server.py",
 }
 

@@ -18,8 +18,11 @@ from foosim.common.finding import Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     LINEAR_VELOCITY,
+    POSE,
     ROBOTS,
     SAMPLES,
+    STILL_POSE,
+    STILL_TICKS,
     Carrier,
     Component,
     EntityRule,
@@ -144,6 +147,8 @@ class Layout:
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
             counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
+            if STILL_TICKS in fields:
+                counts[STILL_POSE] = sum([fields.get(field, 0) for field in POSE])
             for slot, count in counts.items():
                 offsets[slot] = position
                 position += count
@@ -174,7 +179,7 @@ class Layout:
         """Free rigid bodies, in name order."""
         self.couples = any(entity.is_rigid and entity.kind.couples for entity in entities)
         """Whether it has rigid bodies whose islands need a solve of their own."""
-        self.resting = tuple([entity for entity in entities if "slow_ticks" in entity.offsets])
+        self.resting = tuple([entity for entity in entities if STILL_TICKS in entity.offsets])
         """Bodies that may come to rest, in name order."""
         self.shared: dict[int, tuple[WorldSpec, object]] = {}
         """What the forms of this layout share, by the identity of the world, which is kept with it."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from fractions import Fraction
 from math import gcd
-from typing import Annotated, Final, NamedTuple, Protocol, Self, TypeVar
+from typing import Annotated, Any, Final, NamedTuple, Protocol, Self, TypeVar
 
 from pydantic import Field, PrivateAttr, SerializeAsAny
 
@@ -11,6 +11,8 @@ from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
+from foosim.world.forms import registry
+from foosim.world.forms.forms import Kit
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.matter.mesh import AssetError, Mesh, check_digest
 from foosim.world.matter.physics import PhysicsSettings, SurfaceSettings
@@ -82,18 +84,26 @@ def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
     return Schedule(step // common, shift // common % (period // common), period // common)
 
 
+def default_engine(world: Mapping[str, Any]) -> str:
+    """Return the engine of a world (its sections by their fields) that names none."""
+    kits = [registry.find("kit", name) for name in world.get(KITS, {})]
+    models = [registry.find_model(name) for kit in kits if isinstance(kit, Kit) for name in kit.entities.values()]
+    models += map(registry.model_of, (*world.get("robots", {}).values(), *world.get("objects", {}).values()))
+    return "bullet" if any(model.shares_solve for model in models) else "mujoco"
+
+
 class WorldSpec(SpecBase):
     """The world: its robots, the sections of kits, rules, a scene, and fixed things.
 
     `digests` (BLAKE2b) say which files are meant that models of robots are made from, by path in the asset folder; they
-    are written when a run is planned.
+    are written when a run is planned. A world without an `engine` has bullet if there are rods or balls in it, else
+    mujoco.
     """
 
     world: Name
     seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
     tick_ns: Annotated[int, Quantity(units.TIME, "0.1 ms", "100 ms")] = Field(alias="tick")
     substeps: Annotated[int, Field(ge=1, le=64)]
-    engine: str
     kits: dict[str, SerializeAsAny[SpecBase]] = Field(default={}, max_length=KITS_MAX)
     rules: dict[Name, SerializeAsAny[RuleSettings]] = Field(default={}, max_length=RULES_MAX)
     scene: SerializeAsAny[SceneSettings] | None = None
@@ -105,6 +115,7 @@ class WorldSpec(SpecBase):
     objects: dict[RobotName, SerializeAsAny[EntitySettings]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     digests: dict[AssetPath, Digest] = Field(default={}, max_length=ROBOT_FILES_MAX)
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
+    engine: str = Field(default_factory=default_engine)
     _contents: Contents = PrivateAttr(default_factory=Contents)
 
     def section(self, kit: str, kind: type[Section]) -> Section:

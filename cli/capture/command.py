@@ -132,6 +132,8 @@ def verify(
             "they compute different worlds",
             err=True,
         )
+    if found.tick >= 0 and found.other_versions:
+        typer.echo(f"the capture was made with {'; '.join(found.other_versions)}", err=True)
     raise typer.Exit(FAILED if not found.equal else DONE if found.finished else UNFINISHED)
 
 

@@ -13,26 +13,18 @@ if TYPE_CHECKING:
     from foosim.world.layout import Layout
 
 
-@engine("bullet", meshes=True, islands=True)
+@engine("bullet", meshes=True)
 class Bullet:
-    """Rigid bodies by the Bullet library, with scenery of any shape."""
+    """Bodies whose joints do not couple, by the Bullet library, with scenery of any shape."""
 
     def make(self, deployment: Deployment, layout: Layout) -> AnyEngine:
         """Return an engine, built at once."""
-        if layout.couples:
-            from foosim.node.physics.bullet_islands import BulletIslands
-
-            return BulletIslands(deployment, layout)
         from foosim.node.physics.bullet_engine import BulletEngine
 
         return BulletEngine(deployment, layout)
 
     def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
         """Build an engine a body at a time."""
-        if layout.couples:
-            from foosim.node.physics.bullet_islands import BulletIslands
-
-            return (yield from BulletIslands.in_steps(deployment, layout))
         from foosim.node.physics.bullet_engine import BulletEngine
 
         return (yield from BulletEngine.in_steps(deployment, layout))

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from foosim.node.physics.quiet import without_lines
-from foosim.world.bodies.limits import PRIMITIVES_MAX
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics, Side
+from foosim.world.parameters.table import PRIMITIVES_MAX
 from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector
 
 with without_lines(b"pybullet build time:"):

@@ -12,14 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 from foosim.deployment.schema import Deployment
 from foosim.world.components.drives import Drives
 from foosim.world.layout import Entity, Layout
-
-ISLAND_ENGINES_MAX: Final = 8
-"""Engines of islands that a node keeps for a layout: those that were used last, or are expected to be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +40,6 @@ class IslandEngine(Protocol):
 
     def close(self) -> None:
         """Free what the engine holds. It is not used afterwards."""
-
-
-@runtime_checkable
-class ForesightedEngine(IslandEngine, Protocol):
-    """An engine of islands that can be told which are coming, and gets ready for these between two ticks."""
-
-    missed: str
-    """Of the last `solve`, what it had to build at once; empty where all was there."""
-
-    def expect(self, islands: Sequence[tuple[tuple[Entity, ...], tuple[Entity, ...]]]) -> None:
-        """Get ready for islands (bodies and movers, in name order) that may come, the likely ones first."""
-
-    def build_some(self) -> bool:
-        """Do one short step of getting ready; False when there is nothing to do."""
 
 
 class Engine(Protocol):

@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import ISLAND_ENGINES_MAX, AnyEngine, EngineKind
+from foosim.node.physics.interface import AnyEngine, EngineKind
 from foosim.world.forms import registry
 from foosim.world.layout import Entity, Layout
 
@@ -53,7 +53,7 @@ def make_engine(deployment: Deployment, layout: Layout) -> AnyEngine:
 def prepare_spares(deployment: Deployment, layout: Layout) -> None:
     """Get ready what would hold up the ticks later, when another engine is built beside them."""
     if has_rigid(layout):
-        kind_of(deployment).prepare_spares(ISLAND_ENGINES_MAX if layout.couples else SPARES)
+        kind_of(deployment).prepare_spares(SPARES)
 
 
 def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:

@@ -1,12 +1,10 @@
-"""Meshes and convex hulls from outside meet the physics engine in a throw-away process first, and only then in one that
-matters.
+"""Meshes of the scenery meet Bullet in a throw-away process first, and only then in one that matters.
 
-What Python can check is checked before (`world.mesh_files`, `world.bodies`); what is left is that Bullet may crash,
-hang or use up the memory. The throw-away process has 1 GiB of address space, 5 s of processor time for each, and can
-open nothing. It builds the world with one mesh alone, lets a free body fall on it and start inside of it, 100 ticks in
-all; and with one body that has hulls, which goes on by itself and with another body inside of it. If it ends in any
-other way than well, the run does not begin, and the message says which file did it. A process that rehearses a world
-several times tries it once.
+What Python can check is checked before (`world.mesh_files`); what is left is that Bullet may crash, hang or use up the
+memory. The throw-away process has 1 GiB of address space, 5 s of processor time for each, and can open nothing. It
+builds the world with one mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it ends
+in any other way than well, the run does not begin, and the message says which file did it. A process that rehearses a
+world several times tries it once.
 """
 
 from __future__ import annotations
@@ -25,12 +23,10 @@ from typing import Final
 import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import AnyEngine, Island, IslandEngine
-from foosim.node.physics.making import kind_of
+from foosim.node.physics.interface import Engine, IslandEngine
+from foosim.node.physics.making import kind_of, make_engine
 from foosim.protocol.codec import decode_any, encode
-from foosim.world.assembly.hulls import with_hulls
 from foosim.world.assembly.world import build_scene, initial_numbers
-from foosim.world.components.drives import NO_DRIVES
 from foosim.world.layout import Entity, build_layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import Body, Shape, Vector, place, shape_box
@@ -48,12 +44,24 @@ _passed: Final = deque[bytes](maxlen=100)
 COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
 
 
-def check_models(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
-    """Try the meshes and hulls of a deployment, whose text is given, with its engine. Its files must have been read.
+def check_shapes(deployment: Deployment, name: str, text: str) -> None:
+    """Try what an engine makes of somebody's numbers: meshes of scenery, and bodies. Files must have been read.
+
+    `text` is that of the deployment. Raises AssetError.
+    """
+    layout = build_layout(deployment)
+    if layout.couples:
+        make_engine(deployment, layout).close()
+    else:
+        check_meshes(deployment, name, text)
+
+
+def check_meshes(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
+    """Try the meshes of a deployment, whose text is given, with its engine. Its files must have been read.
 
     Raises AssetError for one that fails.
     """
-    tries = {label: f"{file}: {label}" for label, (file, _) in _tries(deployment, name).items()}
+    tries = {f"scenery.{thing}": f"{mesh.file}: scenery.{thing}" for thing, mesh in _meshes(deployment).items()}
     if not tries:
         return
     world = _digest(deployment, command)
@@ -92,18 +100,10 @@ def _digest(deployment: Deployment, command: Sequence[str]) -> bytes:
     return found.digest()
 
 
-def _tries(deployment: Deployment, name: str) -> dict[str, tuple[str, SceneryMesh | Entity]]:
-    """Return what is to be tried by its place in the deployment: the file that it is from, and a mesh or a body."""
-    layout = build_layout(deployment)
-    found: dict[str, tuple[str, SceneryMesh | Entity]] = {}
-    if layout.free:  # motions meet the box around a mesh, which is checked
-        for thing, spec in sorted(deployment.scenery.items()):
-            if isinstance(spec, SceneryMesh):
-                found[f"scenery.{thing}"] = spec.file, spec
-    for entity in with_hulls(deployment, layout):
-        section, things = ("robots", deployment.robots) if entity.is_robot else ("objects", deployment.objects)
-        found[f"{section}.{entity.name}"] = getattr(things.get(entity.name), "file", name), entity
-    return found
+def _meshes(deployment: Deployment) -> dict[str, SceneryMesh]:
+    """Return the meshes that free bodies meet: motions meet the box around one, which is checked."""
+    found = {thing: spec for thing, spec in sorted(deployment.scenery.items()) if isinstance(spec, SceneryMesh)}
+    return found if build_layout(deployment).free else {}
 
 
 def _reason(code: int, said: Sequence[str]) -> str:
@@ -126,20 +126,15 @@ def main() -> None:
     deployment = load_deployment(text, name).with_assets(files)
     bare = deployment.model_copy(update={"scenery": {}})
     kind_of(deployment).make(bare, build_layout(deployment)).close()  # imports what it needs
-    tries = _tries(deployment, name)
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 0)
     _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)
-    for label, (_, tried) in tries.items():
-        os.write(report, f"{label}\n".encode())
+    for thing, mesh in _meshes(deployment).items():
+        os.write(report, f"scenery.{thing}\n".encode())
         used = resource.getrusage(resource.RUSAGE_SELF)
         _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + CPU_S)
         try:
-            if isinstance(tried, SceneryMesh):
-                thing = label.removeprefix("scenery.")
-                _try(deployment.model_copy(update={"scenery": {thing: tried}}).with_assets(files))
-            else:
-                _try_body(bare, tried)
+            _try(deployment.model_copy(update={"scenery": {thing: mesh}}).with_assets(files))
         except (AssertionError, MemoryError, ArithmeticError) as error:
             os.write(report, f"{type(error).__name__} {' '.join(str(error).split())[:200]}\n".encode())
             raise
@@ -154,6 +149,7 @@ def _try(deployment: Deployment) -> None:
     """Build the world with its one mesh and step it with each free body: from above, and from within a triangle."""
     layout = build_layout(deployment)
     engine = kind_of(deployment).make(deployment, layout)
+    assert not isinstance(engine, IslandEngine), engine
     (shape,) = deployment.scenery_shapes()
     assert isinstance(shape.geometry, Mesh), shape
     low, high = shape_box(shape)
@@ -178,38 +174,14 @@ def _inside(shape: Shape, mesh: Mesh) -> Vector:
     return position
 
 
-def _try_body(deployment: Deployment, entity: Entity) -> None:
-    """Step a body with hulls from where it starts: by itself, then with another free body in the middle of it."""
-    layout = build_layout(deployment)
-    engine = kind_of(deployment).make(deployment, layout)
-    numbers = initial_numbers(deployment, layout)
-    _step(deployment, engine, (entity,), numbers)
-    others = [other for other in layout.free if other.is_rigid and other.name != entity.name]
-    if others:
-        at = entity.offsets.get("position")
-        body = build_scene(deployment, layout).bodies[entity.name]
-        middle = body.position if at is None else tuple(numbers[at : at + 3])
-        there = others[0].offsets["position"]
-        numbers[there : there + 3] = middle
-        _step(deployment, engine, tuple(sorted((entity, others[0]), key=lambda one: one.index)), numbers)
-    engine.close()
-
-
-def _drop(deployment: Deployment, engine: AnyEngine, body: Entity, numbers: list[float], start: Vector) -> None:
+def _drop(deployment: Deployment, engine: Engine, body: Entity, numbers: list[float], start: Vector) -> None:
     """Let a free body, which is at rest in a world's numbers, start from somewhere else."""
     at = body.offsets["position"]
     numbers[at : at + 3] = start
-    _step(deployment, engine, (body,), numbers)
-
-
-def _step(deployment: Deployment, engine: AnyEngine, bodies: tuple[Entity, ...], numbers: list[float]) -> None:
     for _ in range(TICKS // 2):
-        if isinstance(engine, IslandEngine):
-            engine.solve(Island(bodies, (), (NO_DRIVES,) * len(bodies)), numbers, numbers)
-        else:
-            engine.load(bodies, numbers)
-            engine.step(deployment.substeps)
-            engine.read(bodies, numbers)
+        engine.load((body,), numbers)
+        engine.step(deployment.substeps)
+        engine.read((body,), numbers)
         if not all(isfinite(number) for number in numbers):
             raise ArithmeticError("a body that touches it is nowhere: its position is not finite")
 

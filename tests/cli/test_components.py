@@ -108,7 +108,7 @@ TOLD: Final = {
     ("model", "differential_drive"): [
         "moved by: differential_drive",
         "with dynamics: rigid, moved by: an engine; slots: position[3], orientation[4], linear_velocity[3], "
-        "angular_velocity[3], contacts[3], partners[4], partner_impulses[4], slow_ticks, quarantined, "
+        "angular_velocity[3], contacts[3], partners[4], partner_impulses[4], still_ticks, quarantined, "
         "joint_positions[2], joint_velocities[2], joint_efforts[2], heading, wheel_speeds[2], wheel_travel[2], down, "
         "refused, clamped",
     ],

@@ -21,7 +21,10 @@ except SystemExit as end:
     assert not end.code, end.code
 print(*sys.modules, file=sys.stderr)
 """
-HEAVY = {"numpy", "pybullet", "zenoh", "cryptography", "mcap", "rich", "yaml", "ssl", "foosim.deployment.schema"}
+HEAVY = {
+    *("numpy", "pybullet", "mujoco", "zenoh", "cryptography", "mcap", "rich", "yaml", "ssl"),
+    "foosim.deployment.schema",
+}
 
 
 @pytest.mark.parametrize(

@@ -311,22 +311,17 @@ class Many(Own):
     def __init__(self, settings, at):
         self.name = at.robot.name
     def body(self):
-        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range({count}))
+        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range(40))
         return Body(self.name, "many", (0.0, 0.0, 0.0), (Link("a", "fixed", shapes, 1.0, (0.1,) * 3),))
-    def is_plausible(self, numbers, before):
-        return True
     def place(self, view):
         pass
 model("many", RobotSettings, is_rigid=True, slots=CONTACTS)(Many)
 """
 
 
-@pytest.mark.parametrize(("count", "is_valid"), [(16, True), (17, False)])
-def test_a_rigid_model_has_no_more_shapes_than_the_engine_keeps(site: Path, count: int, is_valid: bool) -> None:
-    written(site, "from foosim.world.forms.forms import CONTACTS", MANY.format(count=count))
-    found = problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="bullet"))
-    assert any("a link with 17 boxes" in one for one in found) != is_valid, found
-    assert not found or not is_valid
+def test_a_rigid_model_has_as_many_shapes_as_it_likes_and_no_check_of_its_own(site: Path) -> None:
+    written(site, "from foosim.world.forms.forms import CONTACTS", MANY)
+    assert problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="mujoco")) == []
 
 
 @pytest.mark.parametrize(
@@ -342,7 +337,7 @@ def test_objects_and_rigid_drives_are_free_bodies(things: dict[str, Any], is_fre
     """Scenery may have a surface, and the engine must have its meshes."""
     robots = {"watcher": {"model": "holonomic", "at": {"x": "-5 m"}}, **things.get("robots", {})}
     ramp = {"shape": "box", "length": "6 m", "width": "4 m", "height": "20 cm", "x": "10 m", "z": "1 m"}
-    text = yard_text(robots, engine="bullet", objects=things.get("objects", {}), scenery={"ramp": ramp})
+    text = yard_text(robots, engine="mujoco", objects=things.get("objects", {}), scenery={"ramp": ramp})
     surface = "scenery.ramp.surface: a surface for free bodies, in a world without any, 'floor'"
     assert problems("scenery.ramp.surface=floor", text=text) == [surface] * (not is_free)
     no_meshes = "scenery.ramp.shape: the engine pure has no meshes"
@@ -353,7 +348,7 @@ def test_objects_and_rigid_drives_are_free_bodies(things: dict[str, Any], is_fre
 def test_objects_have_names_of_their_own() -> None:
     crate = "{model: box, size: [20 cm, 20 cm, 20 cm], mass: 1 kg, at: {x: 3 m, z: 10 cm}}"
     wall = "{shape: box, length: 1 m, width: 1 m, height: 1 m, x: -4 m, z: 1 m}"
-    text = yard_text({"a": {"model": "holonomic"}}, engine="bullet")
+    text = yard_text({"a": {"model": "holonomic"}}, engine="mujoco")
     assert problems(f"objects.b={crate}", f"scenery.c={wall}", text=text) == []
     for sets, what in (
         ([f"objects.a={crate}"], "objects: a name that is also one of robots, 'a'"),

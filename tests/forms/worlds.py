@@ -166,7 +166,7 @@ def _solids() -> dict[str, Any]:
         "seed": 1,
         "tick": "10 ms",
         "substeps": 2,
-        "engine": "bullet",
+        "engine": "mujoco",
         "pace": "fast",
         "scene": {"kind": "empty"},
         "objects": objects,
@@ -387,6 +387,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("kit", "hall"): World(HALL.data, ("hall",)),
     ("kit", "table"): World(TABLE.data, ("table",)),
     ("engine", "bullet"): TABLE.with_(("engine",), "bullet", ()),
+    ("engine", "mujoco"): SOLIDS,
     ("engine", "pure"): TABLE,
 }
 

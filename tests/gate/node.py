@@ -113,7 +113,7 @@ def _running_noise(planting: Planting) -> None:
 
 @register("no quarantine", "a result that cannot be is not taken", 5)
 def _no_quarantine(planting: Planting) -> None:
-    planting.swap(World, "plausible", lambda self, entities, numbers, before, tick: True)
+    planting.swap(World, "problem", lambda self, entity, numbers, before, tick: "")
 
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)

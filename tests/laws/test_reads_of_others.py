@@ -156,4 +156,7 @@ def test_a_state_that_cannot_be_is_said_once_with_what_it_is() -> None:
         TABLE.text(), NAME, 60, 2, settings=Settings(on_log=lambda *said: lines.append(str(said))), prepare=prepare
     )
     said = [line for line in lines if "quarantine" in line]
-    assert len(said) == 1 and "ball stands in quarantine from here on: its new state is not within" in said[0]
+    assert (
+        len(said) == 1
+        and "ball is in quarantine until a rule or an order ends it: its new state is not within" in said[0]
+    )

@@ -17,7 +17,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.run import deal_robots
-from foosim.world.assembly.rest import Rest, is_slow
+from foosim.world.assembly.rest import Rest, is_still
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.components.drives import Drives
 from foosim.world.frame import Frame
@@ -94,7 +94,8 @@ def stands_and_falls(stands: int, falls: int) -> None:
             return
         for number, name in enumerate(STACK):
             x, y, z = frame.vector(name, "position", 3)
-            assert z == pytest.approx(SIDE_M * (number + 0.5), abs=0.005), (frame.tick, name)
+            sunk = SIDE_M * (number + 0.5) - z
+            assert 0.0 <= sunk <= 0.001 * (number + 1), (frame.tick, name)
             assert abs(x) < 0.02 and abs(y) < 0.02, (frame.tick, name)
 
     one = run(stack(), stands + falls, 1, pushes, on_commit=watch)
@@ -123,13 +124,21 @@ def test_rest_that_is_not_in_the_frame_is_caught(monkeypatch: pytest.MonkeyPatch
     def stack_differs() -> bool:
         frames = Frames()
         one, last = run(stack(), 150, 1, on_commit=frames), frames.frames[-1]
-        assert all(is_slow(last.layout[name], last.numbers) for name in STACK)
+        speeds = [speed for name in STACK for speed in last.vector(name, "linear_velocity", 3)]
+        assert max(map(abs, speeds)) < 0.01, "it stands"
         return run(stack(), 150, 2, is_shuffled=True).digests != one.digests
 
     def count(self: Rest, bodies: Sequence[Entity], drives: Sequence[Drives], numbers: list[float]) -> None:
         memory = self.__dict__.setdefault("memory", {})
         for entity in bodies:
-            memory[entity.index] = memory.get(entity.index, 0) + 1 if is_slow(entity, numbers) else 0
+            at = entity.offsets["still_pose"]
+            numbers[at : at + 7] = memory.get((entity.index, "pose"), [0.0] * 7)
+            is_moved = not is_still(entity, numbers)
+            memory[entity.index] = 0 if is_moved else memory.get(entity.index, 0) + 1
+            if is_moved:
+                place = entity.offsets["position"]
+                memory[entity.index, "pose"] = numbers[place : place + 7]
+            numbers[at : at + 7] = [0.0] * 7
 
     def may_rest(self: Rest, bodies: Sequence[Entity], *_: object) -> bool:
         memory = self.__dict__.setdefault("memory", {})

@@ -84,7 +84,7 @@ def yard() -> str:
             "seed": 1,
             "tick": "10 ms",
             "substeps": 4,
-            "engine": "bullet",
+            "engine": "mujoco",
             "pace": "fast",
             "assets": "models",
             "scene": {"kind": "empty"},

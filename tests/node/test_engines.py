@@ -10,7 +10,6 @@ import pytest
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.physics.interface import Engine
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.forms.registry import names
 from foosim.world.layout import Layout, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector
@@ -21,7 +20,7 @@ TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 TABLE = load_deployment(TEXT, "table.yaml")
 LAYOUT = build_layout(TABLE)
 BALL, ROD = LAYOUT["ball"], LAYOUT["red.goal"]
-ENGINES = names("engine")
+ENGINES = ["bullet", "pure"]
 OFF = ((0.0, 0.0), (0.0, 0.0))
 
 
@@ -44,10 +43,6 @@ def tick(engine: Engine, layout: Layout, numbers: list[float], *rods: str) -> No
 def contacts(numbers: list[float], name: str = "ball") -> list[float]:
     start = LAYOUT[name].offsets["contacts"]
     return numbers[start : start + 3]
-
-
-def test_engines_are_those_of_the_deployment() -> None:
-    assert ENGINES == ["bullet", "pure"]
 
 
 def test_a_bounce_is_logged_once_with_its_impulse(engine: Engine) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.node.physics.interface import Island
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.rehearsal.resimulation import Replica
@@ -26,6 +27,7 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.parameters.table import table_of
+from tests.kinematic_yard import Yard, yard_text
 from tests.placing import place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -225,3 +227,56 @@ def test_quarantine_is_part_of_the_step() -> None:
     for closing in closings[1:]:
         assert replica.step(closing.edits, closing.delivered).digest == closing.digest, closing.frame.tick
     replica.close()
+
+
+# --- bodies of any kind ----------------------------------------------------------------------------------------------
+
+POST: Final = {"post": {"model": "holonomic", "at": {"x": "-9 m"}}}
+BOX: Final = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "speed_limit": "2 m/s"}
+
+
+class Apart(Yard):
+    """Each body is an island."""
+
+    def step(self, ticks: int = 1) -> None:
+        islands = tuple([(entity,) for entity in self.layout.entities])
+        solved = tuple(range(len(islands)))
+        for _ in range(ticks):
+            self.stepper.solve(self.engine, Work(self.tick, self.layout, islands, solved, self.numbers, {}))
+            self.tick += 1
+
+
+def test_a_body_is_solved_again_three_times_and_then_stays_out() -> None:
+    """Each time it stands still for a second, where it was; what fell from high is no failure, however fast it is."""
+    objects = {"a": {**BOX, "at": {"z": "40 m"}}, "b": {**BOX, "at": {"x": "3 m", "z": "1 m"}}}
+    yard = Apart(yard_text(POST, engine="mujoco", objects=objects))
+    yard.step(200)
+    assert yard.vector("a", "quarantined") == [0.0] and yard.vector("a", "linear_velocity")[2] < -19.0
+    solve = yard.engine.solve  # type: ignore[union-attr]
+
+    def failing(island: Island, numbers: list[float], start: Sequence[float]) -> None:
+        solve(island, numbers, start)
+        if island.bodies[0].name == "a":
+            yard.put("a", "position", nan)
+
+    yard.engine.solve = failing  # type: ignore[method-assign, union-attr]
+    marks, places, at = [], [], yard.vector("a", "position")
+    for _ in range(450):
+        yard.step()
+        marks.append(yard.vector("a", "quarantined")[0])
+        places.append(yard.vector("a", "position"))
+    assert all(place == at for place in places) and yard.vector("a", "linear_velocity") == [0.0] * 3
+    assert marks[-1] == 4.0 and len(yard.stepper.quarantined) == 4
+    assert "for 1 s, then it is solved again (3 of 3): its new position is nan" in yard.stepper.quarantined[2]
+    assert "is in quarantine until it is removed" in yard.stepper.quarantined[3]
+    assert yard.vector("b", "position")[2] == pytest.approx(0.1, abs=0.001), "the others go on"
+
+
+def test_a_body_that_can_be_solved_again_goes_on() -> None:
+    yard = Apart(yard_text(POST, engine="mujoco", objects={"a": {**BOX, "at": {"z": "2 m"}}}))
+    yard.put("a", "linear_velocity", 0.0, 0.0, 2_000.0)
+    yard.step(101)
+    assert yard.vector("a", "quarantined") == [-1.0]
+    yard.step(200)
+    assert yard.vector("a", "position")[2] == pytest.approx(0.1, abs=0.001)
+    assert "a part of it moves at up to 2000 m/s, at most 1000 m/s are computed" in yard.stepper.quarantined[0]

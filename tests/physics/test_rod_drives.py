@@ -1,6 +1,6 @@
 """Drives of rods against closed forms, by the whole way of a tick: a command is delivered, the world is solved.
 
-On each engine, and on Bullet's for islands, which computes a table that has boxes. Numbers are drawn by the seed.
+On each engine. Numbers are drawn by the seed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.physics.interface import IslandEngine
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import build_scene, initial_numbers
@@ -30,8 +29,6 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
 SEED: Final = 18
 STILL: Final = "table.gravity=0 m/s2"
-CRATE: Final = "objects={crate: {model: box, size: [5 cm, 5 cm, 5 cm], mass: 1 kg, at: {x: 2 m, y: 2 m, z: 2 m}}}"
-"""Couples its parts, as far as an engine knows; beside the table nothing meets it."""
 
 
 class Driven:
@@ -39,14 +36,13 @@ class Driven:
 
     def __init__(self, engine: str, actuator: str, *sets: str, rod: str = "red.goal", balls: int = 1) -> None:
         own = [f"robots.{rod}.actuators={{motors: {actuator}}}", *sets]
-        own += ["engine=pure"] if engine == "pure" else ["engine=bullet", *([CRATE] if engine == "islands" else [])]
+        own += [f"engine={engine}"]
         self.deployment = load_deployment(apply_sets(TEXT, TABLE.name, own), TABLE.name)
         self.layout = build_layout(self.deployment, [("also", "ball")][: balls - 1])
         self.rod, self.table = self.layout[rod], table_of(self.deployment)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.stepper = Stepper(self.deployment, self.layout)
         self.engine = make_engine(self.deployment, self.layout)
-        assert isinstance(self.engine, IslandEngine) == (engine == "islands")
         self.body = build_scene(self.deployment, self.layout).bodies[rod]
         self.loads = load_of(self.body, 0), load_of(self.body, 1)
         self.tick_s = self.deployment.tick_ns / 1e9
@@ -79,7 +75,7 @@ class Driven:
 
 
 Make = Callable[..., Driven]
-engines = pytest.mark.parametrize("engine", ["pure", "bullet", "islands"])
+engines = pytest.mark.parametrize("engine", ["pure", "bullet"])
 
 
 @engines
@@ -219,7 +215,7 @@ def test_no_drive_pushes_a_rod_beyond_its_stroke(driven: Make, engine: str, kind
             assert way * one.of("joint_positions")[0] == pytest.approx(stroke, abs=1e-4)
 
 
-@pytest.mark.parametrize("engine", ["bullet", "islands"])
+@pytest.mark.parametrize("engine", ["bullet"])
 def test_a_kick_is_that_of_a_free_rod_with_its_rotor(driven: Make, engine: str) -> None:
     """A motor without a current, at the voltage of its speed, adds nothing within the contact: the ball has (1 + e) w a
     / (1 + m a2 / I). Bullet's own motor would give it all that restores the speed, up to the limit of the current."""

@@ -21,7 +21,7 @@ from tests.placing import place_ball
 
 TOUCH: Final = "robots.blue.midfield.sensors={touch: {kind: figure_contact, rate: 100 Hz}}"
 NO_PLAYERS: Final = "players={}"
-engines = pytest.mark.parametrize("engine", ["pure", "bullet", "islands"])
+engines = pytest.mark.parametrize("engine", ["pure", "bullet"])
 
 
 def read(one: Driven, channel: str, robot: str | None = None) -> Any:

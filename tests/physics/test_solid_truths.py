@@ -10,12 +10,12 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
+import mujoco
 import pytest
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
-from foosim.node.physics.bullet_client import make_shape, p
-from foosim.node.physics.bullet_islands import BODIES, SCENERY, CompositionEngine, _Made
 from foosim.node.physics.interface import Island
+from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.world.bodies.inertia import turned
 from foosim.world.bodies.urdf import body_of, read_urdf
 from foosim.world.components.drives import NO_DRIVES, Drives, Motor
@@ -212,21 +212,21 @@ def test_the_energy_of_a_chain_stays(case: int) -> None:
 
 @pytest.mark.parametrize("case", range(3))
 def test_links_are_where_our_kinematics_put_them(case: int) -> None:
-    """Bullet's own poses of links, at drawn joint angles, against the one forward kinematics."""
+    """MuJoCo's own poses of links, at drawn joint angles, against the one forward kinematics."""
     body = chain(6)
     with solids(body, scenery=()) as one:
         angles = [draw(100 + 10 * case + number, -2.0, 2.0) for number in range(6)]
         one.set("arm", "joint_positions", *angles)
         ours = forward_kinematics(body, one["arm"], one.numbers)
-        one.solve(one.engine, one.entities, one.numbers.copy())
-        made = one.engine._made[0]
-        for joint, angle in zip(made.joints, angles, strict=True):
-            p.resetJointState(made.id, joint, angle, 0.0, one.engine._client)
-        for joint, (_, position, orientation) in zip(made.joints, ours, strict=True):
-            state = p.getLinkState(made.id, joint, computeForwardKinematics=1, physicsClientId=one.engine._client)
-            assert state[4] == pytest.approx(position, abs=1e-6)  # Bullet keeps axes as single floats
-            sign = 1.0 if state[5][3] * orientation[3] >= 0 else -1.0
-            assert [sign * part for part in state[5]] == pytest.approx(orientation, abs=1e-6)
+        island = Island((one["arm"],), (), (NO_DRIVES,))
+        one.engine.load(island, [body], one.numbers, one.numbers)
+        mujoco.mj_kinematics(one.engine.m, one.engine.d)
+        for index, (_, position, orientation) in enumerate(ours):
+            theirs = one.engine.d.body(f"b0.{index}")
+            assert theirs.xpos == pytest.approx(position, abs=1e-12)
+            w, x, y, z = theirs.xquat
+            sign = 1.0 if w * orientation[3] >= 0 else -1.0
+            assert [sign * x, sign * y, sign * z, sign * w] == pytest.approx(orientation, abs=1e-12)
 
 
 def test_a_centre_of_mass_away_from_the_origin_of_a_free_body() -> None:
@@ -340,7 +340,7 @@ def test_actuators_of_disjoint_joints_share_a_robot(kind: str, tmp_path: Path, m
     }
     cart = {"model": "urdf", "file": "cart.urdf", "fixed": True, "at": {"z": "1 m"}, "actuators": actuators}
     files = {"cart.urdf": f'<robot name="cart"><link name="foot"/>{PARTS}</robot>'.encode()}
-    yard = Yard(yard_text({"cart": cart}, engine="bullet", physics={"gravity": "1 m/s2"}), files)
+    yard = Yard(yard_text({"cart": cart}, engine="mujoco", physics={"gravity": "1 m/s2"}), files)
     yard.put("cart", "wheels.set_point", 2.0, -1.0)
     yard.put("cart", "arm.set_point", 0.5)
     yard.step(100)
@@ -456,7 +456,7 @@ def flying(case: int) -> tuple[Yard, QuadrotorRobot]:
     frame = {"mass": f"{mass:.6f} kg", "arm": f"{arm:.6f} m", "rotor_radius": f"{arm / 3:.6f} m"}
     settings = {**frame, "thrust_factor": float(thrust), "rotor_speed": "20000 rad/s", "at": {"z": "5 m"}}
     physics = {"gravity": f"{GRAVITY} m/s2"}
-    text = yard_text({"quad": {"model": "quadrotor", **settings}}, engine="bullet", substeps=4, physics=physics)
+    text = yard_text({"quad": {"model": "quadrotor", **settings}}, engine="mujoco", substeps=4, physics=physics)
     yard = Yard(text)
     found = yard.deployment.robots["quad"]
     assert isinstance(found, QuadrotorRobot)
@@ -539,25 +539,5 @@ def goes_with_the_wall(kind: type[CompositionEngine]) -> bool:
     return abs(first - 0.5) < 0.03 and abs(speed - 0.5) < 0.01 and abs(place - 0.65) < 0.005 and partner == 1.0
 
 
-class StaticMovers(CompositionEngine):
-    """Movers are rigid statics, as scenery is."""
-
-    def _make(self, body: Body, parking: Vector) -> _Made:
-        if any(link.mass > 0.0 for link in body.links):
-            return super()._make(body, parking)
-        made: int = p.createMultiBody(
-            baseMass=0.0,
-            baseCollisionShapeIndex=make_shape(self._client, body.links[0].shapes, placed=True),
-            useMaximalCoordinates=True,
-            physicsClientId=self._client,
-        )
-        return _Made(made, body, (), (), True, None, ((-1, BODIES | SCENERY),), {-1: 0}, parking)
-
-
 def test_a_mover_pushes_a_box() -> None:
     assert goes_with_the_wall(CompositionEngine)
-
-
-def test_a_mover_that_is_a_rigid_static_is_caught() -> None:
-    """Bullet takes no notice of the velocity of a rigid static: a box is pressed out of it, once it is in it."""
-    assert not goes_with_the_wall(StaticMovers)

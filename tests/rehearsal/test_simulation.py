@@ -159,7 +159,7 @@ def test_who_came_into_quarantine_is_said() -> None:
         too_fast = with_ball(simulation.deployment, simulation.frame, (0.0, 0.0, 0.0175), (100.0, 0.0, 0.0))
         simulation.reset(too_fast)
         simulation.step(ticks=2)
-        assert any("ball stands in quarantine from here on" in text for text in simulation.quarantined)
+        assert any("ball is in quarantine until" in text for text in simulation.quarantined)
         simulation.reset()
         assert simulation.quarantined == []
 

@@ -11,6 +11,7 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
+from foosim.capture.contents import library_versions
 from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.reader import CapturedTick, open_capture
 from foosim.capture.rows import OwnerRow
@@ -24,7 +25,7 @@ from foosim.node.physics.interface import Engine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify, verify_capture
+from foosim.replay.verify import Verified, verify, verify_capture
 from foosim.world.layout import Layout
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -153,6 +154,21 @@ def test_where_ticks_differ_the_command_says_that_the_arithmetic_does(tmp_path: 
     assert f"the capture's arithmetic is {epoch.arithmetic}, this machine's is {own}" in done.stderr
     shown = runner.invoke(app, ["info", str(path)])
     assert "\n  nodes n1, n2\n" in shown.stdout and f"\n  arithmetic {epoch.arithmetic}\n" in shown.stdout
+
+
+def test_another_version_of_an_engine_is_named_where_worlds_differ(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the library that the capture was made with, and of the one here."""
+    path = tmp_path / "run.mcap"
+    rehearse(TEXT, TABLE.name, 30, 1, ["engine=pure"], Settings(), capture=path)
+    there = library_versions()["mujoco-core"]
+    monkeypatch.setattr("foosim.replay.verify.library_versions", lambda: {**library_versions(), "mujoco-core": "4.0.9"})
+    verified = verify_capture(path)
+    assert verified.equal and verified.other_versions == (f"mujoco-core {there}, here 4.0.9",)
+    monkeypatch.setattr("foosim.replay.verify._compare", lambda *_: Verified(3, 1, b"", 3, ("ball",)))
+    done = CliRunner().invoke(app, ["verify", str(path)])
+    assert done.exit_code == 1 and f"the capture was made with mujoco-core {there}, here 4.0.9" in done.stderr
 
 
 def test_where_no_tick_differs_another_arithmetic_is_no_news(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def said(arm: str = ARM, *, folder: Path, objects: Any = None, **robot: Any) -> 
     (folder / "arm.urdf").write_text(arm)
     robots = {"arm": {"model": "urdf", "file": "arm.urdf", "fixed": True, "actuators": JOINTS, **robot}}
     try:
-        pin_assets(yard_text(robots, engine="bullet", objects=objects or {}), "yard.yaml", folder)
+        pin_assets(yard_text(robots, engine="mujoco", objects=objects or {}), "yard.yaml", folder)
     except Refused as error:
         return str(error)
     return ""
@@ -141,28 +141,11 @@ def test_actuators_share_a_robot_but_no_joint(case: str, tmp_path: Path) -> None
     assert found.partition("actuators.")[2] == what, found
 
 
-@pytest.mark.parametrize(
-    ("spare", "count", "what"),
-    [
-        ("", 17, "1: a link with 17 boxes, spheres, cylinders and capsules; at most 16 are valid, beside meshes, 'a'"),
-        ("", 16, ""),
-        ('<collision><geometry><mesh filename="s.obj"/></geometry></collision>', 16, ""),
-    ],
-)
-def test_a_link_has_no_more_shapes_than_the_engine_keeps(spare: str, count: int, what: str, tmp_path: Path) -> None:
-    """Of 17 in one link Bullet drops the last without a word."""
-    (tmp_path / "s.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n")
-    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
-    text = f'<robot name="r"><link name="a">{box * count}{spare}</link></robot>'
-    found = said(text, folder=tmp_path, actuators={})
-    assert found == (f"arm.urdf:{what}" if what else "")
-
-
 def test_an_engine_that_does_not_have_such_bodies(tmp_path: Path) -> None:
     box = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"x": "2 m", "z": "10 cm"}}
     text = yard_text({"base": {"model": "differential_drive"}}, engine="pure", objects={"crate": box})
     with pytest.raises(Refused) as refused:
         pin_assets(text, "yard.yaml", tmp_path)
-    what = "engine: the engine has no rigid bodies such as crate, a box (bullet has bodies of any kind), 'pure'"
+    what = "engine: the engine solves rods and balls of a table; objects.crate is a box, 'pure', nearest is 'mujoco'"
     assert str(refused.value).endswith(what)
-    pin_assets(text.replace("engine: pure", "engine: bullet"), "yard.yaml", tmp_path)
+    pin_assets(text.replace("engine: pure", "engine: mujoco"), "yard.yaml", tmp_path)

@@ -144,7 +144,7 @@ def test_a_rotorcraft_without_power_brakes_and_hovers() -> None:
 
 RIGID: Final = {
     "substeps": 2,
-    "engine": "bullet",
+    "engine": "mujoco",
     "physics": {"gravity": "10 m/s2"},
 }
 

@@ -31,7 +31,7 @@ def at(**place: str) -> dict[str, str]:
 
 
 def text_of(objects: dict[str, Any], robots: dict[str, Any] | None = None, **sections: Any) -> str:
-    return yard_text(robots or QUAD, engine="bullet", substeps=4, objects=objects, **sections)
+    return yard_text(robots or QUAD, engine="mujoco", substeps=4, objects=objects, **sections)
 
 
 def problems(text: str, folder: Path | None = None) -> list[str]:
@@ -155,18 +155,20 @@ def test_meshes_when_their_files_are_there(tmp_path: Path) -> None:
     assert problems(text, tmp_path) == ["robots.one.at: the robot starts in the rock, '0.9 m, 0 m, 0 m'"]
 
 
-def test_what_a_kit_brings_is_compared_with_what_it_does_not() -> None:
-    """Rods pass through the walls of their table, as the kit means it; a crate on it is beside all of that, or not."""
-
-    def on_the_table(**place: str) -> list[str]:
-        box = {"model": "box", "size": ["4 cm"] * 3, "mass": "100 g", "speed_limit": "5 m/s", "at": place}
-        try:
-            apply_sets((DEPLOY / "table.yaml").read_text(), "table.yaml", [f"objects.a={json.dumps(box)}"])
-        except DeploymentError as error:
-            return [problem.split(": ", 1)[1].split(" (")[0] for problem in error.problems]
-        return []
-
-    assert on_the_table(x="15 cm", z="2 cm") == []
-    assert on_the_table(x="15 cm", y="34 cm", z="2 cm") == ["objects.a.at: a starts 20 mm deep in the table"]
-    assert on_the_table(z="2 cm") == ["objects.a.at: a starts 35 mm deep in ball"]
-    assert on_the_table(x="522 mm", z="8 cm") == ["objects.a.at: a starts 30 mm deep in blue.goal"]
+def test_bodies_of_any_kind_beside_rods_are_refused_at_both_places() -> None:
+    """The engine of the one has none of the other."""
+    box = {
+        "model": "box",
+        "size": ["4 cm"] * 3,
+        "mass": "100 g",
+        "speed_limit": "5 m/s",
+        "at": {"x": "1 m", "z": "2 cm"},
+    }
+    text = (DEPLOY / "table.yaml").read_text()
+    with pytest.raises(DeploymentError) as refused:
+        apply_sets(text, "table.yaml", [f"objects.a={json.dumps(box)}"])
+    found = [problem.split(":", 1)[1].split(": ", 1)[1] for problem in refused.value.problems]
+    print(found)
+    assert len(found) == 2
+    assert any("a box, which no engine solves beside robots.red.goal, a rod" in problem for problem in found)
+    assert any("a rod, which no engine solves beside objects.a, a box" in problem for problem in found)

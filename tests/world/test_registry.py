@@ -253,7 +253,7 @@ def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
     assert names("modifier") == [
         *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
     ]
-    assert names("engine") == ["bullet", "pure"]
+    assert names("engine") == ["bullet", "mujoco", "pure"]
 
 
 @pytest.mark.parametrize("form", FORMS)

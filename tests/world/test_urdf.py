@@ -408,10 +408,6 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
         robot_text(more='\n<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'),
         "4: a jo",
     ),
-    "many links": (
-        robot_text("".join(f'<link name="n{number}"/>' for number in range(200))),
-        "2: 128 links; at most 127 are valid",
-    ),
     "two roots": (joined("ab"), r"2: 2 links that hang on none, there is one root: a \(line 2\), c \(line 2\)"),
     "two parents": (joined("ab", "ac", "bc"), r"5: a loop: c has two parents, by the joints ac \(line 4\) and bc"),
     "ring": (joined("ab", "bc", "ca"), "3: a loop: each link hangs on another one"),

@@ -190,13 +190,6 @@ class Assignment:
             shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
 
-    def approaching(self, numbers: Sequence[float], node: str, ticks: int) -> list[BodyIsland]:
-        """Return the islands that a node may have to solve within some ticks beside those of this one, the likely ones
-        first. No result follows from them."""
-        if not isinstance(self.reach, Volumes):
-            return []
-        return [island for island in self.reach.approaching(numbers, ticks) if self._solver_of_any(island) == node]
-
     def _solver_of_any(self, island: BodyIsland) -> str:
         if island.nearest:
             return self.owners[island.nearest]

@@ -6,7 +6,7 @@ A problem is a text without a place: a deployment names the robot, rule or kit t
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
 from foosim.common.finding import Finding, Location
@@ -17,6 +17,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     ROBOTS,
     Component,
+    Engine,
     EntityRule,
     Form,
     Kit,
@@ -297,3 +298,51 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
             if other is not one:
                 what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
                 yield Finding(one.location, what, slot.partition(".")[2], at="key")
+
+
+# --- engines ---------------------------------------------------------------------------------------------------------
+
+
+class _Rigid(NamedTuple):
+    """Where something rigid is declared, and what it is."""
+
+    location: tuple[str, ...]
+    what: str
+
+
+def engine_findings(spec: WorldSpec) -> Iterator[Finding]:
+    """Rigid bodies that the engine does not have, and those of which no engine has both."""
+    engine = registry.find("engine", spec.engine)
+    assert isinstance(engine, Engine), engine
+    body, rod = next(rigid_bodies(spec), None), next(_rods(spec), None)
+    if body is not None and rod is not None:
+        for one, other in ((body, rod), (rod, body)):
+            what = f"{one.what}, which no engine solves beside {'.'.join(other.location)}, {other.what}"
+            yield Finding(one.location, what, one.location[-1], at="key")
+    elif body is not None and not engine.islands:
+        what = f"the engine solves rods and balls of a table; {'.'.join(body.location)} is {body.what}"
+        yield Finding(("engine",), what, engine.name, "'mujoco'")
+    elif rod is not None and engine.islands:
+        what = f"the engine solves no rods and balls of a table; {'.'.join(rod.location)} is {rod.what}"
+        yield Finding(("engine",), what, engine.name, "'bullet'")
+
+
+def _rods(spec: WorldSpec) -> Iterator[_Rigid]:
+    """Yield the robots, or else the objects of kits, that are rods and balls of a table."""
+    for name, robot in spec.robots.items():
+        if (model := registry.model_of(robot)).shares_solve:
+            yield _Rigid(("robots", name), with_article(model.name))
+    for key in spec.kits:
+        kit = registry.find("kit", key)
+        for model_name in kit.entities.values() if isinstance(kit, Kit) else ():
+            if registry.find_model(model_name).shares_solve:
+                yield _Rigid((key,), with_article(model_name))
+
+
+def rigid_bodies(spec: WorldSpec) -> Iterator[_Rigid]:
+    """Yield the robots and objects that need an engine with bodies of any kind."""
+    for section, entities in (("robots", spec.robots), ("objects", spec.objects)):
+        for name, settings in entities.items():
+            model = registry.model_of(settings)
+            if model.is_rigid and model.couples:
+                yield _Rigid((section, name), with_article(model.name))

@@ -1,8 +1,10 @@
-"""Rest: an island whose bodies have all been slow for long is copied, not solved.
+"""Rest: an island whose bodies have not moved for long is copied, not solved.
 
-A hundred boxes that lie still would cost as much as a hundred that fall. Whether a body is at rest follows from its
-slot `slow_ticks`, so it is the same in all nodes, and after a restart. An island is solved while one of its bodies is
-not slow for long enough, is commanded, or has a mover in its way that moves.
+A hundred boxes that lie still would cost as much as a hundred that fall. A frame has the pose that each body had when
+it moved last (`still_pose`), and how many ticks it has stayed there (`still_ticks`): so rest is the same in all nodes,
+and after a restart. A speed would not do: a ball at its highest point is slow, and so is a pole just past its balance.
+An island is solved while one of its bodies has not been still for long enough, is commanded, or has a mover in its way
+that moves.
 """
 
 from __future__ import annotations
@@ -11,18 +13,20 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.world.components.drives import Drives
+from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
+from foosim.world.scene import conjugate, multiply
 from foosim.world.spec import WorldSpec
 
-SLOW_M_S: Final = 0.01
-SLOW_RAD_S: Final = 0.05
-"""Below these speeds a body is slow. A box that a substep's gravity lets settle is slower; one that begins to tip over
-is faster within the time of rest."""
-MAY_CHANGE: Final = frozenset(("slow_ticks", "partners", "refused", "clamped"))
+STILL_M: Final = 50e-6
+STILL_RAD: Final = 50e-6
+"""What stays within these of a pose is still. In the time of rest a box creeps by 22 um down a slope of 15 degrees; a
+ball on one of 0.05 degrees rolls by 760 um, a pole that is 2 mrad past its balance turns by 3 mrad."""
+MAY_CHANGE: Final = frozenset((STILL_TICKS, STILL_POSE, "partners", "refused", "clamped"))
 """Fields of a body at rest that may change: references follow their entities into another layout."""
 REST_NS: Final = 500_000_000
-"""How long all bodies of an island are slow before they are at rest."""
+"""How long all bodies of an island are still before they are at rest."""
 
 
 class Rest:
@@ -30,7 +34,7 @@ class Rest:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.ticks = -(-REST_NS // spec.tick_ns)
-        self._slots = {entity.index: entity.offsets["slow_ticks"] for entity in layout.resting}
+        self._slots = {entity.index: entity.offsets[STILL_TICKS] for entity in layout.resting}
 
     def may_rest(
         self, bodies: Sequence[Entity], movers: Sequence[Entity], numbers: Sequence[float], start: Sequence[float]
@@ -50,24 +54,26 @@ class Rest:
             numbers[at : at + 2] = 0.0, 0.0
 
     def count(self, bodies: Sequence[Entity], drives: Sequence[Drives], numbers: list[float]) -> None:
-        """Count the ticks for which bodies are slow after a tick, and stop those that come to rest with it."""
+        """Count the ticks for which bodies are still after a tick, and stop those that come to rest with it."""
         for entity, asked in zip(bodies, drives, strict=True):
             at = self._slots.get(entity.index)
             if at is None:
                 continue
-            if asked.is_moving or not is_slow(entity, numbers):
+            if asked.is_moving or not is_still(entity, numbers):
                 numbers[at] = 0.0
+                kept = entity.offsets[STILL_POSE]
+                numbers[kept : kept + entity.counts[STILL_POSE]] = _pose(entity, numbers)
                 continue
             numbers[at] += 1.0
             if numbers[at] == self.ticks:
-                _stop(entity, numbers)
+                stop(entity, numbers)
 
 
 def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
     """Begin to count anew for each body that an order or a rule of the world has changed."""
     old = before.numbers
     for entity in layout.resting:
-        at = entity.offsets["slow_ticks"]
+        at = entity.offsets[STILL_TICKS]
         if numbers[at] == 0.0 or entity.name not in before.layout:
             continue
         was = before.layout[entity.name]
@@ -77,22 +83,34 @@ def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
                 numbers[at] = 0.0
 
 
-def is_slow(entity: Entity, numbers: Sequence[float]) -> bool:
-    """Whether no part of a body moves faster than what counts as slow."""
+def _pose(entity: Entity, numbers: Sequence[float]) -> list[float]:
+    """Return what `still_pose` holds: position, orientation and the positions of joints, as far as there are such."""
     offsets = entity.offsets
-    if "linear_velocity" in offsets:
-        at, spin = offsets["linear_velocity"], offsets["angular_velocity"]
-        x, y, z = numbers[at : at + 3]
-        a, b, c = numbers[spin : spin + 3]
-        if x * x + y * y + z * z > SLOW_M_S * SLOW_M_S or a * a + b * b + c * c > SLOW_RAD_S * SLOW_RAD_S:
+    found: list[float] = []
+    for field in POSE:
+        at = offsets.get(field)
+        if at is not None:
+            found += numbers[at : at + entity.counts[field]]
+    return found
+
+
+def is_still(entity: Entity, numbers: Sequence[float]) -> bool:
+    """Whether a body is where its `still_pose` has it."""
+    at = entity.offsets[STILL_POSE]
+    kept, pose = numbers[at : at + entity.counts[STILL_POSE]], _pose(entity, numbers)
+    joints = 0
+    if "position" in entity.offsets:
+        joints = 7
+        a, b, c, x, y, z, w = pose[:7]
+        away = (a - kept[0]) * (a - kept[0]) + (b - kept[1]) * (b - kept[1]) + (c - kept[2]) * (c - kept[2])
+        u, v, t, _ = multiply(conjugate((kept[3], kept[4], kept[5], kept[6])), (x, y, z, w))
+        if away > STILL_M * STILL_M or 4.0 * (u * u + v * v + t * t) > STILL_RAD * STILL_RAD:
             return False
-    at = offsets.get("joint_velocities", -1)
-    if at < 0:
-        return True
-    return all(abs(speed) <= SLOW_RAD_S for speed in numbers[at : at + entity.counts["joint_velocities"]])
+    return all(abs(a - b) <= STILL_RAD for a, b in zip(kept[joints:], pose[joints:], strict=True))
 
 
-def _stop(entity: Entity, numbers: list[float]) -> None:
+def stop(entity: Entity, numbers: list[float]) -> None:
+    """Set the velocities of a body to 0."""
     for field in ("linear_velocity", "angular_velocity", "joint_velocities"):
         at = entity.offsets.get(field)
         if at is not None:

@@ -1,6 +1,7 @@
 """Bounding volumes of rigid bodies of any kind, and the islands that follow from them.
 
-The volume of a body is the box around its shapes, grown by its declared speed limit x tick; that of a body on a fixed
+The volume of a body is the box around its shapes, grown by its declared speed limit x tick, or by twice its present
+speed x tick where that is more; that of a body on a fixed
 base is the box around all that its joints let it reach. Bodies whose volumes overlap are an island. Movers (bodies that
 go on by a motion) are in no island: each island has those in whose way it is. Everything follows from the frame; only
 + - x / sqrt and comparisons, element by element, so that all CPUs agree.
@@ -11,13 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
+from math import sqrt
 from operator import itemgetter
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.assembly.rest import is_slow, moves
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -29,13 +30,12 @@ Numbers: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
+PRESENT_SPEED: Final = 2.0
+"""Within a tick a body gets no farther than at its declared speed limit, or at so many times its present speed."""
 FEW: Final = 16
 """Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
 SKIN_M: Final = 0.05
 """Which boxes may overlap is looked up anew when a side of one is this far from where it was then."""
-LOOKED_AT: Final = 64
-"""Bodies that a look ahead starts from, and islands that it finds."""
-
 X, Y, Z, W = range(4)
 ROTATION: Final = np.array(
     [
@@ -97,6 +97,8 @@ class Volumes:
         ]
         self._layout = layout
         self._entities = [entity for entity, _ in felt]
+        self.rows = {entity.index: row for row, entity in enumerate(self._entities)}
+        """The row of each entity in `boxes_at`."""
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
         self._free = np.array([row for row, _, _ in free], np.intp)
@@ -106,9 +108,11 @@ class Volumes:
         middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
         self._middles = np.array(middles).reshape(-1, 1, 3)
         self._halves = np.array(halves).reshape(-1, 1, 3)
-        self._ways = np.array([body.speed_limit * tick_s if body.is_free else 0.0 for _, body in felt])
-        """How far each body gets in a tick (m)."""
-        self._grown = np.array([[body.speed_limit * tick_s + MARGIN_M] for _, _, body in free])
+        self._moves = itemgetter(*[at for _, entity, _ in free for at in _move_places(entity)]) if free else None
+        """Returns the velocity and the spin of each free body."""
+        self._radii = np.array([radius_of(body) for _, _, body in free])
+        self._limits = np.array([body.speed_limit for _, _, body in free])
+        self._tick_s = tick_s
         self._boxes = np.zeros((len(felt), 2, 3))
         for row, (_, body) in enumerate(felt):
             if not body.is_free:
@@ -133,7 +137,7 @@ class Volumes:
 
         It is the same list as the last one where it is equal to that.
         """
-        boxes = self._boxes_at(numbers)
+        boxes = self.boxes_at(numbers)
         if self._near is None or not (np.abs(boxes - self._near.boxes) <= SKIN_M).all():
             self._near = _near(boxes)
         ones, others = self._near.ones, self._near.others
@@ -145,44 +149,6 @@ class Volumes:
         if found is not None and found != self._found[1]:
             self._found = pairs, found
         return self._found[1]
-
-    def approaching(self, numbers: Sequence[float], ticks: int) -> list[BodyIsland]:
-        """Return the islands that may come about within some ticks: two of the present ones together, or one with a
-        mover. Those come first whose volumes are nearest. At least one of the two moves.
-
-        Volumes grow by their declared speed limits x so many ticks. What moves is limited to the first `LOOKED_AT`
-        bodies and movers, so that a look costs little in any world.
-        """
-        present = self.islands(numbers)
-        boxes = self._boxes_at(numbers)
-        entities = self._entities
-        moving = [row for row, entity in enumerate(entities) if _is_fast(entity, numbers)][:LOOKED_AT]
-        if not moving:
-            return []
-        gaps = np.maximum(boxes[moving, None, 0] - boxes[None, :, 1], boxes[None, :, 0] - boxes[moving, None, 1])
-        gap = gaps.max(axis=2)
-        reach = self._ways * (ticks - 1)
-        near = (gap > 0.0) & (gap <= np.array(reach[moving])[:, None] + reach[None, :])
-        at, other = near.nonzero()
-        home = {index: number for number, island in enumerate(present) for index in island.entities}
-        homes, is_mover = np.array([home[entity.index] for entity in entities]), np.array(self._is_mover)
-        one, two = homes[moving][at], homes[other]
-        apart = np.flatnonzero((one != two) & ~(is_mover[moving][at] & is_mover[other]))
-        pairs = np.minimum(one, two)[apart] * len(present) + np.maximum(one, two)[apart]
-        ordered = pairs[np.lexsort((pairs, gap[at, other][apart]))]
-        nearest = ordered[np.sort(np.unique(ordered, return_index=True)[1])][:LOOKED_AT]
-        return [
-            self._together(present[pair // len(present)], present[pair % len(present)], numbers)
-            for pair in nearest.tolist()
-        ]
-
-    def _together(self, one: BodyIsland, other: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
-        """Return two islands as one; a mover, which is alone in its island, is in the way of the other."""
-        members = sorted([*one.entities, *other.entities])
-        bodies = [self._layout.entities[index] for index in members if self._layout.entities[index].is_rigid]
-        alone = {index for index in members if not self._layout.entities[index].is_rigid}
-        movers = tuple(sorted({*one.movers, *other.movers, *alone}))
-        return BodyIsland(tuple([entity.index for entity in bodies]), movers, self._nearest(bodies, numbers))
 
     def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
         if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice
@@ -217,7 +183,7 @@ class Volumes:
         found += [BodyIsland((index,), (), name) for index, name in self._alone]
         return sorted(found, key=lambda island: island.entities)
 
-    def _boxes_at(self, numbers: Sequence[float]) -> Numbers:
+    def boxes_at(self, numbers: Sequence[float]) -> Numbers:
         """Return the boxes of all bodies, shape (bodies, 2, 3): the least and the greatest coordinates."""
         boxes = self._boxes.copy()
         if self._poses is not None:
@@ -226,10 +192,20 @@ class Volumes:
             along = turned * self._middles
             spread = np.abs(turned) * self._halves
             middle = poses[:, :3] + (along[:, :, 0] + along[:, :, 1] + along[:, :, 2])
-            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown
+            half = spread[:, :, 0] + spread[:, :, 1] + spread[:, :, 2] + self._grown(numbers)
             boxes[self._free, 0] = middle - half
             boxes[self._free, 1] = middle + half
         return boxes
+
+    def _grown(self, numbers: Sequence[float]) -> Numbers:
+        """Return by how much the volumes of free bodies grow (m), shape (bodies, 1)."""
+        assert self._moves is not None
+        moves = np.array(self._moves(numbers)).reshape(-1, 2, 3)
+        square = moves * moves
+        lengths = np.sqrt(square[:, :, 0] + square[:, :, 1] + square[:, :, 2])
+        speeds = np.maximum(self._limits, PRESENT_SPEED * (lengths[:, 0] + lengths[:, 1] * self._radii))
+        grown: Numbers = (speeds * self._tick_s + MARGIN_M)[:, None]
+        return grown
 
     def _nearest(self, entities: Sequence[Entity], numbers: Sequence[float]) -> str:
         """Return the robot nearest to an object of an island, ties by name; the first robot without an object."""
@@ -279,15 +255,28 @@ def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     return sorted(map(tuple, pairs.tolist()))
 
 
-def _is_fast(entity: Entity, numbers: Sequence[float]) -> bool:
-    """Whether a body or a mover may get anywhere."""
-    return not is_slow(entity, numbers) if entity.is_rigid else moves(entity, numbers)
-
-
 def _pose_places(entity: Entity) -> list[int]:
     """Return the places of a free body's position and of its quaternion's parts."""
     at, turned = entity.offsets["position"], entity.offsets["orientation"]
     return [*range(at, at + 3), *range(turned, turned + 4)]
+
+
+def _move_places(entity: Entity) -> list[int]:
+    """Return the places of a free body's velocity and spin."""
+    at, spin = entity.offsets["linear_velocity"], entity.offsets["angular_velocity"]
+    return [*range(at, at + 3), *range(spin, spin + 3)]
+
+
+def reach_speed(speed_limit: float, present: float) -> float:
+    """Return the speed (m/s) with which a body may go on for a tick, from its promise and its present speed."""
+    return max(speed_limit, PRESENT_SPEED * present)
+
+
+def radius_of(body: Body) -> float:
+    """Return how far a part of a free body can be from its centre of mass (m)."""
+    middle, half = _own_box(body)
+    x, y, z = (abs(a) + b for a, b in zip(middle, half, strict=True))
+    return sqrt(x * x + y * y + z * z)
 
 
 def _own_box(body: Body) -> tuple[Vector, Vector]:

@@ -471,21 +471,18 @@ class World:
                 except BaseException as error:
                     raise component_error(f"rule {label}", entity.name, tick, error) from error
 
-    def plausible(
-        self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
-    ) -> bool:
-        """Whether the new, finite state of each of these entities can be."""
-        models = self.models
-        for entity in entities:
-            try:
-                is_plausible = models[entity.index].is_plausible(numbers, before)
-                if is_plausible is False:
-                    return False
-                if is_plausible is not True:
-                    raise WrongResult(models[entity.index].is_plausible, "True or False", is_plausible)
-            except BaseException as error:
-                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
-        return True
+    def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float], tick: int) -> str:
+        """Return in words why the new, finite state of an entity cannot be; empty where it can."""
+        model = self.models[entity.index]
+        if not hasattr(model, "is_plausible"):
+            return ""
+        try:
+            is_plausible = model.is_plausible(numbers, before)
+            if is_plausible is not True and is_plausible is not False:
+                raise WrongResult(model.is_plausible, "True or False", is_plausible)
+        except BaseException as error:
+            raise component_error(f"model {entity.model}", entity.name, tick, error) from error
+        return "" if is_plausible else "its new state is not within its bounds, speed limits and reach"
 
     def stir(self, numbers: list[float]) -> None:
         """Set a world at rest in motion, for the fixed small run that tells engines apart. Raises ComponentError."""

@@ -16,7 +16,6 @@ from functools import lru_cache
 from typing import Final
 
 from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
-from foosim.world.bodies.limits import size_problem
 from foosim.world.bodies.urdf_joints import JointPart, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, materials_of, mesh_paths, read_link
 from foosim.world.bodies.xml_tree import Element, read_xml
@@ -145,9 +144,6 @@ def _links(robot: Element, files: Mapping[str, bytes]) -> list[LinkPart]:
         shapes += len(link.shapes)
         if shapes > SHAPES_MAX:
             raise element.error(f"more than {SHAPES_MAX} collision shapes")
-        problem = size_problem([one.shapes for one in links.values()])
-        if problem:
-            raise element.error(problem, link.name)
     if not links:
         raise robot.error("a robot without links")
     if shapes == 0:

@@ -48,7 +48,9 @@ class Model(Protocol):
     `place_at(view, position, velocity)` sets it there (m, m/s, world frame), for models that can be added;
     `out_of_bounds(numbers)` says what is wrong with a state that no run should come to, empty if nothing is;
     `stir(view)` sets it in motion, for the fixed small run that tells engines apart;
-    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed, which is finite.
+    `derive(view)`, of a rigid model, writes the fields that follow from what the engine has computed, which is finite;
+    `is_plausible(numbers, before)` says whether its new, finite state can be: where it may be, within its speed limit
+    and its reach. What holds for any rigid body is checked beside it (`world.assembly.body_limits`).
     """
 
     def body(self) -> Body | None:
@@ -56,9 +58,6 @@ class Model(Protocol):
 
     def place(self, view: WritableView) -> None:
         """Set its fields to what they are at tick 0. All are 0 before, and references -1."""
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether its new, finite state can be: where it may be, within its speed limit and its reach."""
 
 
 class Motion(Protocol):

@@ -73,8 +73,12 @@ TOUCHES: Final[Mapping[str, int]] = MappingProxyType(
 """With whom the links of a jointed body were in contact in the last tick, of at most two with the greatest impulses in
 the order in which they began: how many contacts began; of each its partner, the index of the link, the place along the
 axis of the first joint, from that joint (m), the first and the last substep, and the impulse (N s)."""
-RESTING: Final[Mapping[str, int]] = MappingProxyType({"slow_ticks": 1})
-"""How many ticks a rigid body has been slow: bodies of an island that all have been for long are at rest."""
+STILL_TICKS: Final = "still_ticks"
+STILL_POSE: Final = "still_pose"
+POSE: Final = ("position", "orientation", "joint_positions")
+RESTING: Final[Mapping[str, int]] = MappingProxyType({STILL_TICKS: 1})
+"""How many ticks a rigid body has been still: bodies of an island that all have been for long are at rest. What has it
+has `still_pose` besides, of as many numbers as the fields of its pose: where it has stayed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,6 +267,11 @@ class Model(Form):
         return None if callable(self.slots) else self.slots
 
     @property
+    def shares_solve(self) -> bool:
+        """Whether it is a rod or a ball of a table: an engine solves all of these together."""
+        return self.is_rigid and not self.couples
+
+    @property
     def can_be_free(self) -> bool:
         """Whether its entities are rigid bodies that nothing holds, or some may be."""
         return self.is_rigid and (self.declared is None or LINEAR_VELOCITY in self.declared)
@@ -343,7 +352,7 @@ class Engine(Form):
     """What computes rigid bodies.
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`).
+    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table.
     """
 
     meshes: bool = False

@@ -72,12 +72,12 @@ class SurfaceSettings(SpecBase):
 
 class PhysicsSettings(SpecBase):
     """What all rigid bodies of a world feel: gravity (standard gravity by default, ISO 80000-3), and how often the
-    solver iterates at most over the contacts and joints of a substep. `contact_erp` is the share of an overlap that a
-    substep corrects.
+    solver iterates at most over the contacts and joints of a substep: a solve that is cut short may throw bodies about.
+    `contact_erp` is the share of an overlap that a substep corrects.
     """
 
     gravity: Gravity = default("9.80665 m/s2")
-    solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
+    solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 200
     contact_erp: Annotated[float, Field(ge=0, le=1)] = 0.05
 
 

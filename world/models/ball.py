@@ -94,7 +94,7 @@ class Ball:
 
     def out_of_bounds(self, numbers: Sequence[float]) -> str:
         """Return that it is out of the table or too fast, unless it is in quarantine."""
-        if numbers[self._at.slot("quarantined").at] != 0.0:
+        if numbers[self._at.slot("quarantined").at] > 0.0:
             return ""
         x, y, _ = numbers[self._position : self._position + 3]
         speed = sum(value * value for value in numbers[self._velocity : self._velocity + 3])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
 from typing import Final
 
 from foosim.common.exact_math import atan2
@@ -14,8 +13,8 @@ from foosim.world.moving.upright import Upright
 from foosim.world.moving.wheels import WheelMotors, Wheels, slips_of
 from foosim.world.parameters.differential import DifferentialDriveRobot, rigid_body
 from foosim.world.parameters.primitives import RIGID
-from foosim.world.parameters.vehicles import ROUNDING, body_of, is_in_reach, set_down, upright
-from foosim.world.scene import Body, Colour
+from foosim.world.parameters.vehicles import body_of, is_in_reach, set_down, upright
+from foosim.world.scene import Body, Colour, moved, rotate
 
 BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
 GREEN: Final[Colour] = (0.15, 0.55, 0.35, 1.0)
@@ -31,15 +30,13 @@ class RigidDifferentialDrive:
 
     def __init__(self, settings: DifferentialDriveRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at
-        self._position, self._orientation = at.slot("position").at, at.slot("orientation").at
-        self._velocity, self._spin = at.slot("linear_velocity").at, at.slot("angular_velocity").at
+        self._orientation = at.slot("orientation").at
         self._joints, self._rates = at.slot("joint_positions").at, at.slot("joint_velocities").at
         first = at.slot("heading")
         self._derived = Slot(first.at, sum(WHEELS.values()), f"{at.robot.name} {', '.join(WHEELS)}", first.is_own)
         """The fields of `WHEELS`, which follow one another."""
         self._tick_s = at.spec.tick_ns / 1e9
-        self._radius, self._speed_max = settings.wheel_radius, settings.speed_limit
-        self._way_max, self._reach = settings.speed_limit * self._tick_s * ROUNDING, settings.reach
+        self._radius = settings.wheel_radius
 
     def body(self) -> Body:
         """Return hull, wheels and casters."""
@@ -55,8 +52,9 @@ class RigidDifferentialDrive:
         """Set it to its start, on its wheels, at rest."""
         at, where = self._at, self._settings.at
         set_down(at, where, view)
-        x, y, z = where.position
-        view.write(at.slot("position"), x, y, z + self._settings.centre_height)
+        centre = rotate(where.orientation, (0.0, 0.0, self._settings.centre_height))
+        view.write(at.slot("position"), *moved(where.position, centre, 1.0))
+        view.write(at.slot("orientation"), *where.orientation)
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def derive(self, view: WritableView) -> None:
@@ -67,16 +65,6 @@ class RigidDifferentialDrive:
         left, right = numbers[self._rates : self._rates + 2]
         one, other = numbers[self._joints : self._joints + 2]
         view.write(self._derived, heading, left * radius, right * radius, one * radius, other * radius)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is within its reach, and no part of it faster than its speed limit."""
-        at, velocity, spin, most = self._position, self._velocity, self._spin, self._speed_max
-        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
-        vx, vy, vz = numbers[velocity : velocity + 3]
-        a, b, c = numbers[spin : spin + 3]
-        speed = sqrt(vx * vx + vy * vy + vz * vz) + sqrt(a * a + b * b + c * c) * self._reach
-        rims = max(abs(rate) for rate in numbers[self._rates : self._rates + 2]) * self._radius
-        return dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max and speed <= most and rims <= most
 
 
 @model(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.matter.materials import PLASTIC
-from foosim.world.parameters.primitives import RIGID, ROUNDING, SPIN_MAX
+from foosim.world.parameters.primitives import RIGID
 from foosim.world.parameters.rotors import QuadrotorRobot
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape
 
@@ -29,9 +28,6 @@ class Quadrotor:
 
     def __init__(self, settings: QuadrotorRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at
-        self._position, self._velocity = at.slot("position").at, at.slot("linear_velocity").at
-        self._spin = at.slot("angular_velocity").at
-        self._way_max = settings.speed_limit * at.spec.tick_ns / 1e9 * ROUNDING
 
     def body(self) -> Body:
         """Return the middle and the discs of its rotors."""
@@ -52,16 +48,3 @@ class Quadrotor:
         view.write(at.slot("position"), *self._settings.at.position)
         view.write(at.slot("orientation"), *self._settings.at.orientation)
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is within its speed limit and its reach."""
-        at, velocity, spin = self._position, self._velocity, self._spin
-        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
-        vx, vy, vz = numbers[velocity : velocity + 3]
-        a, b, c = numbers[spin : spin + 3]
-        most = self._settings.speed_limit
-        return (
-            dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max
-            and vx * vx + vy * vy + vz * vz <= most * most
-            and a * a + b * b + c * c <= SPIN_MAX * SPIN_MAX
-        )

@@ -115,6 +115,6 @@ class Rover:
     def out_of_bounds(self, numbers: Sequence[float]) -> str:
         """Return that it is in quarantine, or has a charge that it cannot have."""
         charge = numbers[self._at.slot("charge").at]
-        if numbers[self._at.slot("quarantined").at] != 0.0 or not 0.0 <= charge <= self._rover.battery.capacity:
+        if numbers[self._at.slot("quarantined").at] > 0.0 or not 0.0 <= charge <= self._rover.battery.capacity:
             return "is in quarantine, or has a charge that it cannot have"
         return ""

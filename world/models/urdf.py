@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from math import inf, sqrt
+from math import inf
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field, StringConstraints
@@ -19,20 +18,11 @@ from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
 from foosim.world.placing import At
-from foosim.world.scene import MOVING, Body, Link, enclosing, shape_box
+from foosim.world.scene import Body, Link
 from foosim.world.scenery import AssetPath
 from foosim.world.spec import WorldSpec
 
 SUFFIX: Final = ".urdf"
-WORLD_MAX_M: Final = 100e3
-"""No coordinate of a free robot is farther out, as none of a place in a deployment is."""
-STOP_DEPTH_RAD: Final = 0.1
-STOP_DEPTH_M: Final = 0.02
-"""How far a joint may be beyond its limits: its stops give way a little."""
-SPEED_FACTOR: Final = 10.0
-"""What pushes a joint may turn it faster than its motor does, by so much."""
-SPEED_MAX: Final = 1000.0
-"""The speed of a joint of which the file says none (rad/s)."""
 
 
 def _urdf_path(path: str) -> str:
@@ -49,8 +39,8 @@ Surface = Annotated[str, StringConstraints(min_length=1, max_length=48)]
 class UrdfRobot(RobotSettings):
     """A robot from a URDF file in the asset folder: `at` is the pose of its first link.
 
-    The base is held there if it is `fixed`, else the first link is free, and no part of the robot is ever faster than
-    `speed_limit`. `surface` is that of all its shapes.
+    The base is held there if it is `fixed`, else the first link is free, and `speed_limit` is how fast any part of the
+    robot usually is. `surface` is that of all its shapes.
     """
 
     file: UrdfPath
@@ -106,19 +96,6 @@ class Urdf:
             surface=settings.surface,
             speed_limit=settings.speed_limit,
         )
-        self._free = 0 if settings.fixed else at.slot("position").at
-        joints = self._body.joints
-        self._joints = at.slot("joint_positions").at if joints else 0
-        self._speeds = at.slot("joint_velocities").at if joints else 0
-        tick_s = at.spec.tick_ns / 1e9
-        self._bounds = tuple([_bounds(link) for link in joints])
-        self._ways = tuple([_speed_max(link) * tick_s for link in joints])
-        self._reach_m = settings.speed_limit * tick_s
-
-    @cached_property
-    def _arms(self) -> tuple[float, ...]:
-        """Of each link (`arms_of`): where robots are only placed, none of them is wanted."""
-        return arms_of(self._body)
 
     def body(self) -> Body:
         """Return links and shapes as the file says."""
@@ -135,44 +112,6 @@ class Urdf:
             view.write(at.slot("joint_positions"), *[_start(link) for link in body.joints])
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether its joints are within their limits and speeds, and a free one is neither too far nor too fast."""
-        for number, (low, high, speed) in enumerate(self._bounds):
-            at, moves = self._joints + number, numbers[self._speeds + number]
-            if not (low <= numbers[at] <= high and -speed <= moves <= speed):
-                return False
-            if abs(numbers[at] - before[at]) > self._ways[number]:
-                return False
-        return not self._body.is_free or self._is_free_plausible(numbers, before)
-
-    def _is_free_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        start = self._free
-        way = 0.0
-        for number in range(start, start + 3):
-            if abs(numbers[number]) > WORLD_MAX_M:
-                return False
-            way += (numbers[number] - before[number]) * (numbers[number] - before[number])
-        return way <= self._reach_m * self._reach_m and self._speed(numbers) <= self._settings.speed_limit
-
-    def _speed(self, numbers: Sequence[float]) -> float:
-        """Return a bound of how fast any part of it is (m/s): of each link, what its joints and the base can add up to.
-
-        What a turn adds is its speed times the farthest that anything beyond the joint is from it.
-        """
-        at = self._at
-        linear, angular = at.slot("linear_velocity").at, at.slot("angular_velocity").at
-        vx, vy, vz = numbers[linear : linear + 3]
-        wx, wy, wz = numbers[angular : angular + 3]
-        speeds = [sqrt(vx * vx + vy * vy + vz * vz) + sqrt(wx * wx + wy * wy + wz * wz) * self._arms[0]]
-        joint = self._speeds
-        for link, arm in zip(self._body.links[1:], self._arms[1:], strict=True):
-            own = 0.0
-            if link.joint in MOVING:
-                own = abs(numbers[joint]) * arm
-                joint += 1
-            speeds.append(speeds[link.parent] + own)
-        return max(speeds)
-
     def stir(self, view: WritableView) -> None:
         """Set it in motion, for the small run that tells engines apart."""
         if self._body.is_free:
@@ -185,37 +124,3 @@ def _start(link: Link) -> float:
     """Return where a joint starts: at 0, or at its limit that is nearest to it."""
     low, high = (-inf, inf) if link.joint == "continuous" else link.limits
     return min(max(0.0, low), high)
-
-
-def _speed_max(link: Link) -> float:
-    return SPEED_MAX if link.speed == inf else link.speed * SPEED_FACTOR
-
-
-def _bounds(link: Link) -> tuple[float, float, float]:
-    """Return the least and greatest position of a joint, and its greatest speed."""
-    depth = STOP_DEPTH_M if link.joint == "prismatic" else STOP_DEPTH_RAD
-    low, high = (-inf, inf) if link.joint == "continuous" else link.limits
-    return low - depth, high + depth, _speed_max(link)
-
-
-def arms_of(body: Body) -> tuple[float, ...]:
-    """Return of each link by how much at most a part beyond its joint moves, per unit of the joint's speed.
-
-    For a joint that turns that is how far from its place the shapes beyond it can be (m), for the first link from its
-    centre of mass; for one that slides it is 1. Links without a joint that moves have what is beyond them.
-    """
-    reach = [0.0] * len(body.links)
-    for number in range(len(body.links) - 1, -1, -1):
-        link = body.links[number]
-        if link.shapes:
-            low, high = enclosing([shape_box(shape) for shape in link.shapes])
-            x, y, z = (max(abs(low[axis]), abs(high[axis])) for axis in range(3))
-            reach[number] = max(reach[number], sqrt(x * x + y * y + z * z))
-        if link.parent >= 0:
-            x, y, z = link.position
-            slides = max(abs(way) for way in link.limits) if link.joint == "prismatic" else 0.0
-            beyond = reach[number] + slides + sqrt(x * x + y * y + z * z)
-            reach[link.parent] = max(reach[link.parent], beyond)
-    x, y, z = body.links[0].centre_of_mass
-    first = reach[0] + sqrt(x * x + y * y + z * z)
-    return (first, *[1.0 if link.joint == "prismatic" else reach[n] for n, link in enumerate(body.links) if n > 0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import pi, sqrt
+from math import pi
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import model_validator
@@ -16,7 +16,8 @@ from foosim.world.bodies.inertia import solid
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT, FRICTIONLESS
 from foosim.world.parameters.hall_bodies import DARK, mast
-from foosim.world.parameters.vehicles import Acceleration, Slip, Speed, TurnRate, Vehicle, mark_of
+from foosim.world.parameters.vehicles import Acceleration, Slip, Speed, TurnRate, Vehicle, leaning, mark_of
+from foosim.world.placing import ORIGIN_OF_WORLD, At
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Sphere, Vector, turn
 
 Track = Annotated[float, Quantity(units.LENGTH, "1 cm", "20 m")]
@@ -56,12 +57,13 @@ class DifferentialDriveRobot(Vehicle):
     With `dynamics: rigid` it is a rigid body: a hull, `clearance` above the floor, of `mass` less twice `wheel_mass`;
     two wheels, whose motors have at most `torque` each; and two balls without friction in casters, ahead and behind. A
     `bumper` is a plate of that width ahead, without a mass of its own. `surface` is that of hull and bumper, `tyres`
-    that of the wheels. No part of it is ever faster than `speed_limit`: a robot that is comes into quarantine.
+    that of the wheels. `speed_limit` is how fast any part of it usually is; it may start with a pitch and a roll.
 
     The sizes are those of usual research robots; they slip on clean floors by less than can be seen.
     """
 
     dynamics: Literal["kinematic", "rigid"] = "kinematic"
+    at: At = ORIGIN_OF_WORLD
     track: Track = default("40 cm")
     speed: Speed = default("1 m/s")
     acceleration: Acceleration = default("1 m/s2")
@@ -80,6 +82,8 @@ class DifferentialDriveRobot(Vehicle):
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
+        if self.dynamics != "rigid" and (leans := leaning(self.at)):
+            raise custom_error(leans)
         problem = next(self._problems(), "")
         if problem:
             raise custom_error(BadValue(problem))
@@ -117,14 +121,6 @@ class DifferentialDriveRobot(Vehicle):
     def centre_height(self) -> float:
         """How high the centre of mass of the hull is above the underside of the wheels (m)."""
         return (self.height + self.clearance) / 2.0
-
-    @property
-    def reach(self) -> float:
-        """How far any part of it can be from the centre of mass of its hull (m)."""
-        ahead = self.radius + (0.0 if self.bumper is None else 2.0 * BUMPER_HALF_M)
-        aside = self.radius if self.bumper is None else max(self.radius, self.bumper / 2.0)
-        above = max(self.height, self.antenna_height)
-        return sqrt(ahead * ahead + aside * aside + above * above)
 
 
 def rigid_body(its: DifferentialDriveRobot, name: str, colour: Colour) -> Body:

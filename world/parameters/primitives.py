@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Final
 
 from pydantic import Field
@@ -35,8 +35,8 @@ RIGID: Final = {**BODY, **CONTACTS, **PARTNERS, **RESTING, "quarantined": 1}
 class ObjectSettings(EntitySettings):
     """A rigid object: where it is at tick 0 (its middle), its mass, the surface that others feel, its looks.
 
-    No part of it is ever faster than `speed_limit`: one that is comes into quarantine. Bodies within twice the way that
-    this is in a tick are solved together, so a limit that is near what happens makes a world cheap.
+    `speed_limit` is how fast any part of it usually is. Bodies within twice the way that this is in a tick are solved
+    together, so a limit that is near what happens makes a world cheap; a faster body is solved with those farther away.
     """
 
     at: At = Field(default_factory=lambda: At.model_validate({}))
@@ -59,10 +59,6 @@ class RigidObject:
         self._settings, self._at, self._geometry = settings, at, geometry
         whole = solid(geometry, settings.mass)
         self._centre, (self._moments, self._axes) = whole.centre, principal_of(whole.tensor)
-        self._position, self._velocity = at.slot("position").at, at.slot("linear_velocity").at
-        self._spin = at.slot("angular_velocity").at
-        self._speed_max = settings.speed_limit
-        self._way_max = settings.speed_limit * at.spec.tick_ns / 1e9 * ROUNDING
 
     def body(self) -> Body:
         """Return the shape."""
@@ -85,15 +81,3 @@ class RigidObject:
         """Push and turn it, for the small run that tells engines apart."""
         view.write(self._at.slot("linear_velocity"), 0.3, 0.2, 0.1)
         view.write(self._at.slot("angular_velocity"), 0.5, -0.3, 1.0)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is within its speed limit and its reach."""
-        at, velocity, spin = self._position, self._velocity, self._spin
-        dx, dy, dz = (numbers[at + axis] - before[at + axis] for axis in range(3))
-        vx, vy, vz = numbers[velocity : velocity + 3]
-        a, b, c = numbers[spin : spin + 3]
-        return (
-            dx * dx + dy * dy + dz * dz <= self._way_max * self._way_max
-            and vx * vx + vy * vy + vz * vz <= self._speed_max * self._speed_max
-            and a * a + b * b + c * c <= SPIN_MAX * SPIN_MAX
-        )

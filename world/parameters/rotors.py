@@ -26,7 +26,7 @@ class QuadrotorRobot(RobotSettings):
 
     `arm` is from the middle to a rotor; `thrust_factor` (N s2) and `drag_factor` (N m s2) are those of each rotor,
     whose speed is at most `rotor_speed`. Defaults are of an airframe of 1.5 kg that hovers at half of its greatest
-    thrust. No part of it is ever faster than `speed_limit`.
+    thrust. `speed_limit` is how fast any part of it usually is.
     """
 
     at: At = Field(default_factory=lambda: At.model_validate({}))

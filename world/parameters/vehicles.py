@@ -34,10 +34,17 @@ HULL: Final = DEFAULT
 """The surface of robots without rigid-body dynamics."""
 
 
-def _is_upright(at: At) -> At:
+def leaning(at: At) -> BadValue | None:
+    """Return what is wrong with a place for what stands upright."""
     for key, angle in (("roll", at.roll), ("pitch", at.pitch)):
         if angle != 0.0:
-            raise custom_error(BadValue(f"what stands upright has no {key}", f"{angle:g} rad"))
+            return BadValue(f"what stands upright has no {key}", f"{angle:g} rad")
+    return None
+
+
+def _is_upright(at: At) -> At:
+    if problem := leaning(at):
+        raise custom_error(problem)
     return at
 
 

@@ -143,7 +143,7 @@ class Football:
         """A ball beyond the walls or below the floor for long enough returns to the spot; so does one in quarantine."""
         numbers = view.numbers
         inside = abs(x) <= self._end_x_m and abs(y) <= self._side_y_m and z > 0.0
-        out = 0.0 if inside and numbers[ball.quarantined] == 0.0 else numbers[ball.out.at] + 1.0
+        out = 0.0 if inside and numbers[ball.quarantined] <= 0.0 else numbers[ball.out.at] + 1.0
         if out != numbers[ball.out.at]:
             view.write(ball.out, out)
             if out >= self._out_ticks:

@@ -1,0 +1,224 @@
+"""Contacts and rest of bodies of any kind against closed forms, at values drawn by a fixed seed.
+
+Sliding in any course, thin plates, what is carried, a grip, slopes and stacks over a minute, what is slow and moves.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, degrees, dist, hypot, pi, radians, remainder, sin
+from random import Random
+from typing import Any, Final
+
+import pytest
+
+from foosim.node.physics.interface import Island
+from foosim.node.physics.mujoco_islands import CompositionEngine
+from foosim.node.tick import Work
+from foosim.world.components.drives import NO_DRIVES, Drives, Motor
+from foosim.world.matter.physics import Side
+from foosim.world.scene import ORIGIN, Body, Box, Link, turn
+from tests.kinematic_yard import Yard, yard_text
+from tests.solids import GRAVITY, TICK_S, Solids, ball, box, physics, shape
+
+SEED: Final = 34
+Y: Final = (0.0, 1.0, 0.0)
+Z: Final = (0.0, 0.0, 1.0)
+MINUTE: Final = 6_000
+
+
+@pytest.mark.parametrize("case", range(8))
+def test_a_box_slides_in_a_line_as_far_as_its_friction_lets_it(case: int) -> None:
+    """Whatever its course and its yaw are: v^2 / (2 mu g), in the direction of its speed."""
+    draw = Random(SEED * 100 + case)
+    half = draw.choice(((0.3, 0.3, 0.05), (0.1, 0.1, 0.1), (0.15, 0.08, 0.1)))
+    mu, speed, course = draw.uniform(0.2, 0.8), draw.uniform(1.0, 3.0), draw.uniform(-pi, pi)
+    one = Solids([box("a", half, 2.0)], physics(floor=Side(0.0, mu), default=Side(0.0, 1.0)))
+    velocity = speed * cos(course), speed * sin(course), 0.0
+    one.put("a", (0.0, 0.0, half[2]), turn(Z, draw.uniform(-pi, pi)), velocity)
+    one.run(400)
+    x, y, _ = one.get("a", "position")
+    way, turned = hypot(x, y), degrees(remainder(atan2(y, x) - course, 2 * pi))
+    print(f"{way:.4f} m, {turned:.2f} degrees beside its course")
+    assert way == pytest.approx(speed * speed / (2 * mu * GRAVITY), rel=0.02)
+    assert abs(turned) < 1.0
+
+
+@pytest.mark.parametrize("case", range(8))
+def test_a_ball_stays_on_a_plate_of_a_millimetre(case: int) -> None:
+    """As long as it goes no farther than its radius in a substep."""
+    draw = Random(SEED * 200 + case)
+    radius, substeps = draw.uniform(0.01, 0.05), draw.choice((2, 4, 10))
+    speed = 0.9 * radius / (TICK_S / substeps)
+    plate = shape(Box((0.5, 0.5, 0.0005)), "floor")
+    one = Solids([ball("a", radius, 0.1)], scenery=(plate,), substeps=substeps)
+    one.put("a", (0.0, 0.0, radius + draw.uniform(0.001, 0.1)), velocity=(0.0, 0.0, -speed))
+    one.run(200)
+    assert one.get("a", "position")[2] == pytest.approx(radius + 0.0005, abs=0.001)
+
+
+def test_each_of_many_shapes_of_a_link_is_felt() -> None:
+    """A bar of forty boxes: a ball lies on the last one."""
+    boxes = tuple([shape(Box((0.05, 0.05, 0.05)), position=(0.1 * number, 0.0, 0.0)) for number in range(40)])
+    bar = Body("bar", "bar", (0.0, 0.0, 1.0), (Link("bar", "fixed", boxes, 1.0, (0.1,) * 3),))
+    one = Solids([ball("a", 0.05, 0.1), bar], scenery=())
+    one.put("a", (3.9, 0.0, 1.11))
+    one.run(100)
+    assert one.get("a", "position")[2] == pytest.approx(1.1, abs=0.001)
+
+
+def test_a_tower_of_four_hundred_boxes_lands_in_one_piece() -> None:
+    """Sixteen layers of 25, 2 cm apart, fall on one another: nothing is thrown about."""
+    draw = Random(SEED)
+    names = [f"b{number:03}" for number in range(400)]
+    one = Solids([box(name, (0.1, 0.1, 0.1), 1.0) for name in names], substeps=2)
+    for number, name in enumerate(names):
+        x, y = (0.22 * place + draw.uniform(-0.01, 0.01) for place in (number % 5, number // 5 % 5))
+        one.put(name, (x, y, 0.15 + 0.22 * (number // 25)))
+    fastest = 0.0
+    for _ in range(45):
+        one.run(1)
+        fastest = max(fastest, *[dist(ORIGIN, one.get(name, "linear_velocity")) for name in names])
+    assert fastest < 3.0, "16 gaps of 2 cm: 2.8 m/s in free fall"
+
+
+def test_a_mover_carries_what_stands_on_it() -> None:
+    """At 0.5 m/s for 4 s: a box on top goes along, after what it slides until it has the speed, v^2 / (2 mu g)."""
+    top = Body("m", "mover", ORIGIN, (Link("m", "free", (shape(Box((0.5, 0.5, 0.1))),), 0.0, ORIGIN),))
+    one = Solids([box("a", (0.1, 0.1, 0.1), 1.0), top], scenery=())
+    engine = CompositionEngine(one.feel, TICK_S / one.substeps, one.substeps, (), one.bodies[:1], one.bodies[1:])
+    one.put("a", (0.0, 0.0, 0.3))
+    for tick in range(400):
+        one.put("m", (0.5 * TICK_S * tick, 0.0, 0.1), velocity=(0.5, 0.0, 0.0))
+        island = Island((one.entities[0],), (one.entities[1],), (NO_DRIVES,))
+        engine.load(island, one.bodies, one.numbers, one.numbers)
+        engine.step(island)
+        engine.read(island, one.numbers)
+    x, _, z = one.get("a", "position")
+    assert x == pytest.approx(2.0 - 0.25 / (2 * 0.5 * GRAVITY), abs=0.01)
+    assert z == pytest.approx(0.3, abs=0.001) and one.get("a", "partners")[0] == 1.0
+
+
+def test_a_box_in_a_moving_grip_does_not_slip() -> None:
+    """Two fingers hold 200 g with 8 N each, and shake it for 10 s: by less than 2 mm."""
+    finger = shape(Box((0.01, 0.02, 0.04)))
+    links = [Link("lift", "prismatic", (), 1.0, (0.01,) * 3, axis=Z, limits=(-1.0, 1.0))]
+    for name, x in (("left", -0.06), ("right", 0.06)):
+        about = {"axis": (1.0, 0.0, 0.0), "limits": (-0.05, 0.05), "parent": 0, "position": (x, 0.0, 0.0)}
+        links.append(Link(name, "prismatic", (finger,), 0.1, (0.001,) * 3, **about))  # type: ignore[arg-type]
+    grip = Body("grip", "grip", (0.0, 0.0, 1.0), tuple(links))
+    one = Solids([box("a", (0.04, 0.04, 0.04), 0.2), grip], physics(default=Side(0.0, 0.9)), scenery=())
+    one.put("a", (0.0, 0.0, 1.0))
+    for tick in range(1_100):
+        lift = 0.3 * sin(pi * (tick - 100) * TICK_S) if tick >= 100 else 0.0
+        one.drives["grip"] = Drives((Motor(lift, 200.0), Motor(0.5, 8.0), Motor(-0.5, 8.0)))
+        one.run(1)
+        if tick == 99:
+            held = one.get("a", "position")[2] - one.get("grip", "joint_positions")[0]
+    slipped = abs(one.get("a", "position")[2] - one.get("grip", "joint_positions")[0] - held)
+    print(f"slipped by {slipped * 1e3:.2f} mm")
+    assert slipped < 0.002
+
+
+# --- rest ------------------------------------------------------------------------------------------------------------
+
+
+class Together(Yard):
+    """All rigid bodies as one island."""
+
+    def step(self, ticks: int = 1) -> None:
+        everybody = tuple(self.layout.entities)
+        solved = tuple(entity.index for entity in everybody)
+        for _ in range(ticks):
+            work = Work(self.tick, self.layout, (everybody,), solved, self.numbers, {})
+            self.stepper.solve(self.engine, work)
+            self.tick += 1
+        assert self.stepper.quarantined == []
+
+
+PLANK: Final = {"shape": "box", "length": "8 m", "width": "4 m", "height": "20 cm", "z": "1 m"}
+POST: Final[dict[str, Any]] = {"model": "holonomic", "at": {"x": "-20 m"}}
+
+
+def world(gravity: float, robots: dict[str, Any] | None = None, **sections: Any) -> Together:
+    """A yard beside a robot that stands still."""
+    felt = {"gravity": f"{gravity} m/s2"}
+    text = yard_text({"post": POST, **(robots or {})}, engine="mujoco", substeps=4, physics=felt, **sections)
+    return Together(text, {"pole.urdf": POLE})
+
+
+def one_box(**place: str) -> dict[str, Any]:
+    return {"a": {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": place}}
+
+
+def test_what_falls_slowly_goes_on_falling() -> None:
+    """At 15 mm/s2, which a threshold of speed takes for rest after 0.7 s."""
+    yard = world(0.015, objects=one_box(z="1 m"))
+    yard.step(300)
+    assert yard.vector("a", "position")[2] == pytest.approx(1.0 - 0.015 * 9.0 / 2, abs=0.001)
+
+
+def test_what_drifts_slowly_goes_on_drifting() -> None:
+    yard = world(0.0, objects=one_box(z="1 m"))
+    yard.put("a", "linear_velocity", 0.0099, 0.0, 0.0)
+    yard.step(500)
+    assert yard.vector("a", "position")[0] == pytest.approx(0.0099 * 5.0, rel=1e-6)
+
+
+def test_a_ball_at_its_highest_point_rolls_back() -> None:
+    """On a slope of 0.05 degrees it is slow for seconds: 5/7 g sin(a) is 6 mm/s2."""
+    slope = {
+        "slope": {"shape": "box", "length": "8 m", "width": "4 m", "height": "20 cm", "z": "1 m", "pitch": "0.05 deg"}
+    }
+    ball_on = {"a": {"model": "sphere", "radius": "10 cm", "mass": "1 kg", "at": {"z": "1.2 m"}}}
+    yard = world(GRAVITY, objects=ball_on, scenery=slope)
+    yard.step(20)
+    yard.put("a", "linear_velocity", -0.02, 0.0, 0.0)
+    yard.put("a", "angular_velocity", 0.0, -0.2, 0.0)
+    places = []
+    for _ in range(100):
+        yard.step(10)
+        places.append(yard.vector("a", "position")[0])
+    assert min(places) < -0.02 and places[-1] > 0.05, "it goes up, and down again"
+
+
+POLE: Final = b"""<robot name="pole"><link name="foot"/>
+<link name="rod"><inertial><origin xyz="0 0 0.5"/><mass value="1"/>
+<inertia ixx="0.08" iyy="0.08" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 1"/><geometry><sphere radius="0.02"/></geometry></collision></link>
+<joint name="pivot" type="continuous"><parent link="foot"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_a_pole_just_past_its_balance_falls() -> None:
+    """By 2 mrad: what it turns grows by e every 0.26 s."""
+    pole = {"model": "urdf", "file": "pole.urdf", "fixed": True, "at": {"z": "2 m"}, "actuators": {}}
+    yard = world(GRAVITY, {"pole": pole})
+    yard.put("pole", "joint_positions", 0.002)
+    yard.step(300)
+    assert abs(yard.vector("pole", "joint_positions")[0]) > 1.0
+
+
+def test_a_box_on_a_slope_of_15_degrees_and_a_stack_of_ten_stay_for_a_minute() -> None:
+    """They come to rest, without creep: they are where they were after 10 s, to the last bit."""
+    slope = {
+        "slope": {
+            "shape": "box",
+            "length": "4 m",
+            "width": "4 m",
+            "height": "20 cm",
+            "x": "9 m",
+            "z": "1 m",
+            "pitch": "15 deg",
+        }
+    }
+    objects = {f"b{n}": {**one_box(x="0 m", y=f"{(-1) ** n * 2} mm", z=f"{0.1 + 0.2 * n} m")["a"]} for n in range(10)}
+    angle, away = radians(15.0), 0.2
+    on_it = {"x": f"{9 + away * sin(angle)} m", "z": f"{1 + away * cos(angle)} m", "pitch": "15 deg"}
+    yard = world(GRAVITY, objects=objects | {"c": one_box(**on_it)["a"]}, scenery=slope)
+    yard.step(10)
+    began = yard.vector("c", "position")
+    yard.step(290)
+    assert dist(began, yard.vector("c", "position")) < 0.001
+    yard.step(700)
+    rest = list(yard.numbers)
+    yard.step(MINUTE - 1_000)
+    assert yard.numbers == rest
