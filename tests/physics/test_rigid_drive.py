@@ -87,6 +87,18 @@ def test_its_motors_accelerate_it_by_their_torque() -> None:
     assert one.vector("bot", "joint_efforts") == pytest.approx([1.0, 1.0], rel=0.01)
 
 
+def test_on_little_friction_its_wheels_slip_and_push_as_that_allows() -> None:
+    """The wheels have the commanded speed after a tenth of a second; the robot, which leans on a caster, gains at most
+    mu g, and at least what the wheels carry of it."""
+    slippery = {"surfaces": {"floor": {"friction": 0.05}}}
+    one = yard(slippery, acceleration="10 m/s2", torque="20 N m")
+    told(one, 1.0, 0.0, 100)
+    mu = 0.05 * 0.8
+    assert one.vector("bot", "wheel_speeds") == pytest.approx([1.0, 1.0], rel=0.01)
+    print(one.vector("bot", "linear_velocity"))
+    assert 0.9 * mu * GRAVITY < one.vector("bot", "linear_velocity")[0] <= 1.02 * mu * GRAVITY
+
+
 BLOCK_M: Final = 0.06
 """How high the block is that a bumper, 2 cm above the floor, meets."""
 
