@@ -148,8 +148,10 @@ def test_a_pendulum_swings_with_its_period(case: int) -> None:
 
 
 def test_a_double_pendulum_swings_as_its_equations_say() -> None:
-    """Two points on rods without a mass, against Lagrange's equations integrated by scipy to 1e-10, for 1.5 s: the error
-    is that of the semi-implicit rule, which is half as large for half of the substep."""
+    """Two points on rods without a mass, against Lagrange's equations, integrated by scipy to 1e-10, for 1.5 s.
+
+    The error is that of the semi-implicit rule: it is half as large for half of the substep.
+    """
     l1, l2, m1, m2 = draw(95, 0.3, 1.0), draw(96, 0.3, 1.0), draw(97, 0.5, 2.0), draw(98, 0.5, 2.0)
     upper, lower = pendulum(l1, m1).links[0], pendulum(l2, m2).links[0]
     links = upper, replace(lower, name="lower", parent=0, position=(0.0, 0.0, -l1))
