@@ -43,6 +43,24 @@ def test_a_box_slides_in_a_line_as_far_as_its_friction_lets_it(case: int) -> Non
     assert abs(turned) < 1.0
 
 
+@pytest.mark.parametrize("substeps", [1, 2, 4, 20])
+@pytest.mark.parametrize("case", range(3))
+def test_a_rebound_has_the_restitution_at_any_substep(case: int, substeps: int) -> None:
+    """Of 0.5 to 10 ms, within 10 %."""
+    draw = Random(SEED * 300 + 10 * case + substeps)
+    bounce = draw.uniform(0.1, 0.9)
+    feel = physics(ball=Side(1.0, 0.0), floor=Side(bounce, 0.0))
+    one = Solids([ball("a", 0.1, 1.0, "ball")], feel, substeps=substeps)
+    one.put("a", (0.0, 0.0, 0.5), velocity=(0.0, 0.0, -draw.uniform(1.0, 4.0)))
+    before = now = 0.0
+    while now <= 0.0:
+        before = now
+        one.run(1)
+        now = one.get("a", "linear_velocity")[2]
+    print(f"{now / -before / bounce:.3f} of the restitution {bounce:.3f}")
+    assert now == pytest.approx(-bounce * before, rel=0.1)
+
+
 @pytest.mark.parametrize("case", range(8))
 def test_a_ball_stays_on_a_plate_of_a_millimetre(case: int) -> None:
     """As long as it goes no farther than its radius in a substep."""
