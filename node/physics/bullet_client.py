@@ -9,7 +9,7 @@ from foosim.node.physics.quiet import without_lines
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics, Side
 from foosim.world.parameters.table import PRIMITIVES_MAX
-from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Hull, Shape, Sphere, Vector
+from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Shape, Sphere, Vector
 
 with without_lines(b"pybullet build time:"):
     import pybullet as p
@@ -111,13 +111,12 @@ def bullet_indices(client: int, body: int, count: int) -> tuple[int, ...]:
 def make_shape(client: int, shapes: Sequence[Shape], *, placed: bool) -> int:
     """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses. None is -1.
 
-    A mesh or a hull is the only one: Bullet has no compound of these. They are handed over as numbers, never as the
-    name of a file.
+    A mesh is the only one: Bullet has no compound of these. It is handed over as numbers, never as the name of a file.
     """
     assert len(shapes) <= PRIMITIVES_MAX, f"{len(shapes)} shapes: a compound in Bullet has {PRIMITIVES_MAX}"
     if not shapes:
         return -1
-    if isinstance(shapes[0].geometry, Mesh | Hull):
+    if isinstance(shapes[0].geometry, Mesh):
         (shape,) = shapes
         return _make_triangles(client, shape, placed=placed)
     parts: dict[str, list[Any]] = {
@@ -146,18 +145,16 @@ def make_shape(client: int, shapes: Sequence[Shape], *, placed: bool) -> int:
 
 
 def _make_triangles(client: int, shape: Shape, *, placed: bool) -> int:
-    """Make a static mesh, or the convex hull of corners, which have no triangles in Bullet."""
+    """Make a static mesh."""
     geometry = shape.geometry
-    assert isinstance(geometry, Mesh | Hull), geometry
-    mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
-    triangles = {} if isinstance(geometry, Hull) else {"indices": mesh.triangles.ravel().tolist()}
+    assert isinstance(geometry, Mesh), geometry
     made: int = p.createCollisionShape(
         p.GEOM_MESH,
-        vertices=mesh.vertices.tolist(),
+        vertices=geometry.vertices.tolist(),
+        indices=geometry.triangles.ravel().tolist(),
         collisionFramePosition=shape.position if placed else REST,
         collisionFrameOrientation=shape.orientation if placed else UPRIGHT,
         physicsClientId=client,
-        **triangles,
     )
     assert made >= 0, shape
     return made

@@ -1,11 +1,11 @@
 """The interface of a physics engine to a node: load, command, step, read; and of what makes one.
 
 An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
-complete load of what is solved, from the frame. What is not loaded is parked, out of everybody's way. A change of
-layout builds another engine.
+complete load of what is solved, from the frame. A change of layout builds another engine. Its bodies are the scene's
+bodies of those entities that are rigid (`Entity.is_rigid`).
 
-Its bodies are the scene's bodies of those entities that are rigid (`Entity.is_rigid`); others are no engine's. *Free*
-ones are one link each, a sphere; *jointed* ones are chains of links on a fixed base, each of which slides or turns.
+An `IslandEngine` solves bodies of any kind, an island at a time. An `Engine` solves all bodies in one go, and parks
+what is not loaded: *free* ones are one link each, a sphere; *jointed* ones are chains of two links on a fixed base.
 """
 
 from __future__ import annotations

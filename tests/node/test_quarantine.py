@@ -16,6 +16,7 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.launcher.outcome import Outcome
 from foosim.node.physics.interface import Island
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -280,3 +281,27 @@ def test_a_body_that_can_be_solved_again_goes_on() -> None:
     yard.step(200)
     assert yard.vector("a", "position")[2] == pytest.approx(0.1, abs=0.001)
     assert "a part of it moves at up to 2000 m/s, at most 1000 m/s are computed" in yard.stepper.quarantined[0]
+
+
+class Spoiling:
+    """An engine of islands that finds each body nowhere."""
+
+    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+        pass
+
+    def solve(self, island: Island, numbers: list[float], start: Sequence[float]) -> None:
+        for entity in island.bodies:
+            numbers[entity.offsets["position"]] = nan
+
+    def close(self) -> None:
+        """It holds nothing."""
+
+
+def test_the_end_of_a_run_says_who_is_out() -> None:
+    """By name, in its last lines and its exit code."""
+    text = yard_text(POST, engine="mujoco", objects={"a": {**BOX, "at": {"z": "2 m"}}})
+    out = rehearse(text, "yard.yaml", 50, 1, settings=Settings(factory=Spoiling)).json  # type: ignore[arg-type]
+    assert out["quarantined"] == ["a"] and out["summary"] == ["in quarantine: a"] and not out["failed"]
+    assert Outcome(out, ()).failed
+    sound = rehearse(text, "yard.yaml", 50, 1).json
+    assert sound["quarantined"] == [] and sound["summary"] == [] and not Outcome(sound, ()).failed

@@ -473,13 +473,13 @@ class World:
 
     def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float], tick: int) -> str:
         """Return in words why the new, finite state of an entity cannot be; empty where it can."""
-        model = self.models[entity.index]
-        if not hasattr(model, "is_plausible"):
+        check = getattr(self.models[entity.index], "is_plausible", None)
+        if check is None:
             return ""
         try:
-            is_plausible = model.is_plausible(numbers, before)
+            is_plausible = check(numbers, before)
             if is_plausible is not True and is_plausible is not False:
-                raise WrongResult(model.is_plausible, "True or False", is_plausible)
+                raise WrongResult(check, "True or False", is_plausible)
         except BaseException as error:
             raise component_error(f"model {entity.model}", entity.name, tick, error) from error
         return "" if is_plausible else "its new state is not within its bounds, speed limits and reach"
