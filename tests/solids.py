@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from foosim.node.physics.floors import as_plane
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.world.components.drives import NO_DRIVES, Drives
@@ -18,7 +19,7 @@ TICK_S: Final = 0.01
 SUBSTEPS: Final = 4
 GRAVITY: Final = 9.81
 WHITE: Final = (1.0, 1.0, 1.0, 1.0)
-FLOOR: Final = Shape(Box((50.0, 50.0, 0.5)), "floor", WHITE, (0.0, 0.0, -0.5))
+FLOOR: Final = as_plane(Shape(Box((50.0, 50.0, 0.5)), "floor", WHITE, (0.0, 0.0, -0.5)))
 
 
 def physics(gravity: float = GRAVITY, erp: float = 0.05, **sides: Side) -> Physics:
@@ -122,9 +123,13 @@ class Solids:
     def solve(self, engine: CompositionEngine, members: Sequence[Entity], numbers: list[float]) -> None:
         """Solve an island of these entities."""
         island = Island(tuple(members), (), tuple(self.drives.get(one.name, NO_DRIVES) for one in members))
-        engine.load(island, [self.bodies[one.index] for one in members], numbers, numbers)
-        engine.step(island)
-        engine.read(island, numbers)
+        seats = engine.seats_of(island, [self.bodies[one.index] for one in members])
+        engine.solve(seats, island.drives, numbers, numbers)
+
+    def push(self, engine: CompositionEngine) -> None:
+        """Solve the first body with the second one as a mover in its way."""
+        island = Island((self.entities[0],), (self.entities[1],), (NO_DRIVES,))
+        engine.solve(engine.seats_of(island, self.bodies), island.drives, self.numbers, self.numbers)
 
     def run(self, ticks: int) -> None:
         """Solve all as one island for some ticks."""

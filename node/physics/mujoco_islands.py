@@ -9,19 +9,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from math import fsum, inf
+from math import inf
 from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
 from foosim.deployment.schema import Deployment
+from foosim.node.physics.floors import Floors, as_plane
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mesh_pieces import MeshPieces
-from foosim.node.physics.mujoco_model import SCENERY, VERSION, ModelBuilder, Placed, step, warnings, without_names
+from foosim.node.physics.mujoco_model import (
+    SCENERY,
+    SILENT,
+    VERSION,
+    ModelBuilder,
+    Placed,
+    step,
+    warnings,
+    without_names,
+)
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
-from foosim.world.components.drives import Motor, share_of
+from foosim.world.components.drives import Drives, Motor, share_of
 from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
@@ -30,13 +40,13 @@ from foosim.world.matter.physics import Physics
 from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
 
 MODELS_MAX: Final = 128
-"""Models that an engine keeps: those that were used last."""
+"""Models that an engine keeps: those that were built last."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
-NOBODY: tuple[float, ...] = (NO_ENTITY,) * PARTNERS_MAX
-NO_IMPULSES: tuple[float, ...] = (0.0,) * PARTNERS_MAX
 
-Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
-"""The kinds of an island's bodies, in name order, those of movers in their way, and the pieces of meshes in reach."""
+Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+"""The kinds of an island's bodies, in name order, those of movers in their way, the pieces of meshes in reach, and the
+floors that all bodies are above. `Key` has the entities themselves, and how many of them are no movers."""
+Key = tuple[tuple[int, ...], int, tuple[int, ...], tuple[int, ...]]
 
 
 class MujocoIslands:
@@ -64,15 +74,16 @@ class MujocoIslands:
                 self._bodies[entity.index] = body
                 self._kinds[entity.index] = known.setdefault(without_names(body), len(known))
         self._unnamed = list(known)
+        self._floors = Floors(self._scenery, [(layout.entities[index], body) for index, body in self._bodies.items()])
         self._models: dict[Composition, CompositionEngine] = {}
-        """The one that was used last at the end."""
+        self._seated: dict[Key, tuple[CompositionEngine, Seats]] = {}
         self._check({self._kinds[index]: layout.entities[index] for index in reversed(self._bodies)})
 
     def _check(self, first: Mapping[int, Entity]) -> None:
         """Build each kind of body alone; raise AssetError for the first entity of a kind that MuJoCo refuses."""
         for kind, entity in first.items():
             try:
-                self._build(((kind,), (), ()) if entity.is_rigid else ((), (kind,), ()))
+                self._build(((kind,), (), (), ()) if entity.is_rigid else ((), (kind,), (), ()))
             except ValueError as error:
                 raise AssetError(f"{entity.name}: MuJoCo refuses its body: {error}") from error
 
@@ -81,16 +92,27 @@ class MujocoIslands:
 
         `start` are the numbers of the tick's start, at which movers are.
         """
-        kinds = self._kinds
-        bodies, movers = ([kinds[one.index] for one in its] for its in (island.bodies, island.movers))
-        key = tuple(bodies), tuple(movers), self._pieces_near(island, numbers)
-        engine = self._models.pop(key, None)
+        indices = tuple([one.index for one in (*island.bodies, *island.movers)])
+        floors = self._floors.below(island.bodies, numbers)
+        key = indices, len(island.bodies), self._pieces_near(island, numbers), floors
+        seated = self._seated.get(key)
+        if seated is None:
+            seated = self._seated[key] = self._seat(key, island)
+        engine, seats = seated
+        engine.solve(seats, island.drives, numbers, start)
+
+    def _seat(self, key: Key, island: Island) -> tuple[CompositionEngine, Seats]:
+        """Return a model of an island's composition and its entities' seats in that."""
+        indices, count, pieces, floors = key
+        kinds = tuple([self._kinds[index] for index in indices])
+        composition = kinds[:count], kinds[count:], pieces, floors
+        engine = self._models.get(composition)
         if engine is None:
-            engine = self._build(key)
-        self._models[key] = engine
-        engine.load(island, [self._bodies[one.index] for one in (*island.bodies, *island.movers)], numbers, start)
-        engine.step(island)
-        engine.read(island, numbers)
+            if len(self._models) == MODELS_MAX:
+                del self._models[next(iter(self._models))]
+                self._seated.clear()
+            engine = self._models[composition] = self._build(composition)
+        return engine, engine.seats_of(island, [self._bodies[index] for index in indices])
 
     def _pieces_near(self, island: Island, numbers: Sequence[float]) -> tuple[int, ...]:
         """Return the pieces of meshes that the bodies of an island may touch within the tick."""
@@ -100,27 +122,28 @@ class MujocoIslands:
         return self._meshes.near(self._volumes.boxes_at(numbers)[rows])
 
     def _build(self, key: Composition) -> CompositionEngine:
-        while len(self._models) >= MODELS_MAX:
-            del self._models[next(iter(self._models))]
         bodies, movers = ([self._unnamed[kind] for kind in kinds] for kinds in key[:2])
-        scenery = [*self._scenery, *chain.from_iterable([self._meshes.pieces[piece] for piece in key[2]])]
+        fixed = [as_plane(shape) if place in key[3] else shape for place, shape in enumerate(self._scenery)]
+        scenery = [*fixed, *chain.from_iterable([self._meshes.pieces[piece] for piece in key[2]])]
         return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers)
 
     def close(self) -> None:
         """Free all models."""
         self._models.clear()
+        self._seated.clear()
 
 
-class _Slots:
-    """Where the numbers of an entity are in a frame; -1 for those that it does not have."""
+class _Seat:
+    """A body of a model, and where the numbers of the entity that sits there now are in a frame (-1: it has none)."""
 
     __slots__ = (
-        "contacts", "joint_efforts", "joint_positions", "joint_velocities", "orientation", "partner_impulses",
-        "partners", "position", "spin", "velocity",
+        "contacts", "index", "joint_efforts", "joint_positions", "joint_velocities", "orientation", "partner_impulses",
+        "partners", "placed", "position", "spin", "velocity",
     )  # fmt: skip
 
-    def __init__(self, entity: Entity) -> None:
+    def __init__(self, placed: Placed, entity: Entity) -> None:
         at = entity.offsets.get
+        self.placed, self.index = placed, float(entity.index)
         self.position, self.orientation = at("position", -1), at("orientation", -1)
         self.velocity, self.spin = at("linear_velocity", -1), at("angular_velocity", -1)
         self.joint_positions, self.joint_velocities = at("joint_positions", -1), at("joint_velocities", -1)
@@ -128,14 +151,46 @@ class _Slots:
         self.partners, self.partner_impulses = at("partners", -1), at("partner_impulses", -1)
 
 
-class _Touch:
-    """The contacts of two bodies within a tick: their normal forces (N), and a bit for each substep with one."""
+class Seats:
+    """The entities of an island in a model, in the order of its bodies, movers last."""
 
-    __slots__ = ("forces", "substeps")
+    __slots__ = ("bodies", "everybody", "fixed", "movers", "q", "turned", "v")
+
+    def __init__(self, m: Any, places: Sequence[Placed], island: Island, bodies: Sequence[Body]) -> None:
+        self.everybody = [_Seat(*its) for its in zip(places, (*island.bodies, *island.movers), strict=True)]
+        self.bodies = self.everybody[: len(island.bodies)]
+        everything = list(zip(self.everybody, (*island.bodies, *island.movers), bodies, strict=True))
+        self.movers = [its for its in everything if its[0].placed.is_mover]
+        self.fixed = [(seat.placed, body) for seat, _, body in everything if not body.is_free]
+        self.turned: list[tuple[int, int]] = []
+        """Of each free body the first places of its angular velocity in `qvel` and of its orientation in the frame."""
+        self.q, self.v = [0] * m.nq, [0] * m.nv
+        """Where the frame has what `qpos` and `qvel` are; of movers and the clock, which are set apart, 0."""
+        for seat in self.bodies:
+            placed = seat.placed
+            if placed.is_free:
+                q, v, x = placed.q, placed.v, seat.orientation
+                self.q[q : q + 3], self.q[q + 3 : q + 7] = (
+                    range(seat.position, seat.position + 3),
+                    (x + 3, x, x + 1, x + 2),
+                )
+                self.v[v : v + 3], self.v[v + 3 : v + 6] = (
+                    range(seat.velocity, seat.velocity + 3),
+                    range(seat.spin, seat.spin + 3),
+                )
+                self.turned.append((v + 3, x))
+            for number, (i, j) in enumerate(zip(placed.qs, placed.vs, strict=True)):
+                self.q[i], self.v[j] = seat.joint_positions + number, seat.joint_velocities + number
+
+
+class _Touch:
+    """The contacts of two bodies within a tick: the sum of their normal forces in its substeps (N), and a bit for each
+    substep with one."""
+
+    __slots__ = ("force", "substeps")
 
     def __init__(self) -> None:
-        self.forces: list[float] = []
-        self.substeps = 0
+        self.force, self.substeps = 0.0, 0
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -154,9 +209,8 @@ class CompositionEngine:
         self._dt, self._substeps, self._count = substep_s, substeps, len(bodies)
         built = ModelBuilder(physics, substep_s, scenery, bodies, movers)
         self.m, self._placed, self._owners = built.m, built.placed, built.owners
-        self._silent, self._motors, clock = built.silent, built.motors, built.clock
+        self._motors, clock = built.motors, built.clock
         self.d = d = built.d
-        self._q, self._v = d.qpos.tolist(), d.qvel.tolist()
         self._qpos, self._qvel, self._warm, self._applied = d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied
         self._contact = d.contact
         self._touches: dict[tuple[int, int], _Touch] = {}
@@ -164,52 +218,42 @@ class CompositionEngine:
         self._governed: list[tuple[Placed, int, Motor, float]] = []
         """Motors whose force falls with the speed: their body, joint, and the slope as its mean over a substep."""
         self._is_applied = False
-        self._slots: dict[int, _Slots] = {}
-        """By the index of an entity: all that a model meets are of one layout."""
         if self._motors:
-            self._clock = clock, int(self.m.jnt_qposadr[self.m.dof_jntid[clock]])
+            self._clock_v, self._clock_q = clock, int(self.m.jnt_qposadr[self.m.dof_jntid[clock]])
             self._friction, self._speeds = self.m.tendon_frictionloss, self.m.wrap_prm[1::2]
 
-    def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
+    def seats_of(self, island: Island, bodies: Sequence[Body]) -> Seats:
+        """Return which of an island's entities, movers last, with their bodies, is which body of the model."""
+        return Seats(self.m, self._placed, island, bodies)
+
+    def solve(self, seats: Seats, drives: Sequence[Drives], numbers: list[float], start: Sequence[float]) -> None:
+        """Write the next state of the bodies into the numbers, as `MujocoIslands.solve` does."""
+        self.load(seats, drives, numbers, start)
+        self.step(drives)
+        self.read(numbers)
+
+    def load(self, seats: Seats, drives: Sequence[Drives], numbers: Sequence[float], start: Sequence[float]) -> None:
         """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
-        qpos, qvel = self._q, self._v
-        for placed, entity, body in zip(self._placed, (*island.bodies, *island.movers), bodies, strict=True):
-            if placed.is_mover:
-                self._load_mover(placed, entity, body, start)
-                continue
-            slots = self._slots_of(entity)
-            if placed.is_free:
-                q, v, at, spin = placed.q, placed.v, slots.position, slots.spin
-                x, y, z, w = numbers[slots.orientation : slots.orientation + 4]
-                qpos[q : q + 7] = *numbers[at : at + 3], w, x, y, z
-                a, b, c = numbers[spin : spin + 3]
-                qvel[v : v + 6] = *numbers[slots.velocity : slots.velocity + 3], *rotate((-x, -y, -z, w), (a, b, c))
-            elif placed.stands is not body:
+        self._seated = seats
+        qpos, qvel = [numbers[at] for at in seats.q], [numbers[at] for at in seats.v]
+        for v, at in seats.turned:
+            x, y, z, w = numbers[at : at + 4]
+            qvel[v : v + 3] = rotate((-x, -y, -z, w), (qvel[v], qvel[v + 1], qvel[v + 2]))
+        for seat, entity, body in seats.movers:
+            q, v, at, turned = seat.placed.q, seat.placed.v, seat.position, seat.orientation
+            x, y, z, w = start[turned : turned + 4]
+            linear, spin = twist(body, entity, start, 0)
+            qpos[q : q + 7] = *start[at : at + 3], w, x, y, z
+            qvel[v : v + 6] = *linear, *rotate((-x, -y, -z, w), spin)
+        for placed, body in seats.fixed:
+            if placed.stands is not body:
                 self._stand(placed, body)
-            if placed.qs:
-                at, speed = slots.joint_positions, slots.joint_velocities
-                for number, (i, j) in enumerate(zip(placed.qs, placed.vs, strict=True)):
-                    qpos[i], qvel[j] = numbers[at + number], numbers[speed + number]
         if self._motors:
-            self._command(island)
+            self._command(drives)
+            qpos[self._clock_q], qvel[self._clock_v] = 0.0, 1.0
         self._qpos[:], self._qvel[:] = qpos, qvel
-        self._warm[:] = 0.0
+        self._warm.fill(0.0)
         self.d.time = 0.0
-
-    def _slots_of(self, entity: Entity) -> _Slots:
-        slots = self._slots.get(entity.index)
-        if slots is None:
-            slots = self._slots[entity.index] = _Slots(entity)
-        return slots
-
-    def _load_mover(self, placed: Placed, entity: Entity, body: Body, start: Sequence[float]) -> None:
-        q, v = placed.q, placed.v
-        at, turned = entity.offsets["position"], entity.offsets["orientation"]
-        x, y, z, w = start[turned : turned + 4]
-        linear, spin = twist(body, entity, start, 0)
-        self._q[q : q + 3] = start[at : at + 3]
-        self._q[q + 3 : q + 7] = w, x, y, z
-        self._v[v : v + 3], self._v[v + 3 : v + 6] = linear, rotate((-x, -y, -z, w), spin)
 
     def _stand(self, placed: Placed, body: Body) -> None:
         """Put the fixed base of a body of the same kind where this one has it."""
@@ -217,11 +261,11 @@ class CompositionEngine:
         placed.stands = body
         self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
 
-    def _command(self, island: Island) -> None:
+    def _command(self, everybody: Sequence[Drives]) -> None:
         """Set the target speeds of motors, and the greatest forces with which they are reached."""
         speeds, forces = [0.0] * self._motors, [0.0] * self._motors
         self._governed.clear()
-        for placed, drives in zip(self._placed, island.drives, strict=False):
+        for placed, drives in zip(self._placed, everybody, strict=False):
             for number, motor in enumerate(drives.motors, placed.motor):
                 if motor.slope != inf:
                     self._govern(placed, number - placed.motor, motor)
@@ -230,21 +274,19 @@ class CompositionEngine:
         if forces != self._forces:
             self._friction[:] = self._forces = forces
         self._speeds[:] = speeds
-        v, q = self._clock
-        self._q[q], self._v[v] = 0.0, 1.0
 
     def _govern(self, placed: Placed, number: int, motor: Motor) -> None:
         link = [index for index, one in enumerate(placed.body.links) if one.joint in MOVING][number]
         load = load_of(placed.body, link)
         self._governed.append((placed, number, motor, share_of(motor.slope, load, self._dt) * load / self._dt))
 
-    def step(self, island: Island) -> None:
+    def step(self, everybody: Sequence[Drives]) -> None:
         """Advance by the substeps of a tick and note what touches."""
         m, d, touches = self.m, self.d, self._touches
         touches.clear()
         pushed = [
             (placed, drives.wrench)
-            for placed, drives in zip(self._placed, island.drives, strict=False)
+            for placed, drives in zip(self._placed, everybody, strict=False)
             if drives.wrench is not None
         ]
         if self._is_applied:
@@ -272,45 +314,48 @@ class CompositionEngine:
         """Note the contacts of a substep that push."""
         contact, owners, touches = self._contact, self._owners, self._touches
         forces = self.d.efc_force.tolist()
+        forces.append(0.0)  # of what does not push, whose row is -1
         for (one, other), row in zip(contact.geom.tolist(), contact.efc_address.tolist(), strict=True):
-            force = forces[row] if row >= 0 else 0.0
-            if force > 0.0 and not (one in self._silent or other in self._silent):
-                pair = owners[one], owners[other]
+            force = forces[row]
+            if force > 0.0:
+                first, second = owners[one], owners[other]  # MuJoCo puts them in the order of their shapes' types
+                pair = (first, second) if first < second else (second, first)
                 touch = touches.get(pair)
                 if touch is None:
                     touches[pair] = touch = _Touch()
-                touch.forces.append(force)
+                touch.force += force
                 touch.substeps |= bit
 
-    def read(self, island: Island, numbers: list[float]) -> None:
+    def read(self, numbers: list[float]) -> None:
         """Write the state of the island's bodies, and what they touched, into the numbers."""
         qpos, qvel = self._qpos.tolist(), self._qvel.tolist()
         efforts = self._efforts() if self._motors else []
         met = self._met()
-        for number, entity in enumerate(island.bodies):
-            placed, slots = self._placed[number], self._slots_of(entity)
+        for number, seat in enumerate(self._seated.bodies):
+            placed = seat.placed
             if placed.is_free:
-                q, v, at, turned = placed.q, placed.v, slots.position, slots.orientation
+                q, v, at, turned = placed.q, placed.v, seat.position, seat.orientation
                 w, x, y, z = qpos[q + 3 : q + 7]
                 numbers[at : at + 3], numbers[turned : turned + 4] = qpos[q : q + 3], (x, y, z, w)
-                at, spin = slots.velocity, slots.spin
+                at, spin = seat.velocity, seat.spin
                 a, b, c = qvel[v + 3 : v + 6]
                 numbers[at : at + 3], numbers[spin : spin + 3] = qvel[v : v + 3], rotate((x, y, z, w), (a, b, c))
             if placed.qs:
-                count, at = len(placed.qs), slots.joint_positions
-                speed, effort = slots.joint_velocities, slots.joint_efforts
+                count, at = len(placed.qs), seat.joint_positions
+                speed, effort = seat.joint_velocities, seat.joint_efforts
                 numbers[at : at + count] = [qpos[i] for i in placed.qs]
                 numbers[speed : speed + count] = [qvel[i] for i in placed.vs]
                 numbers[effort : effort + count] = efforts[placed.motor : placed.motor + count]
-            self._write_log(slots, island, met.get(number), numbers)
+            self._write_log(seat, met.get(number, ()), numbers)
 
     def _efforts(self) -> list[float]:
         """Return what each motor applied in the last substep (N or N m)."""
         m, d = self.m, self.d
-        found = [0.0] * m.ntendon
         rows = slice(d.ne, d.ne + d.nf)
-        for number, force in zip(d.efc_id[rows].tolist(), d.efc_force[rows].tolist(), strict=True):
-            found[number] = force
+        found: list[float] = d.efc_force[rows].tolist()
+        if len(found) < m.ntendon:  # there is no row for a motor without a force
+            forces = dict(zip(d.efc_id[rows].tolist(), found, strict=True))
+            found = [forces.get(number, 0.0) for number in range(m.ntendon)]
         for placed, number, _, _ in self._governed:
             found[placed.motor + number] = float(self._applied[placed.vs[number]])
         return found
@@ -319,39 +364,29 @@ class CompositionEngine:
         """Return what each body touched in the tick, by its place: the partner's place, and how."""
         found: dict[int, list[tuple[int, _Touch]]] = {}
         for (one, other), touch in self._touches.items():
-            if 0 <= one < self._count:
+            if one != SILENT:
                 found.setdefault(one, []).append((other, touch))
-            if 0 <= other < self._count:
                 found.setdefault(other, []).append((one, touch))
         return found
 
-    def _write_log(
-        self, slots: _Slots, island: Island, met: Sequence[tuple[int, _Touch]] | None, numbers: list[float]
-    ) -> None:
+    def _write_log(self, seat: _Seat, met: Sequence[tuple[int, _Touch]], numbers: list[float]) -> None:
         """Write what a body touched: how many touches began, the impulse (N s), and the last substep with a contact."""
-        at, dt = slots.contacts, self._dt
-        impulses: dict[int, float] = {}
-        if met is None:
-            numbers[at : at + 3] = NO_CONTACT
-        else:
-            substeps = 0
-            parts: dict[int, list[float]] = {}
-            for partner, touch in met:
+        at, dt, force, substeps = seat.contacts, self._dt, 0.0, 0
+        if met:
+            for _, touch in met:
+                force += touch.force
                 substeps |= touch.substeps
-                parts.setdefault(partner, []).extend([force * dt for force in touch.forces])
-            impulses = {partner: fsum(its) for partner, its in parts.items()}
-            before = substeps << 1 | (numbers[at + 2] == self._substeps - 1.0)
-            began = (substeps & ~before).bit_count()
-            numbers[at : at + 3] = float(began), fsum(impulses.values()), substeps.bit_length() - 1.0
-        if slots.partners < 0:
+            began = substeps & ~(substeps << 1 | (numbers[at + 2] == self._substeps - 1.0))
+            numbers[at : at + 3] = float(began.bit_count()), force * dt, substeps.bit_length() - 1.0
+        else:
+            numbers[at : at + 3] = NO_CONTACT
+        if seat.partners < 0:
             return
-        at, to = slots.partners, slots.partner_impulses
-        if not impulses:
-            numbers[at : at + PARTNERS_MAX], numbers[to : to + PARTNERS_MAX] = NOBODY, NO_IMPULSES
-            return
-        kept = sorted([(-impulse, one) for one, impulse in impulses.items() if one != SCENERY])[:PARTNERS_MAX]
-        everybody = (*island.bodies, *island.movers)
-        found = sorted([(float(everybody[one].index), -impulse) for impulse, one in kept])
+        seats, at, to = self._seated.everybody, seat.partners, seat.partner_impulses
+        found = [(seats[one].index, touch.force * dt) for one, touch in met if one != SCENERY]
+        if len(found) > PARTNERS_MAX:
+            found = sorted(found, key=lambda its: (-its[1], its[0]))[:PARTNERS_MAX]
+        found.sort()
         missing = PARTNERS_MAX - len(found)
         numbers[at : at + PARTNERS_MAX] = [index for index, _ in found] + [NO_ENTITY] * missing
         numbers[to : to + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing

@@ -20,6 +20,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from foosim.node.physics.floors import Plane
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics, Side
 from foosim.world.scene import (
@@ -68,9 +69,19 @@ SERVO: Final = (0.999, 0.999, 0.001, 0.5, 2.0)
 LIMIT: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 LEAST: Final = 1e-5
 """MuJoCo takes no smaller coefficient of friction."""
-GEOMS: Final = {Box: "BOX", Sphere: "SPHERE", Cylinder: "CYLINDER", Capsule: "CAPSULE", Hull: "MESH", Mesh: "MESH"}
+GEOMS: Final = {
+    Plane: "PLANE",
+    Box: "BOX",
+    Sphere: "SPHERE",
+    Cylinder: "CYLINDER",
+    Capsule: "CAPSULE",
+    Hull: "MESH",
+    Mesh: "MESH",
+}
 SCENERY: Final = -1
 """The place of what is no body."""
+SILENT: Final = -2
+"""The place of a shape whose contacts are not logged."""
 
 VERSION: Final = f"mujoco {mujoco.__version__}"
 step = mujoco.mj_step
@@ -114,7 +125,7 @@ class ModelBuilder:
     """Builds one model and its data, `m` and `d`.
 
     `placed` says where its bodies are, `owners` whose shape each geom is: the place of the body, `SCENERY` of the
-    scenery. `clock` is the place of the clock in `qvel`, -1 without motors.
+    scenery, `SILENT` of what is not logged. `clock` is the place of the clock in `qvel`, -1 without motors.
     """
 
     def __init__(
@@ -152,10 +163,8 @@ class ModelBuilder:
             motor += len(self.placed[-1].qs)
         self.motors = motor
         self.clock = int(m.joint("clock").dofadr[0]) if motor else -1
-        owners = {name: place for name, place, _, _ in self._shapes}
+        owners = {name: SILENT if side.silent else place for name, place, side, _ in self._shapes}
         self.owners = [owners[m.geom(index).name] for index in range(m.ngeom)]
-        silent = {name for name, _, side, _ in self._shapes if side.silent}
-        self.silent = frozenset([index for index in range(m.ngeom) if m.geom(index).name in silent])
 
     def _set_options(self) -> None:
         option, disable = self._spec.option, mujoco.mjtDisableBit
@@ -164,7 +173,7 @@ class ModelBuilder:
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
         option.iterations, option.tolerance = self._physics.solver_iterations, TOLERANCE
         option.ls_iterations = LINE_SEARCHES
-        option.disableflags = int(disable.mjDSBL_AUTORESET | disable.mjDSBL_SENSOR)
+        option.disableflags = int(disable.mjDSBL_AUTORESET | disable.mjDSBL_SENSOR | disable.mjDSBL_ISLAND)
         compiler = self._spec.compiler
         compiler.degree, compiler.usethread, compiler.inertiafromgeom = False, False, 0
 
@@ -176,7 +185,9 @@ class ModelBuilder:
         geom = parent.add_geom()
         geom.name = f"g{len(self._shapes)}"
         geom.type = getattr(mujoco.mjtGeom, f"mjGEOM_{GEOMS[type(geometry)]}")
-        if isinstance(geometry, Box):
+        if isinstance(geometry, Plane):
+            geom.size = 1.0, 1.0, 1.0  # of how it is drawn
+        elif isinstance(geometry, Box):
             geom.size = geometry.half
         elif isinstance(geometry, Sphere):
             geom.size = geometry.radius, 0.0, 0.0

@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
-from foosim.node.physics.interface import Island
-from foosim.node.physics.mujoco_islands import CompositionEngine
+from foosim.node.physics.mujoco_islands import CompositionEngine, Seats
 from foosim.node.physics.mujoco_model import ModelBuilder, warnings
 from foosim.world.assembly.volumes import overlapping
 from foosim.world.components.drives import Drives, Motor
@@ -221,26 +220,26 @@ def test_islands_have_the_same_bits_over_twenty_thousand_ticks() -> None:
 class KeepsWarmStart(CompositionEngine):
     """The solver starts from the accelerations of the tick before, of whichever island that was."""
 
-    def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
+    def load(self, seats: Seats, drives: Sequence[Drives], numbers: Sequence[float], start: Sequence[float]) -> None:
         warm = self.d.qacc_warmstart.copy()
-        super().load(island, bodies, numbers, start)
+        super().load(seats, drives, numbers, start)
         self.d.qacc_warmstart[:] = warm
 
 
 class KeepsMotors(CompositionEngine):
     """Motors go on with the speeds that they were told first."""
 
-    def _command(self, island: Island) -> None:
+    def _command(self, everybody: Sequence[Drives]) -> None:
         if not self._forces:
-            super()._command(island)
+            super()._command(everybody)
 
 
 class KeepsVelocities(CompositionEngine):
     """The velocities of joints are not those of the frame."""
 
-    def load(self, island: Island, bodies: Sequence[Body], numbers: Sequence[float], start: Sequence[float]) -> None:
+    def load(self, seats: Seats, drives: Sequence[Drives], numbers: Sequence[float], start: Sequence[float]) -> None:
         kept = self.d.qvel.copy()
-        super().load(island, bodies, numbers, start)
+        super().load(seats, drives, numbers, start)
         for placed in self._placed:
             self.d.qvel[placed.vs] = kept[placed.vs]
 

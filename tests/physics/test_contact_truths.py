@@ -11,10 +11,9 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.tick import Work
-from foosim.world.components.drives import NO_DRIVES, Drives, Motor
+from foosim.world.components.drives import Drives, Motor
 from foosim.world.matter.physics import Side
 from foosim.world.scene import ORIGIN, Body, Box, Link, turn
 from tests.kinematic_yard import Yard, yard_text
@@ -107,10 +106,7 @@ def test_a_mover_carries_what_stands_on_it() -> None:
     one.put("a", (0.0, 0.0, 0.3))
     for tick in range(400):
         one.put("m", (0.5 * TICK_S * tick, 0.0, 0.1), velocity=(0.5, 0.0, 0.0))
-        island = Island((one.entities[0],), (one.entities[1],), (NO_DRIVES,))
-        engine.load(island, one.bodies, one.numbers, one.numbers)
-        engine.step(island)
-        engine.read(island, one.numbers)
+        one.push(engine)
     x, _, z = one.get("a", "position")
     assert x == pytest.approx(2.0 - 0.25 / (2 * 0.5 * GRAVITY), abs=0.01)
     assert z == pytest.approx(0.3, abs=0.001) and one.get("a", "partners")[0] == 1.0

@@ -248,7 +248,7 @@ def test_links_are_where_our_kinematics_put_them(case: int) -> None:
         one.set("arm", "joint_positions", *angles)
         ours = forward_kinematics(body, one["arm"], one.numbers)
         island = Island((one["arm"],), (), (NO_DRIVES,))
-        one.engine.load(island, [body], one.numbers, one.numbers)
+        one.engine.load(one.engine.seats_of(island, [body]), island.drives, one.numbers, one.numbers)
         mujoco.mj_kinematics(one.engine.m, one.engine.d)
         for index, (_, position, orientation) in enumerate(ours):
             theirs = one.engine.d.body(f"b0.{index}")
@@ -553,10 +553,7 @@ def pushed_by_a_wall(kind: type[CompositionEngine], ticks: int) -> tuple[float, 
         one.put("a", (0.15, 0.0, 0.1))
         for tick in range(ticks):
             one.put("wall", (0.0 + 0.5 * TICK_S * tick, 0.0, 0.2), velocity=(0.5, 0.0, 0.0))
-            island = Island((one.entities[0],), (one.entities[1],), (NO_DRIVES,))
-            engine.load(island, one.bodies, one.numbers, one.numbers)
-            engine.step(island)
-            engine.read(island, one.numbers)
+            one.push(engine)
         engine.close()
         return one.get("a", "linear_velocity")[0], one.get("a", "position")[0], one.get("a", "partners")[0]
 
