@@ -188,6 +188,26 @@ def test_a_mesh_carries_what_slides_over_its_triangles() -> None:
     assert dist(yard.vector("a", "position"), start) == pytest.approx((9.0 + 0.49) / (2 * moves), rel=0.03)
 
 
+@pytest.mark.parametrize(("x", "speed", "z"), [(0.0, 0.0, 3.2), (2.5, 2.0, 3.2), (0.0, 0.0, 0.1), (49.5, 1.0, 0.1)])
+def test_a_floor_carries_what_is_on_it_and_ends_at_its_edges(x: float, speed: float, z: float) -> None:
+    """On a deck above the floor: what rests stays, also below the deck, and what rolls falls at either edge."""
+    deck = {"deck": {**PLANK, "z": "3 m", "surface": "floor"}}
+    ball_on = {"a": {"model": "sphere", "radius": "10 cm", "mass": "1 kg", "at": {"x": f"{x} m", "z": f"{z} m"}}}
+    yard = world(GRAVITY, objects=ball_on, scenery=deck)
+    yard.put("a", "linear_velocity", speed, 0.0, 0.0)
+    yard.put("a", "angular_velocity", 0.0, speed / 0.1, 0.0)
+    places = []
+    for _ in range(100):
+        yard.step()
+        places.append(yard.vector("a", "position"))
+    ends = 4.0 if z > 1.0 else 50.0
+    fallen_s = (x + speed * 1.0 - ends) / speed if speed else 0.0
+    on_it = [height for at, _, height in places if at < ends]
+    assert on_it == pytest.approx([z] * len(on_it), abs=0.001)
+    assert places[-1][0] == pytest.approx(x + speed, abs=0.01)
+    assert places[-1][2] == pytest.approx(z - GRAVITY * fallen_s**2 / 2, abs=0.05)
+
+
 def test_what_falls_slowly_goes_on_falling() -> None:
     """At 15 mm/s2, which a threshold of speed takes for rest after 0.7 s."""
     yard = world(0.015, objects=one_box(z="1 m"))
