@@ -139,7 +139,7 @@ class Stepper:
         world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)
         world.apply_rules(numbers, frame.tick)
         if edits or world.has_rules:
-            wake_edited(frame, layout, numbers)
+            wake_edited(frame, layout, numbers, edits)
             self._standing.wake_edited(frame, layout, numbers)
         return layout, numbers
 

@@ -122,7 +122,7 @@ def initial_numbers(
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
         if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
-            for label, own in _entity_rules_of(spec, layout, robot):
+            for label, own in entity_rules_of(spec, layout, robot):
                 if hasattr(own, "place"):
                     placed = watched(own) if is_watched else own
                     called(f"rule {label}", robot.name, 0, placed.place, view)
@@ -219,7 +219,7 @@ class WorldMarks:
             (robot.name, label): rule
             for robot in layout.robots
             if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
-            for label, rule in _entity_rules_of(spec, layout, robot)
+            for label, rule in entity_rules_of(spec, layout, robot)
             if hasattr(rule, "marks")
         }
         """By entity and name: those of the world first."""
@@ -268,7 +268,7 @@ class World:
         self._motions = _motions_of(spec, layout)
         self._moving = _Moving([], [])
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
-        rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
+        rules = {robot.index: entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
         self.ruled = frozenset(self._entity_rules)
         """Entities that have rules of their own, by their indices."""
@@ -542,7 +542,8 @@ def are_motors(asked: object, count: int | None) -> bool:
     )
 
 
-def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
+def entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
+    """Return the rules of a robot by name, in name order. Raises ComponentError."""
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found = find_entity_rule(settings)

@@ -16,6 +16,7 @@ from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.energy.battery import BatteryRuleSettings, cell_of, chargers_of, check_battery, is_rover
 from foosim.world.forms.registry import entity_rule
+from foosim.world.models.rover import CHARGE
 
 if TYPE_CHECKING:
     from foosim.world.frame import Frame
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 EMPTY: Final = "empty"
 
 
-@entity_rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",))
+@entity_rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",), settable={"charge": CHARGE})
 class Battery:
     """The charge of one robot (J)."""
 
@@ -59,6 +60,10 @@ class Battery:
         """Charge it as the deployment says; a rover says it itself."""
         if not self._is_rover:
             view.write(self._charge, self._start)
+
+    def set(self, view: WritableView, field: str, value: float) -> None:
+        """Charge it to a share of its capacity."""
+        view.write(self._charge, value * self._capacity)
 
     def has_power(self, view: View) -> bool:
         """Whether there is any charge."""
