@@ -307,7 +307,7 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
 
 
 def _start_findings(deployment: Deployment) -> Iterator[Finding]:
-    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies."""
+    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies; and events."""
     if any(map(stands_upright, deployment.robots.values())):
         from foosim.world.clearance.start import start_findings  # brings numpy
 
@@ -317,6 +317,10 @@ def _start_findings(deployment: Deployment) -> Iterator[Finding]:
         from foosim.world.clearance.overlaps import overlap_findings  # brings numpy
 
         yield from overlap_findings(deployment)
+    if deployment.events:
+        from foosim.world.setting.scheduled import event_findings  # brings numpy
+
+        yield from event_findings(deployment)
 
 
 def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:

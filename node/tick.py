@@ -34,6 +34,7 @@ from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
+from foosim.world.setting.scheduled import Schedule
 
 ECHO = "echo"
 RETRIES: Final = 3
@@ -77,6 +78,7 @@ class Stepper:
         self.world = World(deployment, layout, is_watched=is_watched)
         self._is_watched = is_watched
         self.substeps = deployment.substeps
+        self.events = Schedule(deployment)
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
@@ -133,7 +135,9 @@ class Stepper:
         return packets, view.written
 
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
-        """Return layout and numbers of the frame after the order's edits and the world's rules."""
+        """Return layout and numbers of the frame after the edits of order and events, and the rules of the world."""
+        if frame.tick in self.events.by_tick:
+            edits = [*edits, *self.events.edits(frame)]
         layout, numbers = edit(frame, edits, self.deployment)
         is_same = layout is self.layout or layout.digest == self.layout.digest
         world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)

@@ -29,11 +29,11 @@ from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.records import RequestRecord, asked
 from foosim.supervisor.state import RunState
 from foosim.supervisor.viewing import Viewing, chosen
-from foosim.world.assembly.settable import set_edits, settable
 from foosim.world.assembly.world import addition, body_of
 from foosim.world.components.view import ComponentError
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.world.layout import Layout
+from foosim.world.setting.settable import set_edits, settable
 
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
@@ -302,8 +302,8 @@ class Requests:
         except ComponentError as error:
             raise Refused(str(error)) from error
         except BadValue as bad:
-            raise Refused(f"{entity.name} {field}: {bad}") from bad
-        return self._accept(request, tick, f"{entity.name} {field} set at tick {tick}", [*edits])
+            raise Refused(f"{field} of {entity.name}: {bad}") from bad
+        return self._accept(request, tick, f"{field} of {entity.name} set at tick {tick}", [*edits])
 
     def _tick_for_edit(self) -> int:
         """Return the first tick that is not released; raises Refused when its order is full."""

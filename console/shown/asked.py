@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from foosim.capture.rows import EditRow, EpochRow
-from foosim.world.assembly.settable import WITH_A_PLACE
 from foosim.world.forms.forms import DOWN
+from foosim.world.setting.settable import WITH_A_PLACE
 
 
 def edit_text(edit: EditRow) -> str:

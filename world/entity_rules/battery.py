@@ -7,7 +7,7 @@ distance between its places at the tick's start and end; a robot with a fixed ba
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
 from typing import TYPE_CHECKING, Final
 
@@ -61,9 +61,9 @@ class Battery:
         if not self._is_rover:
             view.write(self._charge, self._start)
 
-    def set(self, view: WritableView, field: str, value: float) -> None:
-        """Charge it to a share of its capacity."""
-        view.write(self._charge, value * self._capacity)
+    def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
+        """Return the charge of a share of its capacity."""
+        return {field: [value * self._capacity]}
 
     def has_power(self, view: View) -> bool:
         """Whether there is any charge."""

@@ -198,7 +198,7 @@ class Component(Form):
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one. `settable` is what can be set of it while a run goes on, and the limits of that: slots of
-    its own with one number, in SI units, or what its method `set(view, field, value)` writes.
+    its own with one number; or what its method `set(field, value)` returns, numbers by slot. Values are in SI units.
     """
 
     value: type[Struct] | None = None

@@ -7,7 +7,6 @@ A pose is set as the deployment would place it: the model places it at tick 0, e
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import atan2
 from typing import Any, Final, NamedTuple
 
 from pydantic import ValidationError
@@ -17,10 +16,9 @@ from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.common.units import Quantity
 from foosim.world.assembly.world import body_of, entity_rules_of
-from foosim.world.clearance.occupied import occupied_by
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.fitted import actuators_of, sensors_of
-from foosim.world.components.view import Slot, WritableView, called
+from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Set
 from foosim.world.forms import registry
 from foosim.world.forms.forms import DOWN
@@ -29,6 +27,7 @@ from foosim.world.layout import Entity, Layout, find_entity_rule
 from foosim.world.parameters.vehicles import leaning
 from foosim.world.placing import At, is_placed
 from foosim.world.scene import Quaternion, Vector
+from foosim.world.setting.occupied import occupied_by
 from foosim.world.spec import WorldSpec
 
 AT: Final = "at"
@@ -41,7 +40,10 @@ WITH_A_PLACE: Final = frozenset((*PLACED[1:], *STOPPED, QUARANTINED))
 
 
 class Pose(NamedTuple):
-    """Where something is put, as models read it in their setting `at`: lengths in m, angles in rad."""
+    """Where something is put, as models read it in their setting `at`: lengths in m, angles in rad.
+
+    What has a heading stands upright, and reads `yaw`; all others read `orientation`.
+    """
 
     x: float
     y: float
@@ -60,59 +62,57 @@ def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
     found: dict[str, str] = {}
     if entity.is_robot:
         found[DOWN] = "true or false"
-    settings = spec.settings_of(entity.name)
-    if "position" in entity.fields and settings is not None and is_placed(type(settings)):
+    if _is_placed(spec, entity):
         found[AT] = "X,Y or X,Y,Z in m, or keys of x, y, z, roll, pitch, yaw"
     for label, _, quantities in _declared(spec, layout, entity):
         found |= {f"{label}.{name}": f"{one.low} to {one.high}" for name, one in quantities.items()}
     return found
 
 
+def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
+    settings = spec.settings_of(entity.name)
+    return "position" in entity.fields and settings is not None and is_placed(type(settings))
+
+
 def set_edits(
-    spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, field: str, value: object
+    spec: WorldSpec,
+    layout: Layout,
+    numbers: Sequence[float],
+    entity: Entity,
+    field: str,
+    value: object,
+    *,
+    is_checked: bool = True,
 ) -> list[Set]:
     """Return the edits that set a field of an entity.
 
     A pose is completed by that in the numbers of a frame. Raises BadValue for a field that is not settable, a value
-    beyond its limits, and a place that is occupied in that frame; ComponentError for a component that raises.
+    beyond its limits, and, if it `is_checked`, a place that is occupied in that frame; ComponentError for a component
+    that raises.
     """
-    fields = settable(spec, layout, entity)
-    if field not in fields:
-        there = f"settable are {', '.join(fields)}" if fields else "nothing is"
-        raise BadValue(f"not settable on {entity.name}: {there}", field, nearest_name(field, fields))
-    if field == DOWN:
+    if field == DOWN and entity.is_robot:
         if not isinstance(value, bool):
             raise BadValue("neither true nor false", value)
         return [Set(entity.name, DOWN, [float(value)])]
-    if field == AT:
-        return _put(spec, layout, numbers, entity, value)
+    if field == AT and _is_placed(spec, entity):
+        edits = _put(spec, layout, numbers, entity, value)
+        if is_checked:
+            _check_place(spec, layout, numbers, entity, edits)
+        return edits
     label, _, name = field.partition(".")
-    made, quantity = next((made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label)
+    found = [(made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label and name in its]
+    if not found:
+        fields = settable(spec, layout, entity)
+        there = f"settable are {', '.join(fields)}" if fields else "nothing is"
+        raise BadValue(f"not settable on {entity.name}: {there}", field, nearest_name(field, fields))
+    made, quantity = found[0]
     try:
         number = float(quantity.read(value))
     except PydanticCustomError as error:
         raise BadValue(str(error), value) from None
-    view = _Recording(0, [*numbers])
-    if hasattr(made, "set"):
-        called(label, entity.name, 0, made.set, view, name, number)
-    else:
-        view.changed[f"{label}.{name}"] = [number]
-    return [Set(entity.name, slot, values) for slot, values in view.changed.items()]
-
-
-class _Recording(WritableView):
-    """A view that keeps what is written, by the name of the field on the entity."""
-
-    __slots__ = ("changed",)
-
-    def __init__(self, tick: int, numbers: list[float]) -> None:
-        super().__init__(tick, numbers)
-        self.changed: dict[str, list[float]] = {}
-
-    def write(self, slot: Slot, *values: float) -> None:
-        """Keep the numbers of a slot, which the component must have declared."""
-        super().write(slot, *values)
-        self.changed[slot.name.partition(" ")[2]] = [*values]
+    slots = called(label, entity.name, 0, made.set, name, number) if hasattr(made, "set") else {name: [number]}
+    own = {f"{label}.{slot}" if f"{label}.{slot}" in entity.offsets else slot: its for slot, its in slots.items()}
+    return [Set(entity.name, slot, [*its]) for slot, its in own.items()]
 
 
 def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple[str, Any, Mapping[str, Quantity]]]:
@@ -137,21 +137,29 @@ def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Enti
     placed = [0.0] * layout.size
     made = entity.kind.made(settings, mounting_of(spec, layout, entity))
     called(f"model {entity.model}", entity.name, 0, made.place, WritableView(0, placed))
-    after = [*numbers]
     edits = []
     for field, count in entity.fields.items():
         at = entity.offsets[field]
         if field in PLACED or field in STOPPED:
-            after[at : at + count] = placed[at : at + count] if field in PLACED else [0.0] * count
-            edits.append(Set(entity.name, field, after[at : at + count]))
+            edits.append(Set(entity.name, field, placed[at : at + count] if field in PLACED else [0.0] * count))
     if numbers[entity.offsets[QUARANTINED]] != 0.0:
         edits.append(Set(entity.name, QUARANTINED, [0.0]))
+    return edits
+
+
+def _check_place(
+    spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, edits: Sequence[Set]
+) -> None:
+    """Raise BadValue where edits put an entity into something."""
+    after = [*numbers]
+    for edit in edits:
+        at = entity.offsets[edit.field]
+        after[at : at + len(edit.numbers)] = edit.numbers
     what = occupied_by(spec, layout, after, entity)
     if what:
         at = entity.offsets["position"]
         x, y, z = after[at : at + 3]
         raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", f"{x:g} m, {y:g} m, {z:g} m")
-    return edits
 
 
 def _elsewhere(spec: WorldSpec, entity: Entity, pose: Pose) -> Any:
@@ -181,8 +189,8 @@ def _completed(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity
     position, orientation = _frame_of(spec, layout, numbers, entity)
     x, y, z = (getattr(asked, key) if key in keys else was for key, was in zip("xyz", position, strict=True))
     if {"roll", "pitch", "yaw"}.isdisjoint(keys):
-        a, b, c, d = orientation
-        return Pose(x, y, z, atan2(2.0 * (d * c + a * b), 1.0 - 2.0 * (b * b + c * c)), orientation)
+        yaw = numbers[entity.offsets["heading"]] if "heading" in entity.offsets else 0.0
+        return Pose(x, y, z, yaw, orientation)
     return Pose(x, y, z, asked.yaw, asked.orientation)
 
 
