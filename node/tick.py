@@ -38,7 +38,8 @@ from foosim.world.setting.scheduled import Schedule
 
 ECHO = "echo"
 RETRIES: Final = 3
-"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is removed."""
+"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is put elsewhere
+or removed."""
 RETRY_NS: Final = 1_000_000_000
 ATTEMPTS: Final = 8
 """The field `quarantined` is this many times the ticks that are left, plus how often the body has come into quarantine;
@@ -330,7 +331,7 @@ class Stepper:
         attempt = 1 - numbers[at]
         if attempt > RETRIES:
             numbers[at] = attempt
-            return "until it is removed"
+            return "until it is put elsewhere or removed"
         numbers[at] = attempt - ATTEMPTS * (-RETRY_NS // self.deployment.tick_ns)
         return f"for 1 s, then it is solved again ({attempt:.0f} of {RETRIES})"
 
