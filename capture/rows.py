@@ -17,7 +17,7 @@ from msgspec import Meta
 from foosim.capture.mcap.checks import CaptureError
 from foosim.common import limits
 from foosim.common.struct_types import Counter
-from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
+from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, Set
 from foosim.world.robot_packets import Delivered
 
 FORMAT: Final = 4
@@ -41,7 +41,7 @@ class Row(msgspec.Struct, frozen=True, gc=False):
 class EditRow(Row, frozen=True):
     """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
 
-    kind: Literal["add", "remove", "push", "freeze", "thaw", "network"]
+    kind: Literal["add", "remove", "push", "set", "network"]
     name: str = ""
     model: str = ""
     position: list[float] = []
@@ -49,6 +49,9 @@ class EditRow(Row, frozen=True):
     impulse: list[float] = []
     event: str = ""
     """What happens to the network, as JSON."""
+    field: str = ""
+    numbers: list[float] = []
+    """What a field of an entity is set to, SI units."""
 
 
 class DeliveredRow(Row, frozen=True, omit_defaults=True):
@@ -339,7 +342,7 @@ def edit_of(row: EditRow) -> Edit:
         return Push(row.name, _vector(row.impulse))
     if row.kind == "network":
         return Disrupt(row.event)
-    return Freeze(row.name) if row.kind == "freeze" else Thaw(row.name)
+    return Set(row.name, row.field, row.numbers)
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:

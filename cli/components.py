@@ -12,6 +12,7 @@ from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.registration import VALUES
 from foosim.world.forms.registry import FORMS
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
+from foosim.world.placing import is_placed
 
 OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
@@ -61,6 +62,7 @@ def as_json(component: Form) -> dict[str, Any]:
         "kit": component.kit,
         "meshes": getattr(component, "meshes", False),
         **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.form, ())},
+        "settable": _settable(component),
     }
     if isinstance(component, Model) and component.variants:
         about["variants"] = {
@@ -73,6 +75,14 @@ def as_json(component: Form) -> dict[str, Any]:
             {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
         ]
     return about
+
+
+def _settable(component: Form) -> dict[str, str]:
+    """Return what can be set of one while a run goes on, and what is valid."""
+    if isinstance(component, Model):
+        placed = {"at": "a pose"} if is_placed(component.settings) else {}
+        return {**placed, **({"down": "true or false"} if component.is_robot else {})}
+    return {name: f"{one.low} to {one.high}" for name, one in getattr(component, "settable", {}).items()}
 
 
 def _moved(model: Model) -> dict[str, Any]:
@@ -107,6 +117,8 @@ def lines(component: Form) -> Iterator[str]:
     if about["needs"]:
         yield f"  needs a model with: {', '.join(about['needs'])}"
     yield from _lines_of_form(about)
+    if about["settable"]:
+        yield f"  can be set: {', '.join(f'{name} ({valid})' for name, valid in about['settable'].items())}"
     if about["meshes"]:
         yield "  has scenery of triangles (shape: mesh)"
     if component.kit:

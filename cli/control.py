@@ -142,6 +142,39 @@ def push(
     show_answer(control.push(_three("impulse", "N s", impulse), name, run), json)
 
 
+@app.command(name="set")
+def set_field(
+    name: Annotated[str, typer.Argument(metavar="ENTITY", help="Which entity.", show_default=False)],
+    setting: Annotated[
+        str, typer.Argument(metavar="FIELD=VALUE", help="What, and to which value.", show_default=False)
+    ],
+    run: RunOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Set a field of an entity, e.g. `crate-1 at=3,1` or `scout down=true`.
+
+    Fields: `at` is a pose, X,Y or X,Y,Z in m, or a mapping such as "{x: 3 m, yaw: 90 deg}"; what it does not say stays
+    as it is. `down` is whether a robot is out of service. `COMPONENT.FIELD` is what `foosim components` shows as "can
+    be set".
+    """
+    field, is_set, text = setting.partition("=")
+    if not is_set:
+        raise BadValue("no setting, which is FIELD=VALUE", setting)
+    show_answer(control.set(name, field, _read_value(text), run), json)
+
+
+def _read_value(text: str) -> object:
+    """Return true, false and mappings as YAML has them, anything else as it is."""
+    import yaml
+
+    if text not in ("true", "false") and not text.startswith("{"):
+        return text
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise BadValue(f"no mapping: {error}".partition("\n")[0], text) from None
+
+
 def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
     """Return three numbers; raises BadValue with what the numbers are, which typer's message lacks."""
     needed = f"{what}: three numbers are needed, X Y Z in {unit}"

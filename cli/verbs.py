@@ -100,6 +100,7 @@ class Foosim(Verbs):
             ),
             "remove": Verb("cli.control", "Remove an entity that was added."),
             "push": Verb("cli.control", "Apply an impulse to a free body."),
+            "set": Verb("cli.control", "Set a field of an entity, e.g. `crate-1 at=3,1` or `scout down=true`."),
             "move": Verb("cli.control", "Move a robot to another node; the world stays the same."),
             "stop": Verb("cli.control", "Stop a node, after its robots have moved to the other nodes."),
             "start": Verb(

@@ -252,6 +252,14 @@ def push(impulse: Vector, name: str | None = None, run: str | None = None) -> An
     return _ask(run, "push", impulse=impulse, **({} if name is None else {"name": name}))
 
 
+def set(name: str, field: str, value: Any, run: str | None = None) -> Answer:  # the word of the command
+    """Set a field of an entity: `at` (a pose), `down` (whether a robot is out of service), or `COMPONENT.FIELD`.
+
+    Values are as in a deployment: texts with units, `True` or `False`, a mapping of x, y, z, roll, pitch, yaw.
+    """
+    return _ask(run, "set", name=name, field=field, value=value)
+
+
 def network(event: dict[str, Any], run: str | None = None) -> Answer:
     """Have something happen to the network: an event of a deployment without its time."""
     return _ask(run, "network", event=event)

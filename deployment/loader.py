@@ -68,6 +68,8 @@ Text = str | Source
 
 _kept: dict[tuple[Text, str], Deployment] = {}
 """By text and name, the least recently used first."""
+_trees: dict[tuple[Text, str], Tree] = {}
+"""Of canonical texts what they were made from, with its places in the files as written."""
 
 
 def load_deployment(text: Text, name: str) -> Deployment:
@@ -144,6 +146,10 @@ def _applied(
     tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
     _keep(canonical, name, _check(tree, problems))
+    while len(_trees) >= DEPLOYMENTS_KEPT:
+        _trees.pop(next(iter(_trees)))
+    if tree is not None:
+        _trees[canonical, name] = tree
     return canonical
 
 
@@ -238,7 +244,9 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
     `text`, `name` and `sets` are what it was loaded from.
     """
     if findings:
-        tree, _ = _with_sets(*read_source(text, name), sets)
+        tree = _trees.get((text, name)) if not sets else None
+        if tree is None:
+            tree, _ = _with_sets(*read_source(text, name), sets)
         assert tree is not None, "it was loaded"
         expanded = expand(tree)
         assert expanded.tree is not None, "it was loaded"
@@ -307,7 +315,7 @@ def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
 
 
 def _start_findings(deployment: Deployment) -> Iterator[Finding]:
-    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies."""
+    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies; and events."""
     if any(map(stands_upright, deployment.robots.values())):
         from foosim.world.clearance.start import start_findings  # brings numpy
 
@@ -317,6 +325,10 @@ def _start_findings(deployment: Deployment) -> Iterator[Finding]:
         from foosim.world.clearance.overlaps import overlap_findings  # brings numpy
 
         yield from overlap_findings(deployment)
+    if deployment.events:
+        from foosim.world.setting.scheduled import event_findings  # brings numpy
+
+        yield from event_findings(deployment)
 
 
 def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:

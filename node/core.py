@@ -351,7 +351,8 @@ class NodeCore:
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         islands, movers = term.members(share)
-        values = None if edits or term.stepper.world.has_rules else frame.values
+        is_edited = edits or frame.tick in term.stepper.events.by_tick or term.stepper.world.has_rules
+        values = None if is_edited else frame.values
         self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers, values)
         return True
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from foosim.world.assembly.world import body_of, model_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView, called
-from foosim.world.edits import Add, Edit, Freeze, Push, Thaw, fitting_edits, layout_after, removed
-from foosim.world.forms.forms import NO_ENTITY
+from foosim.world.edits import Add, Edit, Push, Set, fitting_edits, layout_after, removed
+from foosim.world.forms.forms import DOWN, NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout
+from foosim.world.layout import Entity, Layout
 from foosim.world.spec import WorldSpec
 
 
@@ -29,12 +29,16 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, 
             called(what, change.name, view.tick, made.place_at, view, change.position, change.velocity)
         elif isinstance(change, Push) and change.name in layout:
             _push(numbers, layout, change, spec)
-        elif isinstance(change, Freeze | Thaw):
-            _take_out(view, numbers, spec, layout, change)
+        elif isinstance(change, Set) and change.name in layout:
+            entity = layout[change.name]
+            at = entity.offsets[change.field]
+            numbers[at : at + len(change.numbers)] = change.numbers
+            if change.field == DOWN and entity.is_robot:
+                _hold(view, numbers, spec, layout, entity)
     return layout, numbers
 
 
-def _moved(frame: Frame, layout: Layout, gone: Set[str]) -> list[float]:
+def _moved(frame: Frame, layout: Layout, gone: Collection[str]) -> list[float]:
     """Return a frame's numbers in another layout; entities that are new there are zero, as under a name of one gone.
 
     References follow their entities; those to entities that are gone become -1.
@@ -53,7 +57,7 @@ def _moved(frame: Frame, layout: Layout, gone: Set[str]) -> list[float]:
     return numbers
 
 
-def moved_reference(reference: float, old: Layout, new: Layout, gone: Set[str]) -> float:
+def moved_reference(reference: float, old: Layout, new: Layout, gone: Collection[str]) -> float:
     """Return a reference to an entity in another layout, -1 where the entity is gone."""
     if not 0.0 <= reference < len(old.entities):
         return NO_ENTITY
@@ -69,10 +73,8 @@ def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> 
         numbers[start + axis] += impulse / mass
 
 
-def _take_out(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, change: Freeze | Thaw) -> None:
-    """Mark a robot as out of service or back in it; its actuators hold it where it is."""
-    robot = layout[change.name]
-    numbers[robot.offsets["down"]] = float(isinstance(change, Freeze))
+def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, robot: Entity) -> None:
+    """Have the actuators of a robot that goes out of service, or comes back, hold it where it is."""
     for one in actuators_of(spec, layout, robot):
         called(f"actuator {one.channel}", robot.name, view.tick, one.actuator.hold, view)
         for field, at in robot.offsets.items():

@@ -34,10 +34,12 @@ from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
+from foosim.world.setting.scheduled import Schedule
 
 ECHO = "echo"
 RETRIES: Final = 3
-"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is removed."""
+"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is put elsewhere
+or removed."""
 RETRY_NS: Final = 1_000_000_000
 ATTEMPTS: Final = 8
 """The field `quarantined` is this many times the ticks that are left, plus how often the body has come into quarantine;
@@ -77,6 +79,7 @@ class Stepper:
         self.world = World(deployment, layout, is_watched=is_watched)
         self._is_watched = is_watched
         self.substeps = deployment.substeps
+        self.events = Schedule(deployment)
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
@@ -133,13 +136,15 @@ class Stepper:
         return packets, view.written
 
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
-        """Return layout and numbers of the frame after the order's edits and the world's rules."""
+        """Return layout and numbers of the frame after the edits of order and events, and the rules of the world."""
+        if frame.tick in self.events.by_tick:
+            edits = [*edits, *self.events.edits(frame)]
         layout, numbers = edit(frame, edits, self.deployment)
         is_same = layout is self.layout or layout.digest == self.layout.digest
         world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)
         world.apply_rules(numbers, frame.tick)
         if edits or world.has_rules:
-            wake_edited(frame, layout, numbers)
+            wake_edited(frame, layout, numbers, edits)
             self._standing.wake_edited(frame, layout, numbers)
         return layout, numbers
 
@@ -326,7 +331,7 @@ class Stepper:
         attempt = 1 - numbers[at]
         if attempt > RETRIES:
             numbers[at] = attempt
-            return "until it is removed"
+            return "until it is put elsewhere or removed"
         numbers[at] = attempt - ATTEMPTS * (-RETRY_NS // self.deployment.tick_ns)
         return f"for 1 s, then it is solved again ({attempt:.0f} of {RETRIES})"
 

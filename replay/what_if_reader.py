@@ -52,7 +52,7 @@ class Offered:
 
 def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
     """Return which frames are needed: where no fate depends on places and nobody is taken out of service, only one."""
-    if not on_radio and not {"freeze", "thaw"} & capture.edit_kinds:
+    if not on_radio and "set" not in capture.edit_kinds and not capture.deployment.events:
         return "first"
     return "captured" if set(judged_ticks(capture)) <= set(capture.frame_ticks.tolist()) else "computed"
 

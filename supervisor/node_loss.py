@@ -10,7 +10,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 
 from foosim.supervisor.roster import IN_FLIGHT_NS, Process, refuse
 from foosim.supervisor.state import RunState
-from foosim.world.edits import Edit, Freeze, Thaw
+from foosim.world.edits import Edit, Set
+from foosim.world.forms.forms import DOWN
 
 
 class NodeLoss:
@@ -91,10 +92,10 @@ class NodeLoss:
         away = {robot: node for robot, node in state.returns.items() if node != name}
         state.note_recovery("join", name, "back" if self._was_lost(name) else "started")
         if self._freezes:
-            frozen: list[Edit] = [Freeze(robot) for robot in sorted(away)]
+            frozen: list[Edit] = [Set(robot, DOWN, [1.0]) for robot in sorted(away)]
             state.order(state.frame.tick, [] if state.members else frozen)
             back = [robot for robot in sorted(owners) if owners[robot] == name and robot not in away]
-            state.order(state.released, [Thaw(robot) for robot in back])
+            state.order(state.released, [Set(robot, DOWN, [0.0]) for robot in back])
         self.open(owners, [*state.members, name], now_ns)
         state.returns = away
         state.journal(state.control())
@@ -117,7 +118,7 @@ class NodeLoss:
         """An operator chose the owner of a robot: it does not go back to another node, and runs."""
         state = self._state
         if state.returns.pop(robot, None) is not None and self._freezes:
-            state.order(state.released, [Thaw(robot)])
+            state.order(state.released, [Set(robot, DOWN, [0.0])])
 
     def open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
         """Open an epoch.
@@ -157,8 +158,8 @@ class NodeLoss:
         """Where configured, take the robots of a lost node out of service from the last commit on."""
         state = self._state
         if self._freezes:
-            frozen: list[Edit] = [Freeze(robot) for robot, owner in sorted(state.owners.items()) if owner == lost]
-            state.order(state.frame.tick, frozen)
+            its = [robot for robot, owner in sorted(state.owners.items()) if owner == lost]
+            state.order(state.frame.tick, [Set(robot, DOWN, [1.0]) for robot in its])
 
 
 def fewest(owners: Mapping[str, str], members: Collection[str]) -> str:

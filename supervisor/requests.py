@@ -1,10 +1,10 @@
-"""Requests of operators: pause, resume, step, rate, add, remove, move, balance, push, network, stop and start (a
-node), down; and of viewers: status, describe, watch.
+"""Requests of operators: pause, resume, step, rate, add, remove, move, balance, push, set, network, stop and start
+(a node), down; and of viewers: status, describe, watch.
 
-A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
-first tick not yet released, network with what is sent at the next one, add and remove at the first not yet released
-when all nodes are ready for it, a move at the last commit, with its epoch. A request is journalled when its tick is
-chosen, then answered; one that only reads is neither journalled nor kept. To add a verb: a method and a row.
+A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push and set
+at the first tick not yet released, network with what is sent at the next one, add and remove at the first not yet
+released when all nodes are ready for it, a move at the last commit, with its epoch. A request is journalled when its
+tick is chosen, then answered; one that only reads is neither journalled nor kept. To add a verb: a method and a row.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from math import hypot
 from typing import Any, Final
 
 from foosim.common import limits
-from foosim.common.errors import Malformed, Refused, show
+from foosim.common.errors import BadValue, Malformed, Refused, show
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.units import parse_pace
@@ -33,6 +33,7 @@ from foosim.world.assembly.world import addition, body_of
 from foosim.world.components.view import ComponentError
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.world.layout import Layout
+from foosim.world.setting.settable import set_edits, settable
 
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
@@ -88,6 +89,7 @@ class Requests:
             "move": self._move,
             "balance": self._balance,
             "push": self._push,
+            "set": self._set,
             "network": self._network,
             "stop": self._stop_node,
             "start": self._start_node,
@@ -287,6 +289,21 @@ class Requests:
             raise Refused(f"impulse: {size:g} N s in all are too much, valid are {limit}")
         tick = self._tick_for_edit()
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
+
+    def _set(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Set a field of an entity, whose numbers follow from the newest frame and what is ordered since."""
+        state, field = self._state, _name(arguments, "field")
+        layout = state.frame.layout
+        movable = [entity.name for entity in layout.entities if settable(state.deployment, layout, entity)]
+        entity = layout[chosen("entity with something to set", _name(arguments, "name"), movable)]
+        tick = self._tick_for_edit()
+        try:
+            edits = set_edits(state.deployment, layout, state.coming_numbers(), entity, field, arguments.get("value"))
+        except ComponentError as error:
+            raise Refused(str(error)) from error
+        except BadValue as bad:
+            raise Refused(f"{field} of {entity.name}: {bad}") from bad
+        return self._accept(request, tick, f"{field} of {entity.name} set at tick {tick}", [*edits])
 
     def _tick_for_edit(self) -> int:
         """Return the first tick that is not released; raises Refused when its order is full."""

@@ -1,17 +1,21 @@
-"""The edits of an order: what adds, removes, pushes, freezes and thaws, and the layout after them. Pure."""
+"""The edits of an order: what adds, removes, pushes and sets, and the layout after them. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Annotated
+from typing import Annotated, Final
 
 from msgspec import Meta
 
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
+from foosim.world.forms.forms import SLOTS_MAX
 from foosim.world.layout import Layout
+
+FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX
+"""Characters of a field: the names of a component, of a modifier of it, and of a slot, and two points."""
 
 
 class Add(Message, frozen=True):
@@ -36,16 +40,15 @@ class Push(Message, frozen=True):
     impulse: Vector
 
 
-class Freeze(Message, frozen=True):
-    """Take a robot out of service: it holds still, senses nothing, and no packet reaches it (`down` in the frame)."""
+class Set(Message, frozen=True):
+    """Write the numbers of a field of an entity.
+
+    A robot whose `down` is 1 is out of service: it holds still, senses nothing, and no packet reaches it.
+    """
 
     name: Name
-
-
-class Thaw(Message, frozen=True):
-    """Put a robot that was frozen back into service."""
-
-    name: Name
+    field: Annotated[str, Meta(min_length=1, max_length=FIELD_MAX)]
+    numbers: Annotated[list[float], Meta(max_length=SLOTS_MAX)]
 
 
 class Disrupt(Message, frozen=True):
@@ -54,7 +57,7 @@ class Disrupt(Message, frozen=True):
     event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
 
 
-Edit = Add | Remove | Push | Freeze | Thaw | Disrupt
+Edit = Add | Remove | Push | Set | Disrupt
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
@@ -62,8 +65,8 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
     """Return the edits that do something to a world with this layout, in their order.
 
     An addition of a name that is taken, or of a model of which the world cannot have more, the removal of what was not
-    added, a push of what is no free body and a freeze of what is no robot change nothing, and what happens to the
-    network is the vHub's: a function of the order alone, the same for all who read it.
+    added, a push of what is no free body and a field that an entity has not, or not of so many numbers, change nothing,
+    and what happens to the network is the vHub's: a function of the order alone, the same for all who read it.
     """
     models = dict(layout.models)
     addable, declared = layout.declared.addable, layout.declared.names
@@ -81,8 +84,8 @@ def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
             del models[edit.name]
         elif edit.name not in models:
             continue
-        elif isinstance(edit, Freeze | Thaw):
-            if not layout.kind_of(models[edit.name]).is_robot:
+        elif isinstance(edit, Set):
+            if edit.name not in layout or layout[edit.name].counts.get(edit.field) != len(edit.numbers):
                 continue
         elif not layout.would_be_free(edit.name, models[edit.name]):
             continue
@@ -118,5 +121,7 @@ def check_edits(edits: Sequence[Edit]) -> None:
             numbers = (*change.position, *change.velocity)
         elif isinstance(change, Push):
             numbers = change.impulse
+        elif isinstance(change, Set):
+            numbers = tuple(change.numbers)
         if not all(isfinite(number) for number in numbers):
             raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")

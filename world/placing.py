@@ -43,5 +43,10 @@ class MountedAt(At):
     link: LinkName | None = None
 
 
+def is_placed(settings: type[SpecBase]) -> bool:
+    """Whether settings say where an entity starts: its pose, or its place on the ground and its heading."""
+    return "at" in settings.model_fields or {"x", "y", "heading"}.issubset(settings.model_fields)
+
+
 ORIGIN_OF_WORLD: Final = At()
 FIRST_LINK: Final = MountedAt()

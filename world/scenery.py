@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, StringConstraints
 
 from foosim.common import limits, units
 from foosim.common.errors import BadValue
@@ -83,7 +83,7 @@ Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "1000 m")]
 Position = Annotated[float, Quantity(units.LENGTH, "-1000 m", "1000 m")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 Share = Annotated[float, Field(ge=0, le=1)]
-SurfaceName = Literal["floor", "walls", "goal", "ramps"]
+SurfaceName = Annotated[str, StringConstraints(max_length=48)]
 
 
 class Material(SpecBase):
@@ -101,7 +101,7 @@ class Material(SpecBase):
 class Placed(SpecBase):
     """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
 
-    `surface` is what it is to a table's ball, `radio` what waves that cross it lose: 5 dB by default.
+    `surface` is what rigid bodies feel of it, '' nothing; `radio` what waves that cross it lose: 5 dB by default.
     """
 
     x: Position = default("0 m")

@@ -11,6 +11,7 @@ from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
+from foosim.world.events import EVENTS_MAX, WorldEvent
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Kit
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
@@ -93,7 +94,7 @@ def default_engine(world: Mapping[str, Any]) -> str:
 
 
 class WorldSpec(SpecBase):
-    """The world: its robots, the sections of kits, rules, a scene, and fixed things.
+    """The world: its robots, the sections of kits, rules, a scene, fixed things, and what is set at which time.
 
     `digests` (BLAKE2b) say which files are meant that models of robots are made from, by path in the asset folder; they
     are written when a run is planned. A world without an `engine` has bullet if there are rods or balls in it, else
@@ -113,6 +114,7 @@ class WorldSpec(SpecBase):
     physics: PhysicsSettings | None = None
     surfaces: dict[Name, SurfaceSettings] = Field(default={}, max_length=SURFACES_MAX)
     objects: dict[RobotName, SerializeAsAny[EntitySettings]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    events: list[WorldEvent] = Field(default=[], max_length=EVENTS_MAX)
     digests: dict[AssetPath, Digest] = Field(default={}, max_length=ROBOT_FILES_MAX)
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     engine: str = Field(default_factory=default_engine)

@@ -1,4 +1,4 @@
-"""Descriptions of edits of a run's world: entities that were added, removed, pushed, robots that were moved."""
+"""Descriptions of edits of a run's world: entities that were added, removed, pushed, set, robots that were moved."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from foosim.capture.rows import EditRow, EpochRow
+from foosim.world.forms.forms import DOWN
+from foosim.world.setting.settable import WITH_A_PLACE
 
 
 def edit_text(edit: EditRow) -> str:
@@ -14,7 +16,18 @@ def edit_text(edit: EditRow) -> str:
         return f"push {edit.name} by {_vector(edit.impulse)} N s"
     if edit.kind == "add":
         return f"add {edit.name} ({edit.model}) at {_vector(edit.position)} m, with {_vector(edit.velocity)} m/s"
+    if edit.kind == "set":
+        return _set_text(edit)
     return f"remove {edit.name}" if edit.kind == "remove" else ""
+
+
+def _set_text(edit: EditRow) -> str:
+    """Return a description of a field that is set; empty for what comes with a place."""
+    if edit.field == DOWN:
+        return f"{edit.name} is {'out of' if edit.numbers == [1.0] else 'in'} service"
+    if edit.field == "position":
+        return f"put {edit.name} at {_vector(edit.numbers)} m"
+    return "" if edit.field in WITH_A_PLACE else f"set {edit.name} {edit.field} to {_vector(edit.numbers)}"
 
 
 def _vector(numbers: Sequence[float]) -> str:

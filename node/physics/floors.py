@@ -1,5 +1,5 @@
 """Floors: wide upright boxes of scenery. To bodies above one, away from its edges, it is a plane: contacts with planes
-cost a tenth of a solve less, and nothing falls through one."""
+cost a tenth of a solve less. Whatever is not above it at the start of a tick, or near its edges, meets the box."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from foosim.world.layout import Entity
 from foosim.world.scene import UPRIGHT, Body, Box, Shape, Vector, moved, swept_box
 
 EDGE_M: Final = 1.0
-"""How far all of a body is from a floor's edges, at least: no body gets as far in a tick."""
+"""How far all of a body is from a floor's edges, at least. What goes farther in a tick is carried until its end."""
+THICKNESS_MIN_M: Final = 0.05
+SUNK_M: Final = 0.001
+"""By how much the middle of a body that lies on a floor may be below its surface: that of a thin one is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +24,7 @@ class Plane:
 
 
 Floor: TypeAlias = tuple[int, float, float, float, float, float]
-"""Its place in the scenery, the middle and the half sides of where bodies may be, x and y, and its lower side."""
+"""Its place in the scenery, the middle and the half sides of where bodies may be, x and y, and its upper side."""
 
 
 class Floors:
@@ -42,7 +45,7 @@ class Floors:
     def below(self, entities: Sequence[Entity], numbers: Sequence[float]) -> tuple[int, ...]:
         """Return the places in the scenery of the floors that all of these are above."""
         found = []
-        for number, middle_x, middle_y, wide, deep, low in self._floors:
+        for number, middle_x, middle_y, wide, deep, top in self._floors:
             for entity in entities:
                 its = self._free.get(entity.index)
                 if its is None:
@@ -50,7 +53,7 @@ class Floors:
                 else:
                     at, reach = its
                     x, y, z = numbers[at : at + 3]
-                if not (abs(x - middle_x) + reach < wide and abs(y - middle_y) + reach < deep and z > low):
+                if not (abs(x - middle_x) + reach < wide and abs(y - middle_y) + reach < deep and z > top - SUNK_M):
                     break
             else:
                 found.append(number)
@@ -59,9 +62,11 @@ class Floors:
 
 def _floors(number: int, shape: Shape) -> list[Floor]:
     box, (x, y, z) = shape.geometry, shape.position
-    if not isinstance(box, Box) or shape.orientation != UPRIGHT or min(box.half[:2]) <= EDGE_M:
+    if not isinstance(box, Box) or shape.orientation != UPRIGHT:
         return []
-    return [(number, x, y, box.half[0] - EDGE_M, box.half[1] - EDGE_M, z - box.half[2])]
+    if min(box.half[:2]) <= EDGE_M or box.half[2] < THICKNESS_MIN_M / 2:
+        return []
+    return [(number, x, y, box.half[0] - EDGE_M, box.half[1] - EDGE_M, z + box.half[2])]
 
 
 def as_plane(floor: Shape) -> Shape:

@@ -122,7 +122,7 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     timeline.take_epoch(epoch(90, 3, ["n1"], a="n1", b="n1"))
     timeline.take_recovery(RecoveryRow("node", "n2", "silent", 89, 3, 120_000_000))
     push = EditRow("push", "ball", impulse=[0.1, 0.0, 0.0])
-    timeline.take_edits(21, [push, EditRow("freeze", "a"), EditRow("network", event="{")])
+    timeline.take_edits(21, [push, EditRow("set", "a", field="down", numbers=[1.0]), EditRow("network", event="{")])
     cut = '{"partition": [["player-red"], ["camera"]]}'
     timeline.take_edits(30, [EditRow("network", event=cut)])
     for at_ns in (0, 1, 30 * SECOND_NS):
@@ -131,6 +131,7 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     assert timeline.news() == [
         Mark(0, "drops", "3 dropped: blocked 2, random_loss 1"),
         Mark(20, "push", edit_text(push)),
+        Mark(20, "set", "a is out of service"),
         Mark(21, "network", "an event of the network that cannot be read"),
         Mark(30, "network", "partition player-red | camera"),
         Mark(50, "move", "move a from n1 to n2"),

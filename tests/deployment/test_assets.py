@@ -166,6 +166,15 @@ def test_meshes_have_a_limit_together(monkeypatch: pytest.MonkeyPatch) -> None:
         deployment.with_assets({})
 
 
+def test_what_is_wrong_with_files_has_the_line_of_the_file_as_written(folder: Path) -> None:
+    """What is pinned is the canonical text, in which a mapping in braces takes several lines."""
+    wall = "scenery: {wall: {shape: mesh, file: parts/shard.obj, scale: 0.02, x: 5 m, radio: {is: concrete}}}"
+    written = f"{TEXT}assets: models\n{wall}\n"
+    line = written.count("\n")
+    with pytest.raises(DeploymentError, match=rf"^table\.yaml:{line}:[0-9]+: scenery\.wall\.radio"):
+        pin_assets(apply_sets(written, "table.yaml", []), "table.yaml", folder)
+
+
 def test_an_archive_is_not_unpacked(folder: Path) -> None:
     """What an archive's members are called does not matter, since nothing looks for them."""
     with zipfile.ZipFile(folder / "models" / "slip.obj", "w") as archive:

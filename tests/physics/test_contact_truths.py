@@ -208,6 +208,16 @@ def test_a_floor_carries_what_is_on_it_and_ends_at_its_edges(x: float, speed: fl
     assert places[-1][2] == pytest.approx(z - GRAVITY * fallen_s**2 / 2, abs=0.05)
 
 
+def test_a_floor_stops_what_comes_from_below() -> None:
+    """A ball at 15 m/s against the underside of a deck, 1 m thick, turns back."""
+    deck = {"deck": {**PLANK, "height": "1 m", "z": "3 m", "surface": "floor"}}
+    below = {"a": {"model": "sphere", "radius": "10 cm", "mass": "1 kg", "at": {"z": "2 m"}}}
+    yard = world(GRAVITY, objects=below, scenery=deck)
+    yard.put("a", "linear_velocity", 0.0, 0.0, 15.0)
+    yard.step(50)
+    assert yard.vector("a", "position")[2] < 2.5
+
+
 def test_what_falls_slowly_goes_on_falling() -> None:
     """At 15 mm/s2, which a threshold of speed takes for rest after 0.7 s."""
     yard = world(0.015, objects=one_box(z="1 m"))

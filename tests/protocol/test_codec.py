@@ -24,7 +24,7 @@ from foosim.protocol import codec
 from foosim.protocol.channels import CHANNELS, Channel
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Done, End, Epoch, Hello, Order, Part, Request, Sent, Up, Want
-from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw
+from foosim.world.edits import Add, Edit, Push, Remove, Set
 from foosim.world.robot_packets import Delivered
 from foosim.world.start import AddedEntity
 
@@ -296,8 +296,7 @@ def test_edits_are_told_apart_by_their_tags() -> None:
     edits: list[Edit] = [
         Add("b", "ball", (0.0, 0.0, 0.1), (1.0, -0.0, 0.0)),
         Push("ball", (0.0, 1e-300, 0.0)),
-        Freeze("red.goal"),
-        Thaw("red.goal"),
+        Set("red.goal", "down", [1.0]),
         Remove("b"),
     ]
     order = decode(Order, encode(Order(1, 2, edits)))

@@ -17,7 +17,7 @@ from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
 from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
-from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
+from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
 from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
@@ -140,7 +140,9 @@ def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
         build_layout(DEPLOYMENT, [("b2", "ball")])
     still = (0.0, 0.0, 0.0)
     edits: list[Edit] = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still)]
-    assert fitting_edits(layout, [*edits, Freeze("rover01"), Thaw("base")]) == [Freeze("rover01"), Thaw("base")]
+    fitting: list[Edit] = [Set("rover01", "down", [1.0]), Set("base", "down", [0.0])]
+    unfit: list[Edit] = [Set("rover01", "charge", [1.0, 2.0]), Set("base", "speed", [1.0]), Set("none", "down", [1.0])]
+    assert fitting_edits(layout, [*edits, *unfit, *fitting]) == fitting
 
 
 def test_rovers_start_where_they_are_declared() -> None:

@@ -23,7 +23,7 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
-from foosim.world.edits import Add, Freeze
+from foosim.world.edits import Add, Set
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
@@ -124,7 +124,7 @@ def test_a_robot_that_is_taken_out_of_service_forgets_what_waits() -> None:
     rod = Rod("[{kind: delay, time: 6 ms}]", "actuator")
     rod.command(0, 0.01)
     frame = Frame(1, rod.layout, np.array(rod.numbers))
-    _, rod.numbers = edit(frame, [Freeze("red.goal")], rod.deployment)
+    _, rod.numbers = edit(frame, [Set("red.goal", "down", [1.0])], rod.deployment)
     rod.numbers[rod.entity.offsets["down"]] = 0.0
     assert [rod.command(tick) for tick in range(1, 9)] == [0.0] * 8
 

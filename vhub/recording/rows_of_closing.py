@@ -52,7 +52,7 @@ from foosim.vhub.stages.medium import COLLISION
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_FULL
 from foosim.vhub.state.records import Closing
-from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove
+from foosim.world.edits import Add, Disrupt, Edit, Push, Remove
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout
 
@@ -295,4 +295,4 @@ def edit_row(edit: Edit) -> EditRow:
         return EditRow("push", edit.name, impulse=list(edit.impulse))
     if isinstance(edit, Disrupt):
         return EditRow("network", "", event=edit.event)
-    return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
+    return EditRow("set", edit.name, field=edit.field, numbers=edit.numbers)

@@ -66,7 +66,7 @@ class BodyLimits:
             return f"it is {farthest:.4g} m from the origin along an axis, the world ends at {WORLD_MAX_M:g} m"
         speed = speed_of(entity, its.radius, numbers)
         if speed > SPEED_MAX_M_S:
-            return f"a part of it moves at up to {speed:.4g} m/s, at most {SPEED_MAX_M_S:g} m/s are computed"
+            return f"a part of it moves at up to {speed:.6g} m/s, at most {SPEED_MAX_M_S:g} m/s are computed"
         way = sqrt((x - a) * (x - a) + (y - b) * (y - b) + (z - c) * (z - c))
         reach = reach_speed(its.speed_limit, speed_of(entity, its.radius, before)) * self._tick_s
         if way > reach * ROUNDING:

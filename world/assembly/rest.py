@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.world.components.drives import Drives
+from foosim.world.edits import Edit, Set
 from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -69,9 +70,13 @@ class Rest:
                 stop(entity, numbers)
 
 
-def wake_edited(before: Frame, layout: Layout, numbers: list[float]) -> None:
-    """Begin to count anew for each body that an order or a rule of the world has changed."""
+def wake_edited(before: Frame, layout: Layout, numbers: list[float], edits: Sequence[Edit]) -> None:
+    """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order puts
+    something elsewhere: they may have leaned on it."""
     old = before.numbers
+    if any(isinstance(edit, Set) and edit.field == "position" for edit in edits):
+        for entity in layout.resting:
+            numbers[entity.offsets[STILL_TICKS]] = 0.0
     for entity in layout.resting:
         at = entity.offsets[STILL_TICKS]
         if numbers[at] == 0.0 or entity.name not in before.layout:

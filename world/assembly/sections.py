@@ -13,6 +13,8 @@ from foosim.world.matter.physics import Physics, physics_from
 from foosim.world.spec import WorldSpec
 
 STANDARD_GRAVITY: Final = 9.80665
+RESTITUTION_NS: Final = 10_000_000
+"""Of substeps: a rebound is right within 5 % up to this, at 40 ms it has 3 % too much energy, at 100 ms 18 %."""
 FELT_BY_NOBODY: Final = ""
 """The surface of scenery that no rigid body feels."""
 
@@ -41,14 +43,25 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
         for key in ("physics", "surfaces"):
             if getattr(spec, key):
                 yield Finding((key,), f"what rigid bodies feel, which {felt[0]} says already", key, at="key")
-    if len(felt) == 1 or (not felt and _has_rigid(spec)):
+    if len(felt) <= 1:
         yield from _unfelt(spec)
+    if not felt and _has_rigid(spec):
+        yield from _too_long(spec)
     for _, kit in kits_of(spec):
         yield from kit.findings()  # type: ignore[attr-defined]
 
 
 def _has_rigid(spec: WorldSpec) -> bool:
     return any(registry.model_of(one).is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
+
+
+def _too_long(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield that substeps are too long for restitution: in one substep a contact begins and ends."""
+    least = -(-spec.tick_ns // RESTITUTION_NS)
+    bouncy = [name for name, surface in spec.surfaces.items() if surface.restitution > 0.0]
+    if bouncy and spec.substeps < least:
+        what = f"too few for the restitution of the surface {bouncy[0]}, which is right in substeps of at most 10 ms"
+        yield Finding(("substeps",), f"{what} (valid from {least} on)", spec.substeps)
 
 
 def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
@@ -61,6 +74,8 @@ def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
     if spec.scene is not None:
         surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
+    for name, thing in spec.scenery.items():
+        made.append((("scenery", name, "surface"), f"scenery {name}", [thing.surface], scenery))
     for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
         for name, one in entities.items():
             for key, surface in one.felt_surfaces.items():

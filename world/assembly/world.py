@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import Refused
 from foosim.common.keyed_random import draw_key
+from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import (
     EntityRule,
@@ -52,6 +53,8 @@ NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose marks cannot be told."""
 FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
+EVENT: Final = "event"
+EVENT_LOOK: Final = MarkKind("away", "events of the world", is_cut=True)
 TOGETHER_MIN: Final = 32
 """Actuators from which on they are asked together: fewer are asked one after the other in less time."""
 
@@ -122,7 +125,7 @@ def initial_numbers(
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
         if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
-            for label, own in _entity_rules_of(spec, layout, robot):
+            for label, own in entity_rules_of(spec, layout, robot):
                 if hasattr(own, "place"):
                     placed = watched(own) if is_watched else own
                     called(f"rule {label}", robot.name, 0, placed.place, view)
@@ -204,7 +207,7 @@ def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     made = [find_rule(settings).made for settings in world_rules(spec).values()]
     made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
     own = {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
-    return {FAILED: FAILED_LOOK, **own}
+    return {FAILED: FAILED_LOOK, **({EVENT: EVENT_LOOK} if spec.events else {}), **own}
 
 
 class WorldMarks:
@@ -219,10 +222,11 @@ class WorldMarks:
             (robot.name, label): rule
             for robot in layout.robots
             if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
-            for label, rule in _entity_rules_of(spec, layout, robot)
+            for label, rule in entity_rules_of(spec, layout, robot)
             if hasattr(rule, "marks")
         }
         """By entity and name: those of the world first."""
+        self._events = events_by_tick(spec)
 
     def between(self, before: Frame, after: Frame) -> list[Marked]:
         """Return what happened after one frame, up to a later one.
@@ -230,6 +234,9 @@ class WorldMarks:
         A rule that raises, or gives something else than marks, is left out from then on, and a mark says so.
         """
         found: list[Marked] = []
+        if self._events:
+            ticks = [tick for tick in self._events if before.tick <= tick < after.tick]
+            found += [(tick + 1, EVENT, event.text) for tick in sorted(ticks) for event in self._events[tick]]
         for (entity, label), rule in [*self._rules.items()]:
             if entity != WORLD and entity not in before.layout:
                 continue
@@ -268,7 +275,7 @@ class World:
         self._motions = _motions_of(spec, layout)
         self._moving = _Moving([], [])
         self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
-        rules = {robot.index: _entity_rules_of(spec, layout, robot) for robot in layout.robots}
+        rules = {robot.index: entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
         self.ruled = frozenset(self._entity_rules)
         """Entities that have rules of their own, by their indices."""
@@ -542,7 +549,8 @@ def are_motors(asked: object, count: int | None) -> bool:
     )
 
 
-def _entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
+def entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
+    """Return the rules of a robot by name, in name order. Raises ComponentError."""
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found = find_entity_rule(settings)

@@ -88,7 +88,7 @@ def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
         return
     order = {name: number for number, name in enumerate((*spec.robots, *spec.objects))}
     entities = sorted(layout.entities, key=lambda entity: order.get(entity.name, -1))  # what a kit brings comes first
-    pieces = _Pieces([*_scenery(spec), *_bodies(spec, layout, entities)])
+    pieces = _Pieces([*_scenery(spec), *_bodies(spec, layout, entities, initial_numbers(spec, layout))])
     found = 0
     for owner, entity in enumerate(entities):
         overlap = pieces.first_overlap(owner)
@@ -97,6 +97,14 @@ def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
             found += 1
         if found == FOUND_MAX:
             return
+
+
+def overlapped(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
+    """Return what an entity is in where the numbers of a frame put it, and how deep; empty if it is in nothing."""
+    others = [one for one in layout.entities if one is not entity]
+    pieces = _Pieces([*_scenery(spec), *_bodies(spec, layout, [*others, entity], numbers)])
+    overlap = pieces.first_overlap(len(others))
+    return "" if overlap is None else f"{overlap.what}, {overlap.depth * 1e3:.3g} mm deep"
 
 
 def _finding(spec: WorldSpec, entity: Entity, overlap: _Overlap, place: Vector) -> Finding:
@@ -172,10 +180,9 @@ def _scenery(spec: WorldSpec) -> Iterator[_Piece]:
             yield _piece((-1, what, shape.position), shape, *at, moves=False, is_kits=False)
 
 
-def _bodies(spec: WorldSpec, layout: Layout, entities: Sequence[Entity]) -> Iterator[_Piece]:
-    """Yield the shapes of all bodies that rigid bodies feel, at tick 0. Owners are places in the list."""
+def _bodies(spec: WorldSpec, layout: Layout, entities: Sequence[Entity], numbers: Sequence[float]) -> Iterator[_Piece]:
+    """Yield the shapes of all bodies that rigid bodies feel, in a frame. Owners are places in the list."""
     physics, models = physics_of(spec), models_of(spec, layout)
-    numbers = initial_numbers(spec, layout, models)
     for owner, entity in enumerate(entities):
         body: Body | None = models[entity.index].body() if entity.index in models else None
         if body is None or not entity.is_solved or not is_felt(body, physics):

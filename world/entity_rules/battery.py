@@ -7,7 +7,7 @@ distance between its places at the tick's start and end; a robot with a fixed ba
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +16,7 @@ from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.energy.battery import BatteryRuleSettings, cell_of, chargers_of, check_battery, is_rover
 from foosim.world.forms.registry import entity_rule
+from foosim.world.models.rover import CHARGE
 
 if TYPE_CHECKING:
     from foosim.world.frame import Frame
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 EMPTY: Final = "empty"
 
 
-@entity_rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",))
+@entity_rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",), settable={"charge": CHARGE})
 class Battery:
     """The charge of one robot (J)."""
 
@@ -59,6 +60,10 @@ class Battery:
         """Charge it as the deployment says; a rover says it itself."""
         if not self._is_rover:
             view.write(self._charge, self._start)
+
+    def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
+        """Return the charge of a share of its capacity."""
+        return {field: [value * self._capacity]}
 
     def has_power(self, view: View) -> bool:
         """Whether there is any charge."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from foosim.common.errors import BadValue, show
 from foosim.common.names import NAME_RULE, is_name
+from foosim.common.units import Quantity
 from foosim.world.forms.failures import failure_of
 
 if TYPE_CHECKING:
@@ -120,7 +121,8 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
     return f"{numbers} numbers in all, at most {SLOTS_MAX} are valid" if numbers > SLOTS_MAX else ""
 
 
-OF_ROBOTS: Final = ("down", "refused", "clamped")
+DOWN: Final = "down"
+OF_ROBOTS: Final = (DOWN, "refused", "clamped")
 """Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
 OF_SOLVED: Final = ("quarantined",)
 """Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
@@ -195,7 +197,8 @@ class Component(Form):
     tick at whose start its first number is not 0.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
-    None without a least one.
+    None without a least one. `settable` is what can be set of it while a run goes on, and the limits of that: slots of
+    its own with one number; or what its method `set(field, value)` returns, numbers by slot. Values are in SI units.
     """
 
     value: type[Struct] | None = None
@@ -207,6 +210,7 @@ class Component(Form):
     moves: bool = False
     joints: str = ""
     per_field: Mapping[str, float | None] = field(default_factory=dict)
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
         """Return its slots with these settings. Raises BadValue where these do not fit what it is on, or no slots
@@ -330,12 +334,14 @@ class EntityRule(Form):
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
     that it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
+    `settable` is as that of a `Component`.
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
 
     def slots_on(self, fields: Collection[str]) -> dict[str, int]:
         """Return its slots on an entity whose model has these fields."""

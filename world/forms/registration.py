@@ -14,6 +14,7 @@ from msgspec import Struct
 from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
+from foosim.common.units import Quantity
 from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, Model, slots_problem, with_article, word_of
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
@@ -29,6 +30,7 @@ MAPPINGS: Final = {
     "each": "models to slots",
     "entities": "names to models",
     "per_field": "settings to least values",
+    "settable": "fields to quantities",
     "variants": "values of dynamics to what differs",
 }
 """What the fields of a description are."""
@@ -116,6 +118,16 @@ def _per_field(found: Any, key: str) -> Iterator[str]:
             yield f"the least value of the setting {name} is a number or None, not {show(least)}"
 
 
+def _settable(found: Any, key: str) -> Iterator[str]:
+    for name, quantity in found.settable.items():
+        if not (isinstance(name, str) and is_name(name)):
+            yield f"settable: {show(name)}: {NAME_RULE}"
+        elif not isinstance(quantity, Quantity):
+            yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
+        elif not hasattr(found.made, "set") and (callable(found.slots) or found.slots.get(name) != 1):
+            yield f"settable: {name} is no slot of one number, and the class has no method set"
+
+
 def _variants(found: Any, key: str) -> Iterator[str]:
     variants = found.variants
     if not all(isinstance(one, Model) for one in variants.values()):
@@ -166,6 +178,7 @@ OF_FIELD: Final[Mapping[str, Callable[[Any, str], Iterator[str]]]] = {
     "joints": _setting,
     "shown_as": _shown_as,
     "per_field": _per_field,
+    "settable": _settable,
     "variants": _variants,
     "each": _each,
     "entities": _entities,

@@ -24,7 +24,8 @@ ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
 
 Heading = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
-Charge = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
+CHARGE: Final = Quantity(units.PROBABILITY, "0 %", "100 %")
+Charge = Annotated[float, CHARGE]
 
 
 class RoverRobot(RobotSettings):

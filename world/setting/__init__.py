@@ -1,0 +1,1 @@
+"""What is set while a run goes on: fields of entities, and places."""

@@ -1,0 +1,54 @@
+"""What is at the place to which an entity is put while a run goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from foosim.world.assembly.world import models_of
+from foosim.world.clearance.overlaps import overlapped
+from foosim.world.clearance.solids import distance, scenery_of, solid, solids
+from foosim.world.layout import Entity, Layout
+from foosim.world.moving.upright import Upright
+from foosim.world.spec import WorldSpec
+
+
+def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
+    """Return what an entity is in where the numbers of a frame put it: scenery or another entity; empty if in nothing.
+
+    Rigid bodies are compared by their shapes, what moves by kinematics by its cylinder.
+    """
+    found = overlapped(spec, layout, numbers, entity) if layout.couples else ""
+    return found or _met_upright(spec, layout, numbers, entity)
+
+
+def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
+    standing: dict[int, Upright] = {
+        index: model.upright()
+        for index, model in models_of(spec, layout).items()
+        if hasattr(model, "upright") and "position" in layout.entities[index].offsets
+    }
+    its = standing.pop(entity.index, None)
+    if its is None:
+        return ""
+    x, y, z = _place(entity, numbers)
+    shapes = list(scenery_of(spec))
+    rows = solids([solid(shape) for shape in shapes])
+    is_in = distance(*rows.beside(np.array([x]), np.array([y]))) < its.radius + rows.radius
+    is_in &= (rows.low < z + its.high) & (rows.high > z + its.low)
+    for shape, met in zip(shapes, is_in.tolist(), strict=True):
+        if met:
+            return f"the {shape.name or 'scenery'}"
+    for index, other in standing.items():
+        there_x, there_y, there_z = _place(layout.entities[index], numbers)
+        dx, dy, least = there_x - x, there_y - y, its.radius + other.radius
+        is_level = z + its.low < there_z + other.high and there_z + other.low < z + its.high
+        if dx * dx + dy * dy < least * least and is_level:
+            return layout.entities[index].name
+    return ""
+
+
+def _place(entity: Entity, numbers: Sequence[float]) -> Sequence[float]:
+    at = entity.offsets["position"]
+    return numbers[at : at + 3]
