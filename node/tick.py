@@ -38,8 +38,8 @@ from foosim.world.setting.scheduled import Schedule
 
 ECHO = "echo"
 RETRIES: Final = 3
-"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is put elsewhere
-or removed."""
+"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is put
+elsewhere or removed."""
 RETRY_NS: Final = 1_000_000_000
 ATTEMPTS: Final = 8
 """The field `quarantined` is this many times the ticks that are left, plus how often the body has come into quarantine;
