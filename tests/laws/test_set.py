@@ -120,7 +120,7 @@ def test_a_simulation_sets_what_an_event_sets(tmp_path: Path) -> None:
             digests.append(simulation.frame.digest)
             with pytest.raises(BadValue, match="would be in k-2"):
                 simulation.set("k-1", "at", "3,2")
-            with pytest.raises(UnknownName, match="no entity .*, 'k-3', nearest is 'k-1'"):
+            with pytest.raises(UnknownName, match=r"no entity .*, 'k-3', nearest is 'k-1'"):
                 simulation.set("k-3", "down", True)
     assert digests[0] == digests[1]
 
