@@ -398,7 +398,7 @@ KINDS: Final = list(FAULT_OF)
 LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
 """Remainders modulo 16 of the seeds that also lose players. The losses have separate dice, so that they do not change
 the other faults. 7 and 15 are in the last world, where players act at arrival; 10 is not."""
-SETS: Final = 3
+SETS: Final = 11
 """The remainder modulo 16 of the seeds that also set something, with separate dice."""
 CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player", "set"})
 """Kinds that change the world. All others leave it bit-identical."""
