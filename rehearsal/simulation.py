@@ -29,10 +29,11 @@ from foosim.rehearsal.stepping.world import SteppedWorld
 from foosim.vhub.network.memory import Joining
 from foosim.world.assembly.initial_state import first_frame
 from foosim.world.assembly.world import build_scene, world_status
-from foosim.world.edits import Disrupt
+from foosim.world.edits import Disrupt, Set, written
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.scene import Scene
+from foosim.world.setting.settable import set_edits
 from foosim.world.start import Start
 
 LEARNER: Final = "learner"
@@ -194,6 +195,7 @@ class Simulation:
         self._carrier: Carrier
         self._residents: dict[str, Resident] = {}
         self._events: list[Disrupt] = []
+        self._edits: list[Set] = []
         """What happens to the network from the next frame on."""
         self.reset(start, seed)
 
@@ -234,7 +236,7 @@ class Simulation:
             joining.append(Joining(name, period, hears, offset, arrivals))
         carrier = EmulatedNetwork if self._has_network else Bypass
         self._carrier = carrier(deployment, frame.tick, joining)
-        self._events = []
+        self._events, self._edits = [], []
         self._open()
 
     # --- what there is -----------------------------------------------------------------------------------------------
@@ -309,6 +311,18 @@ class Simulation:
         self.advance(by_agent, ticks)
         return self.readings
 
+    def set(self, name: str, field: str, value: object) -> None:
+        """Set a field of an entity at the next step, as `foosim set` does: `set("crate-1", "at", "3,1")`.
+
+        Raises UnknownName, and BadValue for a field that is not settable, a value beyond its limits, and a place where
+        something is.
+        """
+        frame = self.frame
+        if name not in frame.layout:
+            raise UnknownName("no entity", name, frame.layout.names)
+        numbers = written(frame.layout, frame.numbers, self._edits)
+        self._edits += set_edits(self.deployment, frame.layout, numbers, frame.layout[name], field, value)
+
     def partition(self, *groups: str | Sequence[str]) -> None:
         """Cut the network between groups of endpoints, names or selectors, from the next frame on until `heal`:
         `partition("red.*", ["camera", "player-blue"])`.
@@ -358,7 +372,8 @@ class Simulation:
                 if resident is not None:
                     now_ns = frame.tick * self.deployment.tick_ns
                     sent[name] = resident.act(frame.tick, now_ns, self._carrier.take(name))
-        world.step(self._carrier.close(frame, sent))
+        world.step(self._carrier.close(frame, sent), self._edits)
+        self._edits = []
 
     def close(self) -> None:
         """Free the engines."""

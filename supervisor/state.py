@@ -41,7 +41,7 @@ from foosim.supervisor.records import (
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
 from foosim.world.assembly.initial_state import added_to, first_chain, first_frame
-from foosim.world.edits import Edit, Set, layout_after
+from foosim.world.edits import Edit, layout_after, written
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import Layout, build_layout
 from foosim.world.start import AddedEntity
@@ -298,12 +298,7 @@ class RunState:
 
     def coming_numbers(self) -> list[float]:
         """Return the numbers of the newest frame with the fields that are ordered to be set, released or not."""
-        layout, numbers = self.frame.layout, [*self.frame.numbers]
-        for edit in self._coming():
-            if isinstance(edit, Set) and edit.name in layout:
-                at = layout[edit.name].offsets[edit.field]
-                numbers[at : at + len(edit.numbers)] = edit.numbers
-        return numbers
+        return written(self.frame.layout, self.frame.numbers, self._coming())
 
     def _coming(self) -> list[Edit]:
         edits = [edit for tick in range(self.frame.tick, self.released) for edit in self.orders[tick]]

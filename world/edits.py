@@ -113,6 +113,16 @@ def removed(layout: Layout, edits: Sequence[Edit]) -> frozenset[str]:
     return frozenset(edit.name for edit in fitting_edits(layout, edits) if isinstance(edit, Remove))
 
 
+def written(layout: Layout, numbers: Sequence[float], edits: Sequence[Edit]) -> list[float]:
+    """Return the numbers of a frame with the fields that edits set."""
+    found = [*numbers]
+    for edit in edits:
+        if isinstance(edit, Set) and edit.name in layout:
+            at = layout[edit.name].offsets[edit.field]
+            found[at : at + len(edit.numbers)] = edit.numbers
+    return found
+
+
 def check_edits(edits: Sequence[Edit]) -> None:
     """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
     for change in edits:

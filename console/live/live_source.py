@@ -26,7 +26,7 @@ from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.runtime.transport.inbox import Inbox, Item
 
 VERBS: Final = (
-    *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "network"),
+    *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "set", "network"),
     *("stop", "start", "down"),
 )
 POLL_S: Final = 0.25

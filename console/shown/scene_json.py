@@ -18,6 +18,7 @@ from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "position": ("m",),
@@ -50,6 +51,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "links": list(range(first, len(links))),
                 "removable": layout.is_added(name),
                 "pushable": layout[name].is_free,
+                "settable": settable(deployment, layout, layout[name]),
             }
         )
     scenery = _shapes(scene.scenery, meshes)

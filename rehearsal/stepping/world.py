@@ -13,6 +13,7 @@ from foosim.node.physics.interface import AnyEngine
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.islands import Assignment, Share, reach_of
+from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -58,14 +59,16 @@ class SteppedWorld:
         packets, self._remembered = stepper.sense(frame, frame.layout.robots)
         return packets
 
-    def step(self, delivered: Sequence[Delivered]) -> Frame:
-        """Compute the next frame from what reaches the robots at this one, in order. Raises ComponentError.
+    def step(self, delivered: Sequence[Delivered], edits: Sequence[Edit] = ()) -> Frame:
+        """Compute the next frame from what reaches the robots at this one, in order, and what is edited before.
+
+        Raises ComponentError.
 
         `sense` comes before: what the sensors remember is in the next frame.
         """
         frame, stepper = self.frame, self._stepper
         tick = frame.tick
-        layout, numbers = stepper.edited(frame, ())
+        layout, numbers = stepper.edited(frame, edits)
         share = self._assignment.shares(numbers)[NODE]
         start = numbers.copy() if delivered or stepper.waits else numbers
         outboxes = stepper.deliver(delivered, share.solved, numbers, tick, start)

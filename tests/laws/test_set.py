@@ -10,9 +10,10 @@ from typing import Any, Final
 import pytest
 
 from foosim.capture.reader import open_capture
-from foosim.common.errors import DeploymentError
+from foosim.common.errors import BadValue, DeploymentError, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.simulation import Simulation
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
@@ -98,6 +99,30 @@ def test_times_and_entities_are_drawn_by_the_seed() -> None:
     )
     other = load_deployment(text(events).replace("seed: 1", "seed: 2"), NAME)
     assert events_by_tick(other) != found
+
+
+def test_a_simulation_sets_what_an_event_sets(tmp_path: Path) -> None:
+    sets: tuple[tuple[str, str, Any], ...] = (
+        ("k-1", "at", "3,6"),
+        ("k-1", "battery.charge", "40 %"),
+        ("w-2", "down", True),
+    )
+    events = [{"at": "0.5 s", "entity": name, "set": {field: value}} for name, field, value in sets]
+    digests = []
+    for its in ([], events):
+        file = tmp_path / f"{len(its)}.yaml"
+        file.write_text(text(its))
+        with Simulation(file, network=False) as simulation:
+            simulation.step(ticks=50)
+            for one in () if its else sets:
+                simulation.set(*one)
+            simulation.step(ticks=50)
+            digests.append(simulation.frame.digest)
+            with pytest.raises(BadValue, match="would be in k-2"):
+                simulation.set("k-1", "at", "3,2")
+            with pytest.raises(UnknownName, match=r"no entity .*, 'k-3', nearest is 'k-1'"):
+                simulation.set("k-3", "down", True)
+    assert digests[0] == digests[1]
 
 
 def test_what_leaned_on_what_is_put_elsewhere_falls() -> None:

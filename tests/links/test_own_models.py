@@ -311,7 +311,7 @@ def test_a_model_that_cannot_be_had_is_refused_at_its_place(tmp_path: Path, mode
     (problem,) = refused.value.problems
     place, _, said = problem.partition(": ")
     assert said == f"network.links[1].model.{REFUSED[model]}"
-    assert place.startswith("t.yaml:") and all(number.isdigit() for number in place.split(":")[1:])
+    assert place.startswith("--set:2:") and all(number.isdigit() for number in place.split(":")[1:])
     alone = tmp_path / "alone.yaml"
     alone.write_text(f"network:\n  links:\n  - {{id: one, from: a, to: b, model: {model}}}\n")
     with pytest.raises(DeploymentError, match=f"{alone.name}:3:"):

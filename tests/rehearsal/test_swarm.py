@@ -95,12 +95,13 @@ def test_a_seed_is_a_plan() -> None:
         players = [fault for fault in plan.faults if fault.kind == "player"]
         assert bool(players) == loses_players(seed)
         worlds |= {seed % WORLDS == WORLDS - 1} if players else set()
-        assert plan.nodes in NODES and FAULTS[0] - 3 <= len(plan.faults) - len(players) <= FAULTS[1]
+        extra = len(players) + sum(fault.kind == "set" for fault in plan.faults)
+        assert plan.nodes in NODES and FAULTS[0] - 3 <= len(plan.faults) - extra <= FAULTS[1]
         assert len(plan.kinds) >= 3 and len(plan.faults) >= 5
         assert all(0 < fault.tick < HEALED_TICK for fault in plan.faults)
         again = plan_of(seed)
         assert [(f.tick, f.what) for f in plan.faults] == [(f.tick, f.what) for f in again.faults]
-    assert {fault.kind for seed in range(200) for fault in plan_of(seed).faults} == {*KINDS, "player"}
+    assert {fault.kind for seed in range(200) for fault in plan_of(seed).faults} == {*KINDS, "player", "set"}
     assert worlds == {False, True}, "where players act at arrival, and where they have ticks of their own"
 
 

@@ -38,6 +38,7 @@ from tests.swarm.faults import (
     KINDS,
     MS,
     ONCE,
+    SETS,
     TICKS,
     Dice,
     Fault,
@@ -45,6 +46,7 @@ from tests.swarm.faults import (
     lose_player,
     loses_players,
     revive,
+    set_something,
     when_answered,
 )
 from tests.swarm.invariants import Laws
@@ -135,6 +137,10 @@ def plan_of(seed: int, ticks: int = TICKS) -> Plan:
         of_players = Dice(seed, "players")
         lost = [lose_player(of_players, names) for _ in range(of_players.between(1, 3) * times)]
         faults += [_later(fault, of_players.between(0, late) if late else 0) for fault in lost]
+    if seed % 16 == SETS:
+        of_sets = Dice(seed, "sets")
+        wanted = [set_something(of_sets, names) for _ in range(of_sets.between(3, 8) * times)]
+        faults += [_later(fault, of_sets.between(0, late) if late else 0) for fault in wanted]
     faults.sort(key=lambda fault: fault.tick)
     here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
     clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)

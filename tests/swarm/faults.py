@@ -360,6 +360,22 @@ def _give_up_waiting(system: System, name: str) -> None:
         session.answered()
 
 
+def set_something(dice: Dice, names: Sequence[str]) -> Fault:
+    """A robot goes out of service or comes back, or something is put elsewhere; where something is, it is refused."""
+    place, is_down, is_put = dice.unit(), dice.unit() < 0.6, dice.unit() < 0.5
+    where = f"{8.0 * (dice.unit() - 0.5):.2f},{8.0 * (dice.unit() - 0.5):.2f}"
+
+    def do(system: System) -> None:
+        layout = system.supervisor.state.frame.layout
+        placed = [entity.name for entity in layout.entities if "position" in entity.offsets] if is_put else []
+        named = placed or [robot.name for robot in layout.robots]
+        field, value = ("at", where) if placed else ("down", is_down)
+        ask(system, "set", name=named[int(place * len(named))], field=field, value=value)
+
+    what = f"put something at {where}" if is_put else f"set down={is_down} on robot {place:.2f} of all"
+    return Fault(_tick(dice), "set", what, do)
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -382,7 +398,9 @@ KINDS: Final = list(FAULT_OF)
 LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
 """Remainders modulo 16 of the seeds that also lose players. The losses have separate dice, so that they do not change
 the other faults. 7 and 15 are in the last world, where players act at arrival; 10 is not."""
-CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player"})
+SETS: Final = 11
+"""The remainder modulo 16 of the seeds that also set something, with separate dice."""
+CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player", "set"})
 """Kinds that change the world. All others leave it bit-identical."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which a seed has at most one: if all nodes had changed frames, none would be right."""

@@ -44,7 +44,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
             if getattr(spec, key):
                 yield Finding((key,), f"what rigid bodies feel, which {felt[0]} says already", key, at="key")
     if len(felt) <= 1:
-        yield from _unfelt(spec)
+        yield from _unfelt(spec, has_rigid=bool(felt) or _has_rigid(spec))
     if not felt and _has_rigid(spec):
         yield from _too_long(spec)
     for _, kit in kits_of(spec):
@@ -64,19 +64,22 @@ def _too_long(spec: WorldSpec) -> Iterator[Finding]:
         yield Finding(("substeps",), f"{what} (valid from {least} on)", spec.substeps)
 
 
-def _unfelt(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield the surfaces of scenery and bodies of which nobody says what rigid bodies feel of them."""
+def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
+    """Yield the surfaces of scenery and bodies of which nobody says what rigid bodies feel of them.
+
+    Without rigid bodies these are the surfaces that `scenery` names.
+    """
     felt = physics_of(spec)
     made: list[tuple[Location, str, list[str], Collection[str]]] = []
     scenery = felt.surfaces or felt.sides
-    for name, kit in kits_of(spec):
+    for name, kit in kits_of(spec) if has_rigid else ():
         made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()], scenery))  # type: ignore[attr-defined]
-    if spec.scene is not None:
+    if spec.scene is not None and has_rigid:
         surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for name, thing in spec.scenery.items():
         made.append((("scenery", name, "surface"), f"scenery {name}", [thing.surface], scenery))
-    for section, entities in (("objects", spec.objects), ("robots", spec.robots)):
+    for section, entities in (("objects", spec.objects), ("robots", spec.robots)) if has_rigid else ():
         for name, one in entities.items():
             for key, surface in one.felt_surfaces.items():
                 made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))

@@ -9,7 +9,7 @@ from foosim.common.finding import Finding
 from foosim.common.names import nearest_quoted
 from foosim.world.assembly.event_times import events_by_tick, matched
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.edits import Set
+from foosim.world.edits import Set, written
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.setting.settable import set_edits
@@ -26,14 +26,10 @@ class Schedule:
     def edits(self, frame: Frame) -> list[Set]:
         """Return what the events of a frame's tick set. Raises ComponentError."""
         found: list[Set] = []
-        numbers = [*frame.numbers] if frame.tick in self.by_tick else []
+        layout = frame.layout
         for name, field, value in self.by_tick.get(frame.tick, ()):
-            entity = frame.layout[name]
-            edits = set_edits(self._spec, frame.layout, numbers, entity, field, value, is_checked=False)
-            for edit in edits:
-                at = entity.offsets[edit.field]
-                numbers[at : at + len(edit.numbers)] = edit.numbers
-            found += edits
+            numbers = written(layout, frame.numbers, found)
+            found += set_edits(self._spec, layout, numbers, layout[name], field, value, is_checked=False)
         return found
 
 

@@ -19,7 +19,7 @@ from foosim.world.assembly.world import body_of, entity_rules_of
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.fitted import actuators_of, sensors_of
 from foosim.world.components.view import WritableView, called
-from foosim.world.edits import Set
+from foosim.world.edits import Set, written
 from foosim.world.forms import registry
 from foosim.world.forms.forms import DOWN
 from foosim.world.kinematics import forward_kinematics
@@ -151,10 +151,7 @@ def _check_place(
     spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, edits: Sequence[Set]
 ) -> None:
     """Raise BadValue where edits put an entity into something."""
-    after = [*numbers]
-    for edit in edits:
-        at = entity.offsets[edit.field]
-        after[at : at + len(edit.numbers)] = edit.numbers
+    after = written(layout, numbers, edits)
     what = occupied_by(spec, layout, after, entity)
     if what:
         at = entity.offsets["position"]

@@ -89,6 +89,7 @@ export class Entities {
       button("Follow", this.actions.follow, { title: "Keep the view on it (F)" }),
       button("Plot …", () => this.actions.plot(body.name)),
       body.pushable && source.may("push") ? button("Push …", () => this.askPush(body.name), { disabled: !may("push"), id: "push" }) : null,
+      Object.keys(body.settable).length && source.may("set") ? button("Set …", () => this.askSet(body.name, body.settable), { disabled: !may("set"), id: "set" }) : null,
       owned && source.may("move") ? button("Move …", () => this.askMove(body.name), { disabled: !may("move"), id: "move" }) : null,
       body.removable && source.may("remove") ? button("Remove …", () => this.askRemove(body.name), { disabled: !may("remove"), id: "remove", class: "danger" }) : null,
     ].filter((one) => one !== null);
@@ -134,6 +135,27 @@ export class Entities {
       send: () => {
         const given = vector(impulse.value, "Impulse");
         return typeof given === "string" ? given : this.desk.ask("push", { name, impulse: given });
+      },
+    });
+  }
+
+  /**
+   * @param {string} name
+   * @param {Record<string, string>} settable What is valid, by field.
+   */
+  async askSet(name, settable) {
+    const fields = Object.keys(settable);
+    const which = select(fields.map((one) => [one, one]), fields[0]);
+    const value = h("input", { required: true });
+    const valid = h("p", { class: "hint" });
+    const explain = () => setText(valid, settable[which.value]);
+    which.addEventListener("change", explain);
+    explain();
+    await dialog(`Set ${name}`, [field("Field", which), field("Value", value), valid], {
+      action: "Set",
+      send: () => {
+        const text = value.value.trim();
+        return this.desk.ask("set", { name, field: which.value, value: text === "true" ? true : text === "false" ? false : text });
       },
     });
   }

@@ -17,7 +17,7 @@ interface Shape {
 }
 
 interface SceneLink { name: string; body: string; shapes: Shape[] }
-interface SceneBody { name: string; model: string; links: number[]; removable: boolean; pushable: boolean }
+interface SceneBody { name: string; model: string; links: number[]; removable: boolean; pushable: boolean; settable: Record<string, string> }
 interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
 interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
 interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
