@@ -132,7 +132,7 @@ def _children_s() -> float:
 
 def start_s(tree: Path, world: str) -> float:
     """Return the processor time of a command that rehearses one tick, in seconds."""
-    return _command_s(tree, str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json")
+    return _command_s(tree, "rehearse", str(tree / "deploy" / f"{world}.yaml"), "--for", "20ms", "--json")
 
 
 def help_s(tree: Path) -> float:
