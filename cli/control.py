@@ -154,7 +154,7 @@ def set_field(
     """Set a field of an entity, e.g. `crate-1 at=3,1` or `scout down=true`.
 
     Fields: `at` is a pose, X,Y or X,Y,Z in m, or a mapping such as "{x: 3 m, yaw: 90 deg}"; what it does not say stays
-    as it is. `down` is whether a robot is out of service. `COMPONENT.FIELD` is what `foosim components` shows as "can
+    as it is. `down` is whether a robot is out of service. `RULE.FIELD` is what `foosim components` shows as "can
     be set".
     """
     field, is_set, text = setting.partition("=")

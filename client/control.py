@@ -253,7 +253,7 @@ def push(impulse: Vector, name: str | None = None, run: str | None = None) -> An
 
 
 def set(name: str, field: str, value: Any, run: str | None = None) -> Answer:  # the word of the command
-    """Set a field of an entity: `at` (a pose), `down` (whether a robot is out of service), or `COMPONENT.FIELD`.
+    """Set a field of an entity: `at` (a pose), `down` (whether a robot is out of service), or `RULE.FIELD`.
 
     Values are as in a deployment: texts with units, `True` or `False`, a mapping of x, y, z, roll, pitch, yaw.
     """

@@ -33,7 +33,7 @@ from foosim.world.assembly.world import addition, body_of
 from foosim.world.components.view import ComponentError
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.world.layout import Layout
-from foosim.world.setting.settable import set_edits, settable
+from foosim.world.setting.settable import set_edits
 
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
@@ -294,8 +294,7 @@ class Requests:
         """Set a field of an entity, whose numbers follow from the newest frame and what is ordered since."""
         state, field = self._state, _name(arguments, "field")
         layout = state.frame.layout
-        movable = [entity.name for entity in layout.entities if settable(state.deployment, layout, entity)]
-        entity = layout[chosen("entity with something to set", _name(arguments, "name"), movable)]
+        entity = layout[chosen("entity", _name(arguments, "name"), layout.names)]
         tick = self._tick_for_edit()
         try:
             edits = set_edits(state.deployment, layout, state.coming_numbers(), entity, field, arguments.get("value"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
+from math import nan
 from pathlib import Path
 from random import Random
 from typing import Any, Final
@@ -18,8 +19,12 @@ from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
 from foosim.world.assembly.event_times import events_by_tick
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.components.view import ComponentError
 from foosim.world.edits import Set
+from foosim.world.entity_rules.battery import Battery
 from foosim.world.frame import Frame
+from foosim.world.setting.settable import set_edits
 from tests.kinematic_yard import yard_text
 
 TICKS: Final = 300
@@ -125,6 +130,17 @@ def test_a_simulation_sets_what_an_event_sets(tmp_path: Path) -> None:
     assert digests[0] == digests[1]
 
 
+@pytest.mark.parametrize("gives", [{"charge": [1.0, 2.0]}, {"charge": [nan]}, {"full": [1.0]}, None])
+def test_a_component_that_gives_no_numbers_of_its_slots_is_an_error_of_it(
+    gives: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Battery, "set", lambda self, field, value: gives)
+    deployment = load_deployment(text([]), NAME)
+    frame = initial_frame(deployment)
+    with pytest.raises(ComponentError, match="battery of k-1 failed"):
+        set_edits(deployment, frame.layout, frame.numbers, frame.layout["k-1"], "battery.charge", "20 %")
+
+
 def test_what_leaned_on_what_is_put_elsewhere_falls() -> None:
     """The lowest of a stack at rest: those above it fall by its height."""
     events = [{"at": "2 s", "entity": "b-0", "set": {"at": "0,3"}}]
@@ -153,7 +169,7 @@ REFUSED: Final = (
     ("k-1", "down", "yes", "neither true nor false"),
     ("k-1", "dwon", True, "not settable on k-1: settable are down, at, battery.charge"),
     ("k-1", "battery.charge", "120 %", "out of range 0 % to 100 %"),
-    ("b-9", "at", "0,0", "no entity with something to set 'b-9'; there are b-0, "),
+    ("b-9", "at", "0,0", "no entity 'b-9'; there are b-0, "),
 )
 
 

@@ -76,6 +76,8 @@ REFUSED: Final = {
     "None, not '0'",
     'modifier("own", ModifierSettings, per_field=("std",))': "per_field is a mapping of settings to least values, not "
     "a list of 1",
+    'entity_rule("own", EntityRuleSettings, slots={"a": 1}, settable={"a": 1.0})': "settable: a is set to a Quantity, "
+    "which has limits, not to",
     'rule("own", RuleSettings, slots=lambda settings, on: {})': "slots: they are a mapping",
     'rule("own", RuleSettings, writes="ball")': "writes is a tuple of names, not 'ball': a tuple of one is ('ball',)",
     'rule("own", RuleSettings, each=("rod",))': "each is a mapping of models to slots, not a list of 1",

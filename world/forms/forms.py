@@ -197,8 +197,7 @@ class Component(Form):
     tick at whose start its first number is not 0.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
-    None without a least one. `settable` is what can be set of it while a run goes on, and the limits of that: slots of
-    its own with one number; or what its method `set(field, value)` returns, numbers by slot. Values are in SI units.
+    None without a least one.
     """
 
     value: type[Struct] | None = None
@@ -210,7 +209,6 @@ class Component(Form):
     moves: bool = False
     joints: str = ""
     per_field: Mapping[str, float | None] = field(default_factory=dict)
-    settable: Mapping[str, Quantity] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
         """Return its slots with these settings. Raises BadValue where these do not fit what it is on, or no slots
@@ -334,7 +332,8 @@ class EntityRule(Form):
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
     that it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
-    `settable` is as that of a `Component`.
+    `settable` is what can be set of it while a run goes on, and the limits: slots of its own with one number; or what
+    its method `set(field, value)` returns, numbers by slot. Values are in SI units.
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)

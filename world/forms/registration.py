@@ -124,7 +124,7 @@ def _settable(found: Any, key: str) -> Iterator[str]:
             yield f"settable: {show(name)}: {NAME_RULE}"
         elif not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif not hasattr(found.made, "set") and (callable(found.slots) or found.slots.get(name) != 1):
+        elif not hasattr(found.made, "set") and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"
 
 

@@ -1,4 +1,4 @@
-"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, what its components
+"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, what its rules
 declare; and the edits that set it.
 
 A pose is set as the deployment would place it: the model places it at tick 0, elsewhere.
@@ -6,7 +6,8 @@ A pose is set as the deployment would place it: the model places it at tick 0, e
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 from pydantic import ValidationError
@@ -17,10 +18,9 @@ from foosim.common.names import nearest_name
 from foosim.common.units import Quantity
 from foosim.world.assembly.world import body_of, entity_rules_of
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.fitted import actuators_of, sensors_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Set, written
-from foosim.world.forms import registry
+from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.forms import DOWN
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout, find_entity_rule
@@ -110,33 +110,39 @@ def set_edits(
         number = float(quantity.read(value))
     except PydanticCustomError as error:
         raise BadValue(str(error), value) from None
-    slots = called(label, entity.name, 0, made.set, name, number) if hasattr(made, "set") else {name: [number]}
-    own = {f"{label}.{slot}" if f"{label}.{slot}" in entity.offsets else slot: its for slot, its in slots.items()}
-    return [Set(entity.name, slot, [*its]) for slot, its in own.items()]
+    if not hasattr(made, "set"):
+        return [Set(entity.name, field, [number])]
+    return called(label, entity.name, 0, _of_component, entity, label, made.set, name, number)
+
+
+def _of_component(
+    entity: Entity, label: str, ask: Callable[[str, float], Mapping[str, Sequence[float]]], name: str, number: float
+) -> list[Set]:
+    """Return what a component says that its slots become: its own, else those that are fields of the entity."""
+    found = []
+    for slot, numbers in ask(name, number).items():
+        field = f"{label}.{slot}" if f"{label}.{slot}" in entity.offsets else slot
+        if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
+            raise WrongResult(ask, "finite numbers by slot, as many as each has,", {slot: numbers})
+        found.append(Set(entity.name, field, [*map(float, numbers)]))
+    return found
 
 
 def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple[str, Any, Mapping[str, Quantity]]]:
-    """Yield the components of a robot that have something to set: name, component, and what can be set of it."""
+    """Yield the rules of a robot: name, rule, and what can be set of it."""
     if not entity.is_robot:
         return
-    robot = spec.robots[entity.name]
-    rules = dict(entity_rules_of(spec, layout, entity))
-    for label, rule in sorted(robot.rules.items()):
-        yield label, rules[label], find_entity_rule(rule).settable
-    for actuator in actuators_of(spec, layout, entity):
-        kind = robot.actuators[actuator.channel].kind
-        yield actuator.channel, actuator.actuator, registry.find_component("actuator", kind).settable
-    for sensor in sensors_of(spec, layout, entity):
-        kind = robot.sensors[sensor.channel].kind
-        yield sensor.channel, sensor.sensor, registry.find_component("sensor", kind).settable
+    for label, rule in entity_rules_of(spec, layout, entity):
+        yield label, rule, find_entity_rule(spec.robots[entity.name].rules[label]).settable
 
 
 def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, value: object) -> list[Set]:
     """Return the edits that put an entity elsewhere, at rest and out of quarantine."""
     settings = _elsewhere(spec, entity, _completed(spec, layout, numbers, entity, value))
     placed = [0.0] * layout.size
-    made = entity.kind.made(settings, mounting_of(spec, layout, entity))
-    called(f"model {entity.model}", entity.name, 0, made.place, WritableView(0, placed))
+    what = f"model {entity.model}"
+    made: Any = called(what, entity.name, 0, entity.kind.made, settings, mounting_of(spec, layout, entity))
+    called(what, entity.name, 0, made.place, WritableView(0, placed))
     edits = []
     for field, count in entity.fields.items():
         at = entity.offsets[field]
