@@ -41,6 +41,8 @@ from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
 
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were built last."""
+SEATED_MAX: Final = 1024
+"""Islands whose entities' places in a model are kept: there are more of them than compositions."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
 
 Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
@@ -97,6 +99,8 @@ class MujocoIslands:
         key = indices, len(island.bodies), self._pieces_near(island, numbers), floors
         seated = self._seated.get(key)
         if seated is None:
+            if len(self._seated) == SEATED_MAX:
+                self._seated.clear()
             seated = self._seated[key] = self._seat(key, island)
         engine, seats = seated
         engine.solve(seats, island.drives, numbers, start)

@@ -5,15 +5,17 @@ Sliding in any course, thin plates, what is carried, a grip, slopes and stacks o
 
 from __future__ import annotations
 
+from itertools import combinations
 from math import atan2, cos, degrees, dist, hypot, pi, radians, remainder, sin
 from random import Random
 from typing import Any, Final
 
 import pytest
 
-from foosim.node.physics.mujoco_islands import CompositionEngine
+from foosim.node.physics.interface import Island
+from foosim.node.physics.mujoco_islands import SEATED_MAX, CompositionEngine
 from foosim.node.tick import Work
-from foosim.world.components.drives import Drives, Motor
+from foosim.world.components.drives import NO_DRIVES, Drives, Motor
 from foosim.world.matter.physics import Side
 from foosim.world.scene import ORIGIN, Body, Box, Link, turn
 from tests.kinematic_yard import Yard, yard_text
@@ -216,6 +218,22 @@ def test_a_floor_stops_what_comes_from_below() -> None:
     yard.put("a", "linear_velocity", 0.0, 0.0, 15.0)
     yard.step(50)
     assert yard.vector("a", "position")[2] < 2.5
+
+
+def test_islands_without_end_take_bounded_memory_and_change_nothing() -> None:
+    """Each pair of fifty boxes as an island: more than an engine keeps, and the first one again."""
+    boxes = {f"b{n:02}": {**one_box()["a"], "at": {"x": f"{n - 25} m", "z": "1 m"}} for n in range(50)}
+    yard = world(GRAVITY, objects=boxes)
+    pairs = list(combinations([entity for entity in yard.layout.entities if entity.is_free], 2))
+    assert len(pairs) > SEATED_MAX
+    engine: Any = yard.engine
+    found = []
+    for pair in (*pairs, pairs[0]):
+        numbers = [*yard.numbers]
+        engine.solve(Island(pair, (), (NO_DRIVES, NO_DRIVES)), numbers, numbers)
+        found.append(numbers)
+        assert len(engine._seated) <= SEATED_MAX
+    assert found[0] == found[-1] != yard.numbers
 
 
 def test_what_falls_slowly_goes_on_falling() -> None:
