@@ -12,6 +12,8 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import load_deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import SEATED_MAX, CompositionEngine
 from foosim.node.tick import Work
@@ -188,6 +190,27 @@ def test_a_mesh_carries_what_slides_over_its_triangles() -> None:
         assert yard.vector("a", "position")[2] == pytest.approx(start[2], abs=0.004)
     moves = 0.8 * 0.8 * 9.80665
     assert dist(yard.vector("a", "position"), start) == pytest.approx((9.0 + 0.49) / (2 * moves), rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("sections", "why"),
+    [
+        (
+            {"surfaces": {"rubber": {"restitution": 0.5}}, "tick": "100 ms", "substeps": 8},
+            r"substeps: too few for the restitution of the surface rubber.*\(valid from 10 on\), 8",
+        ),
+        (
+            {"scenery": {"deck": {**PLANK, "surface": "goal"}}},
+            "scenery.deck.surface: scenery deck has an unknown surface .*'goal'",
+        ),
+    ],
+)
+def test_contacts_that_would_not_be_right_are_refused(sections: dict[str, Any], why: str) -> None:
+    text = {"engine": "mujoco", "substeps": 4, "objects": one_box(z="2 m"), **sections}
+    with pytest.raises(DeploymentError, match=why):
+        load_deployment(yard_text({"post": POST}, **text), "yard.yaml")
+    felt = {"tick": "10 ms", "scenery": {"deck": {**PLANK, "surface": "ice"}}, "surfaces": {"ice": {"friction": 0.01}}}
+    load_deployment(yard_text({"post": POST}, **{**text, **felt}), "yard.yaml")
 
 
 @pytest.mark.parametrize(("x", "speed", "z"), [(0.0, 0.0, 3.2), (2.5, 2.0, 3.2), (0.0, 0.0, 0.1), (49.5, 1.0, 0.1)])
