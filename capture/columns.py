@@ -16,6 +16,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import FrameRow, PacketRow
 from foosim.common.names import nearest_name
 from foosim.world.components.mounted import free_poses
+from foosim.world.forms.forms import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics
 from foosim.world.layout import Layout
@@ -113,11 +114,13 @@ SLOT_OF_CENTRE: Final = {name: slot for slot, name in CENTRE_OF_SLOT.items()}
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index.
+    """The captured frames of a run: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index.
 
     `values` are slots: of a free body the `position`, `orientation` and `linear_velocity` of its centre of mass.
     """
 
+    name: str
+    """That of the capture."""
     layout: Layout
     bodies: Mapping[str, Body]
     ticks: Integers
@@ -128,17 +131,23 @@ class Frames:
         return len(self.ticks)
 
     def frame(self, index: int) -> Frame:
-        """Return one of them as a frame, from which a world can be continued."""
+        """Return one of them as a frame, from which a world can be continued; raises IndexError."""
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
     def column(self, entity: str, field: str, count: int = 1) -> Numbers:
         """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several.
 
         Of a free body `position`, `orientation` and `linear_velocity` are those of the origin of its first link, as on
-        /tf and in its sensors' readings; `CENTRE_OF_SLOT` names those of the link's centre of mass. Raises CaptureError
-        for more numbers than the field has.
+        /tf and in its sensors' readings; `CENTRE_OF_SLOT` names those of the link's centre of mass. The numbers are NaN
+        where the entity is absent. Raises CaptureError for an unknown entity or field, and for more numbers than the
+        field has.
         """
+        if field not in self.fields(entity):
+            raise self._unknown(entity, field)
         found = self._field(entity, field)
+        if field != ABSENT and self.layout[entity].can_leave:
+            is_absent = self._slot(entity, ABSENT)[:, 0] != 0.0
+            found = np.where(is_absent[:, np.newaxis], np.nan, found)
         if not 1 <= count <= found.shape[1]:
             raise CaptureError(f"{entity}: {field} has 1 to {found.shape[1]} numbers, not {count}")
         return found[:, 0] if count == 1 else found[:, :count]
@@ -176,72 +185,8 @@ class Frames:
         start = at.offsets[slot]
         return self.values[:, start : start + at.counts[slot]]
 
-    def _free_link(self, entity: str) -> Link | None:
-        """Return the link of an entity that moves freely, which is its first one."""
-        body = self.bodies.get(entity)
-        return body.links[0] if body is not None and body.is_free else None
-
-
-@dataclass(frozen=True, slots=True)
-class AllFrames:
-    """All captured frames of a run, in their order, `blocks` of one layout each."""
-
-    name: str
-    """That of the capture."""
-    blocks: tuple[Frames, ...]
-
-    def __len__(self) -> int:
-        return sum(map(len, self.blocks))
-
-    @property
-    def ticks(self) -> Integers:
-        """Their ticks, (n,)."""
-        return np.concatenate([np.empty(0, dtype=np.int64), *(block.ticks for block in self.blocks)])
-
-    @property
-    def layout(self) -> Layout:
-        """The one layout of a run to which nothing was added; else raises CaptureError."""
-        return self._one_block().layout
-
-    @property
-    def values(self) -> Numbers:
-        """All numbers of the frames, (n, layout.size), of a run to which nothing was added; else CaptureError."""
-        return self._one_block().values
-
-    def frame(self, index: int) -> Frame:
-        """Return one of them as a frame, from which a world can be continued; raises IndexError."""
-        left = index + len(self) if index < 0 else index
-        for block in self.blocks:
-            if 0 <= left < len(block):
-                return block.frame(left)
-            left -= len(block)
-        raise IndexError(f"frame {index} of {len(self)}")
-
-    def column(self, entity: str, field: str, count: int = 1) -> Numbers:
-        """Return one field of an entity over time, as `Frames.column` does.
-
-        Where the entity was not there the numbers are NaN. Raises CaptureError for an entity or a field that no frame
-        has.
-        """
-        known = [field in block.fields(entity) for block in self.blocks]
-        if not any(known):
-            raise self._unknown(entity, field)
-        shape = () if count == 1 else (count,)
-        return np.concatenate(
-            [
-                block.column(entity, field, count) if is_there else np.full((len(block), *shape), np.nan)
-                for block, is_there in zip(self.blocks, known, strict=True)
-            ]
-        )
-
-    def _one_block(self) -> Frames:
-        if len(self.blocks) != 1:
-            ticks = ", ".join(str(block.ticks[0]) for block in self.blocks if len(block))
-            raise CaptureError(f"{self.name}: frames of {len(self.blocks)} layouts (from {ticks}): frame_blocks")
-        return self.blocks[0]
-
     def _unknown(self, entity: str, field: str) -> CaptureError:
-        names = {known.name: block.fields(known.name) for block in self.blocks for known in block.layout.entities}
+        names = {known.name: self.fields(known.name) for known in self.layout.entities}
         what, of = (field, sorted(names[entity])) if entity in names else (entity, sorted(names))
         nearest = nearest_name(what, of)
         hint = f", nearest is {nearest}" if nearest else ""
@@ -249,18 +194,23 @@ class AllFrames:
             return CaptureError(f"{self.name}: {entity} has no field {field!r}{hint}; it has {', '.join(of)}")
         return CaptureError(f"{self.name}: no frame has an entity {entity!r}{hint}")
 
+    def _free_link(self, entity: str) -> Link | None:
+        """Return the link of an entity that moves freely, which is its first one."""
+        body = self.bodies.get(entity)
+        return body.links[0] if body is not None and body.is_free else None
+
 
 def frame_of(layout: Layout, row: FrameRow) -> Frame:
     """Return the row of a frame, whose size is the layout's, as a frame."""
     return Frame(row.tick, layout, np.frombuffer(row.values), {box.index: box.packets for box in row.outboxes})
 
 
-def frames_of(layout: Layout, bodies: Mapping[str, Body], rows: Sequence[FrameRow]) -> Frames:
-    """Return the rows of one layout's frames, which has these bodies, as arrays; their sizes are the layout's."""
+def frames_of(name: str, layout: Layout, bodies: Mapping[str, Body], rows: Sequence[FrameRow]) -> Frames:
+    """Return the rows of frames of a layout, which has these bodies, as arrays; their sizes are the layout's."""
     ticks = np.array([row.tick for row in rows], dtype=np.int64)
     values = np.frombuffer(b"".join(row.values for row in rows), dtype=np.float64).reshape(len(rows), layout.size)
     outboxes = tuple({box.index: box.packets for box in row.outboxes} for row in rows)
-    return Frames(layout, bodies, ticks, values, outboxes)
+    return Frames(name, layout, bodies, ticks, values, outboxes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,15 +222,16 @@ class Poses:
     orientations: Numbers
 
 
-def poses_of(blocks: Iterable[tuple[Frames, Body]], link: str) -> Poses:
-    """Return a link's poses over frames of one or more layouts, by the one forward kinematics."""
+def poses_of(frames: Frames, body: Body, link: str) -> Poses:
+    """Return a link's poses over the frames in which it is present, by the one forward kinematics."""
     ticks: list[int] = []
     poses: list[tuple[float, ...]] = []
-    for frames, body in blocks:
-        entity = frames.layout[body.name]
-        ticks += frames.ticks.tolist()
-        for values in frames.values:
-            placed = {name: (*at, *turn) for name, at, turn in forward_kinematics(body, entity, values.tolist())}
+    entity = frames.layout[body.name]
+    for tick, values in zip(frames.ticks.tolist(), frames.values, strict=True):
+        numbers = values.tolist()
+        if not entity.is_absent(numbers):
+            ticks.append(tick)
+            placed = {name: (*at, *turn) for name, at, turn in forward_kinematics(body, entity, numbers)}
             poses.append(placed[link])
     table = np.array(poses, dtype=np.float64).reshape(len(ticks), 7)
     return Poses(np.array(ticks, dtype=np.int64), table[:, :3], table[:, 3:])

@@ -33,12 +33,13 @@ from foxglove.messages import (
 )
 
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.presence import Presence
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Layout
+from foosim.world.layout import Entity
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, moved, rotate
+from foosim.world.scene import Body, Box, Capsule, Hull, Shape, Sphere, Vector, moved, rotate
 from foosim.world.scene import Quaternion as Turn
 
 WORLD_FRAME: Final = "world"
@@ -62,39 +63,51 @@ def view_schema(message: Any) -> tuple[str, str, bytes]:
 
 
 class View:
-    """Turns frames into messages for viewers. It remembers the scene of the newest layout."""
+    """Turns frames into messages for viewers. It remembers who is in the newest scene."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._tick_ns = deployment.tick_ns
         self.poses_every = deployment.ticks(deployment.capture.poses_hz)
         """Ticks between two messages with poses."""
-        self._layout: Layout | None = None
-        self._scene = Scene({}, ())
+        self._bodies: list[tuple[Entity, Body]] = []
+        self._scenery: tuple[Shape, ...] = ()
+        self._presence: Presence | None = None
+        self._absent: frozenset[int] = frozenset()
 
-    def turn_to(self, frame: Frame) -> bytes:
-        """Return the SceneUpdate of a frame whose layout is new."""
-        shown = _link_names(self._scene)
-        self._layout = frame.layout
-        self._scene = build_scene(self._deployment, frame.layout)
-        gone = shown - _link_names(self._scene)
+    def turn_to(self, frame: Frame) -> bytes | None:
+        """Return the SceneUpdate of a frame in which others are present than in the one before; None where none are.
+
+        It is the whole scene: a reader that begins with it needs none before it.
+        """
+        if self._presence is not None and self._presence.absent(frame.numbers) is self._absent:
+            return None
+        if self._presence is None:
+            scene = build_scene(self._deployment, frame.layout)
+            self._presence, self._scenery = Presence(frame.layout), scene.scenery
+            self._bodies = [(frame.layout[name], body) for name, body in scene.bodies.items()]
+        self._absent = self._presence.absent(frame.numbers)
         at = self._timestamp(frame.tick)
+        gone = [link for entity, body in self._bodies if entity.index in self._absent for link in body.links]
         deletions = [
-            SceneEntityDeletion(timestamp=at, type=SceneEntityDeletionType.MatchingId, id=link) for link in sorted(gone)
+            SceneEntityDeletion(timestamp=at, type=SceneEntityDeletionType.MatchingId, id=link.name) for link in gone
         ]
-        entities = [_entity(at, SCENERY, WORLD_FRAME, self._scene.scenery)]
-        for body in self._scene.bodies.values():
+        entities = [_entity(at, SCENERY, WORLD_FRAME, self._scenery)]
+        for _, body in self._present:
             entities += [_entity(at, link.name, link.name, link.shapes) for link in body.links]
         return SceneUpdate(deletions=deletions, entities=entities).encode()
 
+    @property
+    def _present(self) -> list[tuple[Entity, Body]]:
+        return [(entity, body) for entity, body in self._bodies if entity.index not in self._absent]
+
     def poses(self, frame: Frame) -> bytes:
-        """Return the FrameTransforms of all links at a frame of the layout that the scene shows."""
-        assert self._layout is not None and self._layout.digest == frame.layout.digest, "the scene comes first"
+        """Return the FrameTransforms of all links at a frame of the scene that is shown."""
         at = self._timestamp(frame.tick)
         numbers = frame.numbers
         transforms = []
-        for name, body in self._scene.bodies.items():
-            for link, position, orientation in forward_kinematics(body, frame.layout[name], numbers):
+        for entity, body in self._present:
+            for link, position, orientation in forward_kinematics(body, entity, numbers):
                 transforms.append(
                     FrameTransform(
                         timestamp=at,
@@ -112,10 +125,6 @@ class View:
 
     def _timestamp(self, tick: int) -> Timestamp:
         return Timestamp(*divmod(tick * self._tick_ns, _SECOND_NS))
-
-
-def _link_names(scene: Scene) -> set[str]:
-    return {link.name for body in scene.bodies.values() for link in body.links}
 
 
 def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> SceneEntity:

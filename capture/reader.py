@@ -20,7 +20,6 @@ from mcap import records
 from numpy.typing import NDArray
 
 from foosim.capture.columns import (
-    AllFrames,
     Frames,
     Integers,
     Packets,
@@ -81,7 +80,6 @@ from foosim.world.edits import Edit
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered
-from foosim.world.scene import Body
 from foosim.world.start import Origin
 
 DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
@@ -254,18 +252,13 @@ class CaptureData:
         return self.about.finished
 
     @cached_property
-    def frame_blocks(self) -> tuple[Frames, ...]:
-        """Captured frames, a block for each layout."""
+    def frames(self) -> Frames:
+        """All captured frames."""
         scan = Scan(self.path)
         reader = FrameReader(scan, self.deployment)
-        blocks: list[tuple[Layout, list[FrameRow]]] = []
-        for message in scan.messages(FrameReader.TOPICS):
-            layout, row = reader.row(message)
-            if row is None:
-                blocks.append((layout, []))
-            else:
-                blocks[-1][1].append(row)
-        return tuple(frames_of(layout, build_scene(self.deployment, layout).bodies, rows) for layout, rows in blocks)
+        rows = [row for message in scan.messages(FrameReader.TOPICS) if (row := reader.row(message)) is not None]
+        layout = reader.layout or build_layout(self.deployment)
+        return frames_of(str(self.path), layout, build_scene(self.deployment, layout).bodies, rows)
 
     def each_frame(self) -> Iterator[Frame]:
         """Yield the captured frames one by one."""
@@ -279,11 +272,6 @@ class CaptureData:
     def first_frame(self) -> Frame | None:
         """Return the first captured frame, None when there is none."""
         return next(self.each_frame(), None)
-
-    @property
-    def frames(self) -> AllFrames:
-        """All captured frames, over changes of the layout."""
-        return AllFrames(str(self.path), self.frame_blocks)
 
     @cached_property
     def packets(self) -> Packets:
@@ -305,21 +293,15 @@ class CaptureData:
 
     def poses(self, name: str) -> Poses:
         """Return the poses of a link (`red.attack/slide`), or of an entity's last link (`red.attack`)."""
-        found: list[tuple[Frames, Body]] = []
-        link = ""
         names: set[str] = set()
-        for frames in self.frame_blocks:
-            for body in frames.bodies.values():
-                links = [part.name for part in body.links]
-                names.update((body.name, *links))
-                if name == body.name or name in links:
-                    link = name if name in links else links[-1]
-                    found.append((frames, body))
-        if not found:
-            nearest = nearest_name(name, sorted(names))
-            hint = f", nearest is {nearest}" if nearest else ""
-            raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
-        return poses_of(found, link)
+        for body in self.frames.bodies.values():
+            links = [part.name for part in body.links]
+            names.update((body.name, *links))
+            if name == body.name or name in links:
+                return poses_of(self.frames, body, name if name in links else links[-1])
+        nearest = nearest_name(name, sorted(names))
+        hint = f", nearest is {nearest}" if nearest else ""
+        raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
 
 
 def captured_tick(row: TickRow) -> CapturedTick:
@@ -391,26 +373,27 @@ class FrameReader:
     def __init__(self, scan: Scan, deployment: Deployment) -> None:
         self._scan = scan
         self._deployment = deployment
-        self._layout: Layout | None = None
+        self.layout: Layout | None = None
+        """The layout, once a message has brought it."""
 
     def frame(self, message: Message) -> Frame | None:
-        """Return the frame that a message of `TOPICS` brings; None where that is a layout. Raises CaptureError."""
-        layout, row = self.row(message)
-        return None if row is None else frame_of(layout, row)
+        """Return the frame that a message of `TOPICS` brings; None where that is the layout. Raises CaptureError."""
+        row = self.row(message)
+        return None if row is None or self.layout is None else frame_of(self.layout, row)
 
-    def row(self, message: Message) -> tuple[Layout, FrameRow | None]:
-        """Return the layout that a message brings, or the row of a frame with its layout. Raises CaptureError."""
-        row = self._scan.decode(DECODERS[message.topic], message)
+    def row(self, message: Message) -> FrameRow | None:
+        """Return the row of a frame that a message brings; None where that is the layout. Raises CaptureError."""
+        row: LayoutRow | FrameRow = self._scan.decode(DECODERS[message.topic], message)
         path = self._scan.about.path
         if isinstance(row, LayoutRow):
-            self._layout = layout_of(path, self._deployment, row)
-            return self._layout, None
-        layout = self._layout
+            self.layout = layout_of(path, self._deployment, row)
+            return None
+        layout = self.layout
         if layout is None:
             raise CaptureError(f"{path}: a frame without a layout before it")
         if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
             raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
-        return layout, row
+        return row
 
 
 def origin_of(about: About) -> Origin | None:
@@ -454,11 +437,8 @@ def check_whole(about: About) -> None:
 
 def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
-    try:
-        layout = build_layout(deployment, [(added.name, added.model) for added in row.added])
-    except KeyError as error:
-        raise CaptureError(f"{path}: the layout at tick {row.tick} has an unknown model {error}") from None
+    layout = build_layout(deployment)
     if layout.digest.hex() != row.digest or layout.size != row.size:
         named = "`foosim capture info` names the version that captured it"
-        raise CaptureError(f"{path}: the layout at tick {row.tick} is not what this version builds: {named}")
+        raise CaptureError(f"{path}: its layout is not what this version builds: {named}")
     return layout

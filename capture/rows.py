@@ -39,19 +39,16 @@ class Row(msgspec.Struct, frozen=True, gc=False):
 
 
 class EditRow(Row, frozen=True):
-    """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
+    """A change of the world by an order. `impulse` is x, y, z in the world frame, empty where it is no push."""
 
     kind: Literal["add", "remove", "push", "set", "network"]
     name: str = ""
-    model: str = ""
-    position: list[float] = []
-    velocity: list[float] = []
     impulse: list[float] = []
     event: str = ""
     """What happens to the network, as JSON."""
     field: str = ""
     numbers: list[float] = []
-    """What a field of an entity is set to, SI units."""
+    """What a field of an entity is set to, or all slots of one that is added; SI units."""
 
 
 class DeliveredRow(Row, frozen=True, omit_defaults=True):
@@ -88,21 +85,13 @@ class EntityRow(Row, frozen=True):
     stop: Counter
 
 
-class AddedRow(Row, frozen=True):
-    """An entity that is not in the deployment."""
-
-    name: str
-    model: str
-
-
 class LayoutRow(Row, frozen=True):
-    """The layout of frames from `tick` on."""
+    """The layout of the frames."""
 
     tick: Counter
     digest: DigestHex
     size: Counter
     entities: list[EntityRow]
-    added: list[AddedRow]
 
 
 class OutboxRow(Row, frozen=True, omit_defaults=True):
@@ -335,7 +324,7 @@ def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
 def edit_of(row: EditRow) -> Edit:
     """Return the edit of a row; the inverse of `rows_of_closing.edit_row`."""
     if row.kind == "add":
-        return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
+        return Add(row.name, row.numbers)
     if row.kind == "remove":
         return Remove(row.name)
     if row.kind == "push":

@@ -22,7 +22,7 @@ from foosim.world.assembly.initial_state import start_with
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
 from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Outbox
-from foosim.world.start import AddedEntity, Start
+from foosim.world.start import Start
 
 LAST: Final = "last"
 """The word for the time of the last captured frame."""
@@ -71,12 +71,11 @@ def read_branch(text: str, deployment: Deployment) -> Branch:
     if deployment.tick_ns != captured.tick_ns:
         have, want = format_ns(captured.tick_ns), format_ns(deployment.tick_ns)
         raise BadValue(f"--from: the capture has ticks of {have}, the deployment of {want}", str(path))
-    added = [AddedEntity(entity.name, entity.model) for entity in found.layout.added]
-    differing = _differences(layout, deployment, added)
+    differing = _differences(layout, deployment)
     if differing:
         raise BadValue(f"--from: the deployment does not fit the capture: {'; '.join(differing)}", str(path))
     at = f"frame {frame.tick} of {path}, at {frame.tick * captured.tick_ns / 1e9:g} s"
-    return Branch(start_with(frame, path.name, found.chain, added), f"the run begins with {at}")
+    return Branch(start_with(frame, path.name, found.chain), f"the run begins with {at}")
 
 
 def _frame_of(path: Path, found: _Found) -> tuple[Layout, Frame]:
@@ -144,14 +143,11 @@ def _seconds(at_ns: int | None) -> str | None:
     return None if at_ns is None else format_ns(at_ns)
 
 
-def _differences(layout: Layout, deployment: Deployment, added: list[AddedEntity]) -> list[str]:
-    """Return in words where a captured layout is not that of the deployment with what was added."""
+def _differences(layout: Layout, deployment: Deployment) -> list[str]:
+    """Return in words where a captured layout is not that of the deployment."""
     ours = build_layout(deployment)
     wanted = dict(ours.models)
-    differing = [
-        f"{a.name} was added, the deployment has a {wanted[a.name]} of that name" for a in added if a.name in wanted
-    ]
-    wanted |= {entity.name: entity.model for entity in added}
+    differing = []
     for name in sorted({*wanted, *layout.models}):
         if name not in wanted:
             differing.append(f"it lacks {layout.models[name]} {name}")

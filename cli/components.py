@@ -19,7 +19,7 @@ OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "motion": ("writes",),
     "rule": ("each", "writes"),
     "entity_rule": ("writes", "shared"),
-    "kit": ("entities", "addable", "rules", "presets"),
+    "kit": ("entities", "rules", "presets"),
 }
 """What is told of a form beside what all have: its fields."""
 SETTINGS_OF: Final[Mapping[str, str]] = {
@@ -148,8 +148,6 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  tags: {', '.join(about['tags'])}"
     if about.get("entities"):
         yield f"  beside the robots: {_paired(about['entities'])}"
-    if about.get("addable"):
-        yield f"  can be added: {', '.join(about['addable'])}"
     if about.get("presets"):
         yield f"  presets: {', '.join(about['presets'])}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -62,22 +62,26 @@ def rate(
 
 
 Numbers = tuple[float, float, float]
-Words = tuple[str, str, str]
 
 
-@app.command()
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def add(
-    name: Annotated[str | None, typer.Argument(help="Its name; by default the next free one.")] = None,
-    position: Annotated[Words | None, typer.Option(metavar="X Y Z", help="Where, in m.")] = None,
-    velocity: Annotated[Words | None, typer.Option(metavar="X Y Z", help="How fast, in m/s.")] = None,
-    model: Annotated[str | None, typer.Option(help="Of which model; by default the first that can be added.")] = None,
+    name: Annotated[
+        str, typer.Argument(metavar="ENTITY", help="A spare, or a fleet: then its first spare.", show_default=False)
+    ],
+    at: Annotated[str | None, typer.Option(metavar="X,Y[,Z]", help="Where, in m; else where it is declared.")] = None,
+    yaw: Annotated[str | None, typer.Option(metavar="ANGLE", help="Its heading, such as `90 deg`.")] = None,
+    node: Annotated[str | None, typer.Option(help="The node that owns it from now on; of robots.")] = None,
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Add an entity to the world; by default it rests where the first one of its model starts."""
-    place = None if position is None else _three("position", "m", position)
-    speed = None if velocity is None else _three("velocity", "m/s", velocity)
-    show_answer(control.add(name, place, speed, run, model), json)
+    """Add a spare of the deployment to the world."""
+    place = None if at is None else _read_value(at)
+    if yaw is not None:
+        from foosim.world.setting.settable import read_place
+
+        place = {**(read_place(place) if isinstance(place, str) else place or {}), "yaw": yaw}
+    show_answer(control.add(name, place, node, run), json)
 
 
 @app.command()
@@ -86,7 +90,7 @@ def remove(
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Remove an entity that was added."""
+    """Remove an entity from the world; it can be added again."""
     show_answer(control.remove(name, run), json)
 
 
@@ -163,7 +167,7 @@ def set_field(
     show_answer(control.set(name, field, _read_value(text), run), json)
 
 
-def _read_value(text: str) -> object:
+def _read_value(text: str) -> Any:
     """Return true, false and mappings as YAML has them, anything else as it is."""
     import yaml
 

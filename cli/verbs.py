@@ -94,11 +94,8 @@ class Foosim(Verbs):
             "resume": Verb("cli.control", "Continue after a pause."),
             "step": Verb("cli.control", "Simulate a number of ticks, then pause."),
             "rate": Verb("cli.control", "Change how fast simulated time passes."),
-            "add": Verb(
-                "cli.control",
-                "Add an entity to the world; by default it rests where the first one of its model starts.",
-            ),
-            "remove": Verb("cli.control", "Remove an entity that was added."),
+            "add": Verb("cli.control", "Add a spare of the deployment to the world."),
+            "remove": Verb("cli.control", "Remove an entity from the world; it can be added again."),
             "push": Verb("cli.control", "Apply an impulse to a free body."),
             "set": Verb("cli.control", "Set a field of an entity, e.g. `crate-1 at=3,1` or `scout down=true`."),
             "move": Verb("cli.control", "Move a robot to another node; the world stays the same."),

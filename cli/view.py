@@ -128,9 +128,8 @@ def _followed_live(live: LiveSource, name: str, second: Path, offset_ns: int) ->
         if deployment.files():
             deployment = deployment.with_assets(control.files(deployment))
     leader = Leader(live, deployment.tick_ns, time.monotonic_ns)
-    added = [(added, model) for added, model in what["added"]]
     try:
-        follower, both = open_follower(second, leader, deployment, offset_ns, added=added)
+        follower, both = open_follower(second, leader, deployment, offset_ns)
     except CaptureError as error:
         raise BadValue(f"--second: {error}") from None
     print(compared_text(second, both), file=sys.stderr)

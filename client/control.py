@@ -204,25 +204,18 @@ def rate(pace: str, run: str | None = None) -> Answer:
     return _ask(run, "rate", pace=pace)
 
 
-def add(
-    name: str | None = None,
-    position: Vector | None = None,
-    velocity: Vector | None = None,
-    run: str | None = None,
-    model: str | None = None,
-) -> Answer:
-    """Add an entity of a model at `position` (m, world frame) with `velocity` (m/s).
+def add(name: str, at: Any = None, node: str | None = None, run: str | None = None) -> Answer:
+    """Add a spare of the deployment: the entity of this name, or the first of this fleet that is absent.
 
-    By default it is of the first model of which the world can have more, where the first one of it starts, at rest.
+    `at` is a text `X,Y` or `X,Y,Z` (m), or a mapping of x, y, z, roll, pitch, yaw as in a deployment; by default the
+    entity starts where the deployment has it. `node` owns it from now on.
     """
-    for key, vector in (("position", position), ("velocity", velocity)):
-        _check_finite(key, vector or ())
-    given = {"name": name, "position": position, "velocity": velocity, "model": model}
+    given = {"name": name, "at": at, "node": node}
     return _ask(run, "add", **{key: value for key, value in given.items() if value is not None})
 
 
 def remove(name: str, run: str | None = None) -> Answer:
-    """Remove an added entity."""
+    """Remove an entity from the world; it can be added again."""
     return _ask(run, "remove", name=name)
 
 

@@ -23,7 +23,7 @@ from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_ki
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
-from foosim.world.layout import WORLD
+from foosim.world.layout import WORLD, spares_of
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scenery import SceneryMesh
 from foosim.world.spec import KITS
@@ -92,7 +92,8 @@ def _kits(deployment: Deployment) -> Iterator[Finding]:
             if kit.is_own:
                 raise
             yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", at="key")
-        for problem in (*kit_problems(key, kit, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
+        entities = {**kit.entities, **spares_of(deployment, kit)}
+        for problem in (*kit_problems(key, entities, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
             yield Finding((key,), f"kit {key}: {problem}", at="key")
     for label in deployment.rules:
         others = [key for key, kit in kits.items() if label in kit.rules]
@@ -125,7 +126,8 @@ def _names(deployment: Deployment) -> Iterator[Finding]:
     entities: dict[str, str] = {}
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
-    reserved = (WORLD, *(name for kit in _kit_forms(deployment).values() for name in kit.entities))
+    kits = _kit_forms(deployment).values()
+    reserved = (WORLD, *(name for kit in kits for name in (*kit.entities, *spares_of(deployment, kit))))
     for section, scopes, refused in (
         ("robots", (entities, endpoints), reserved),
         ("objects", (entities,), reserved),
@@ -293,10 +295,11 @@ def _scenery(deployment: Deployment) -> Iterator[Finding]:
 
 
 def _models(deployment: Deployment) -> Iterator[Model]:
-    """Yield the models of robots and objects, of what kits put into the world, and of what can be added."""
+    """Yield the models of robots and objects, and of what kits put into the world."""
     yield from map(registry.model_of, (*deployment.robots.values(), *deployment.objects.values()))
     for kit in _kit_forms(deployment).values():
-        yield from (model for name in (*kit.entities.values(), *kit.addable) if (model := find_kit_model(name)))
+        names = (*kit.entities.values(), *spares_of(deployment, kit).values())
+        yield from (model for name in names if (model := find_kit_model(name)))
 
 
 def _radio(radio: RadioMaterial, location: Location) -> Iterator[Finding]:

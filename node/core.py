@@ -8,7 +8,6 @@ else in the system sees committed frames only.
 from __future__ import annotations
 
 from array import array
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -21,7 +20,7 @@ from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.node.inputs import Inputs, PendingEpochMessages, check_near
-from foosim.node.tick import Stepper, Work, moved_slots
+from foosim.node.tick import Stepper, Work
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
@@ -39,7 +38,6 @@ from foosim.protocol.messages import (
     Order,
     Part,
     Piece,
-    Prepare,
     Recall,
     Samples,
     Want,
@@ -49,7 +47,6 @@ from foosim.protocol.retry import Patience
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
-from foosim.world.edits import removed
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Outbox
@@ -74,7 +71,7 @@ Groups: TypeAlias = tuple[tuple[Entity, ...], ...]
 
 @dataclass
 class _Term:
-    """The state that changes with an epoch or a layout: solvers and writers."""
+    """The state that changes with an epoch: solvers and writers."""
 
     stepper: Stepper
     slots: Slots
@@ -117,7 +114,7 @@ class NodeCore:
         self.roster: tuple[str, ...] = ()
         self.owners: dict[str, str] = {}
         self.ended: End | None = None
-        self._steppers: dict[bytes, Stepper] = {}
+        self._stepper: Stepper | None = None
         self._term: _Term | None = None
         self._history: dict[int, Frame] = {}
         self._awaited_epoch: Epoch | None = None
@@ -151,7 +148,6 @@ class NodeCore:
             channels.RECALL.name: self._on_recall,
             channels.BUILD.name: self._on_build,
             channels.PIECE.name: self._on_build,
-            channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
         }
 
@@ -229,10 +225,10 @@ class NodeCore:
         self.actions.append(Publish(channels.PART, self.name, payload))
         self._barrier.add(part)
 
-    def engine_ready(self, layout: Layout, fingerprint: bytes) -> None:
-        """The shell has an engine for this layout; `fingerprint` is the digest of its fixed small run."""
+    def engine_ready(self, fingerprint: bytes) -> None:
+        """The shell has built the engine; `fingerprint` is the digest of its fixed small run."""
         self.member.simulation = fingerprint
-        self.member.ready(layout)
+        self.member.ready()
 
     def wake(self, now_ns: int) -> None:
         """Send what is due by time: hello, heartbeat, repeated requests."""
@@ -250,17 +246,17 @@ class NodeCore:
         return self.ended is None and (self.frame is not None or self._awaited_epoch is not None)
 
     @property
-    def layouts_wanted(self) -> list[Layout]:
-        """Layouts for which the shell should have an engine, in the order of need."""
-        return self.member.layouts
+    def layout(self) -> Layout | None:
+        """The layout of the world; None before the build."""
+        return self.member.layout
 
-    def stepper(self, layout: Layout) -> Stepper:
-        """Return the pure step of a layout, made once."""
-        assert self.deployment is not None
-        stepper = self._steppers.get(layout.digest)
-        if stepper is None:
-            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout, is_watched=self.is_watched)
-        return stepper
+    @property
+    def stepper(self) -> Stepper:
+        """The pure step, made once."""
+        if self._stepper is None:
+            assert self.deployment is not None and self.member.layout is not None
+            self._stepper = Stepper(self.deployment, self.member.layout, is_watched=self.is_watched)
+        return self._stepper
 
     def present_tick(self) -> int:
         """Return the tick that is computed, -1 without one. Any thread may call this."""
@@ -276,9 +272,9 @@ class NodeCore:
 
     def make_anew(self) -> None:
         """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
-        self._steppers.clear()
+        self._stepper = None
         if self._term is not None:
-            self._term = self._make_term(self._term.assignment.layout)
+            self._term = self._make_term()
 
     def statistics(self) -> NodeStatistics:
         tick = self.frame.tick if self.frame is not None else 0
@@ -318,7 +314,7 @@ class NodeCore:
 
     def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
         """Publish what these robots send at a frame; return what their sensors remember."""
-        stepper = self.stepper(frame.layout)
+        stepper = self.stepper
         packets, remembered = stepper.sense(frame, robots)
         for name in stepper.not_finite.keys() - self._not_finite:
             self._not_finite.add(name)
@@ -338,13 +334,8 @@ class NodeCore:
         if edits is None or delivered is None:
             return False
         raw, deliveries = delivered
-        layout, numbers = self._term.stepper.edited(frame, edits)
-        gone = removed(frame.layout, edits)
-        if layout is not frame.layout or gone:
-            self._remembered = moved_slots(self._remembered, frame.layout, layout, gone)
-        if layout is not frame.layout:
-            self._term = self._make_term(layout)
         term = self._term
+        numbers, self._remembered = term.stepper.edited(frame, edits, self._remembered)
         share: Share = term.assignment.shares(numbers)[self.name]
         start = numbers.copy()
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
@@ -353,7 +344,7 @@ class NodeCore:
         islands, movers = term.members(share)
         is_edited = edits or frame.tick in term.stepper.events.by_tick or term.stepper.world.has_rules
         values = None if is_edited else frame.values
-        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes, start, movers, values)
+        self.work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
         return True
 
     def _collect(self, now_ns: int) -> bool:
@@ -473,22 +464,18 @@ class NodeCore:
         self.actions += [Publish(channels.WANT, self.name, encode(want)) for want in wants]
         self._patience.asked(now_ns)
 
-    # --- epochs, layouts, start and end ------------------------------------------------------------------------------
+    # --- epochs, start and end ---------------------------------------------------------------------------------------
 
     def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
             self._repeated += not self.member.is_fetching
             return
-        self.deployment, layout = self.member.deployment, self.member.layout
-        assert layout is not None
-        self.member.want_layout(layout)
+        self.deployment = self.member.deployment
+        if self.member.simulation:
+            self.member.ready()
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
         self._repeated += not self.member.recall(recall)
-
-    def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
-        if self.deployment is not None:
-            self.member.want_layout(self.member.layout_with(prepare.added))
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
@@ -541,37 +528,38 @@ class NodeCore:
         if epoch is None or commit.tick != epoch.tick or commit.digest != epoch.digest:
             self._repeated += 1
             return
-        frame = frame_from_bytes(commit.tick, self.member.layout_with(epoch.added), commit.values, commit.outboxes)
+        assert self.member.layout is not None
+        frame = frame_from_bytes(commit.tick, self.member.layout, commit.values, commit.outboxes)
         if frame.digest != epoch.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self._resume(frame, now_ns)
 
     def _take_old_frame(self, commit: Commit) -> None:
-        """A frame to sample, of any layout that there has been."""
-        for stepper in self._steppers.values():
-            if 8 * stepper.layout.size == len(commit.values):
-                frame = frame_from_bytes(commit.tick, stepper.layout, commit.values, commit.outboxes)
-                if frame.digest == commit.digest:
-                    self._unsampled.discard(commit.tick)
-                    self._history[commit.tick] = frame
-                    self._sample_again(commit.tick)
-                    return
-        raise Malformed(f"commit {commit.tick} whose frame has another digest in every layout")
+        """Take a frame to sample."""
+        assert self.member.layout is not None
+        frame = frame_from_bytes(commit.tick, self.member.layout, commit.values, commit.outboxes)
+        if frame.digest != commit.digest:
+            raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        self._unsampled.discard(commit.tick)
+        self._history[commit.tick] = frame
+        self._sample_again(commit.tick)
 
     def _resume(self, frame: Frame, now_ns: int) -> None:
         """Continue from the epoch's frame, with its roster and owners and its pending messages."""
         self._awaited_epoch = None
         self._history = {tick: kept for tick, kept in self._history.items() if tick < frame.tick}
         self._enter(frame, now_ns)
-        self._term = self._make_term(frame.layout)
+        self._term = self._make_term()
         for channel, name, payload in self._pending.take():
             self.receive(channel, name, payload, now_ns)
 
-    def _make_term(self, layout: Layout) -> _Term:
+    def _make_term(self) -> _Term:
+        stepper = self.stepper
+        layout = stepper.layout
         assert self.deployment is not None
         assignment = Assignment(layout, reach_of(self.deployment, layout), self.roster, self.owners)
         mine = tuple(robot for robot in layout.robots if self.owners.get(robot.name) == self.name)
-        return _Term(self.stepper(layout), Slots(layout, self.owners), assignment, mine)
+        return _Term(stepper, Slots(layout, self.owners), assignment, mine)
 
     def _on_end(self, end: End, payload: bytes, now_ns: int) -> None:
         self.ended = end
@@ -579,7 +567,7 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        not_finite = sum((stepper.not_finite for stepper in self._steppers.values()), Counter[str]())
+        not_finite = {} if self._stepper is None else self._stepper.not_finite
         counts = {"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender(), "not_finite": not_finite}
         report = encode_json(counts)
         lacks, lost = self.waiting_for, self.failure

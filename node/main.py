@@ -93,7 +93,7 @@ class NodeShell:
         while self._slow:
             core.actions.append(core.slow_tick(self._slow.popleft()))
         core.advance(now_ns)
-        self._build()
+        self._solver.build()
 
     def _name_slow(self, text: str) -> None:
         """Log where a tick takes long and tell the supervisor, from the thread that watches.
@@ -114,20 +114,10 @@ class NodeShell:
             return False
         self._solver.solve(work)
         self.core.advance(now_ns)
-        self._build()
         return True
 
-    def _build(self) -> None:
-        """Build engines: at the start those of all layouts; then, between two ticks, a part of one for a new layout."""
-        if self.core.work is not None:
-            return
-        if self.core.frame is None:
-            self._solver.build_wanted()
-        else:
-            self._solver.build_some()
-
     def _deadline_ns(self, now_ns: int) -> int:
-        return now_ns if self._solver.is_building else self.core.deadline_ns()
+        return self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if plane is not Plane.SIMULATION:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Final, cast
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from foosim.common import limits
 from foosim.deployment.schema import Deployment
 from foosim.node.due_sensors import DueSensors, Turn
-from foosim.node.edited_frame import edit, moved_reference
+from foosim.node.edited_frame import edit, kept
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
 from foosim.node.physics.touch_log import clear_touches
 from foosim.world.assembly.body_limits import BodyLimits
@@ -135,18 +135,19 @@ class Stepper:
         ]
         return packets, view.written
 
-    def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
-        """Return layout and numbers of the frame after the edits of order and events, and the rules of the world."""
+    def edited(
+        self, frame: Frame, edits: Sequence[Edit], remembered: dict[int, float]
+    ) -> tuple[list[float], dict[int, float]]:
+        """Return the numbers of the frame after the edits of order and events, and the rules of the world; and what
+        sensors that are still there remember of it, by place."""
         if frame.tick in self.events.by_tick:
-            edits = [*edits, *self.events.edits(frame)]
-        layout, numbers = edit(frame, edits, self.deployment)
-        is_same = layout is self.layout or layout.digest == self.layout.digest
-        world = self.world if is_same else World(self.deployment, layout, is_watched=self._is_watched)
-        world.apply_rules(numbers, frame.tick)
-        if edits or world.has_rules:
-            wake_edited(frame, layout, numbers, edits)
-            self._standing.wake_edited(frame, layout, numbers)
-        return layout, numbers
+            edits = [*edits, *self.events.edits(frame, edits)]
+        numbers, moved = edit(frame, edits, self.deployment)
+        self.world.apply_rules(numbers, frame.tick)
+        if edits or self.world.has_rules:
+            wake_edited(frame, numbers, edits)
+            self._standing.wake_edited(frame, numbers)
+        return numbers, kept(remembered, moved) if moved else remembered
 
     @property
     def waits(self) -> bool:
@@ -373,19 +374,6 @@ def _clear_results(entity: Entity, numbers: list[float]) -> None:
     if start is not None:
         count = entity.counts["joint_efforts"]
         numbers[start : start + count] = [0.0] * count
-
-
-def moved_slots(written: dict[int, float], old: Layout, new: Layout, gone: Set[str]) -> dict[int, float]:
-    """Return numbers of owners' slots, by place, at their places in another layout."""
-    moved: dict[int, float] = {}
-    references = frozenset(old.references)
-    for entity in old.robots:
-        if entity.name in new:
-            shift = new[entity.name].split - entity.split
-            for at, number in written.items():
-                if entity.split <= at < entity.stop:
-                    moved[at + shift] = moved_reference(number, old, new, gone) if at in references else number
-    return moved
 
 
 def _packets(turn: Turn, payloads: Iterable[bytes | None], outboxes: Mapping[int, bytes]) -> Iterator[RobotPacket]:

@@ -98,7 +98,6 @@ READY: Final = _simulation(
 )
 RESUME_STATE: Final = _simulation("resume_state", hub_messages.ResumeState, "vhub", "supervisor", "with each ready")
 RESUME_GRANT: Final = _simulation("resume_grant", hub_messages.ResumeGrant, "supervisor", "the named one", "an answer")
-PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
 PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "tick")
@@ -145,7 +144,6 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     READY,
     RESUME_STATE,
     RESUME_GRANT,
-    PREPARE,
     EPOCH,
     ORDER,
     PART,
@@ -196,7 +194,7 @@ Reads = tuple[tuple[Channel, bool], ...]
 NODE_READS: Final[Reads] = (*((channel, True) for channel in (
     BUILD, PIECE, REFUSAL, COMMIT
 )), *((channel, False) for channel in (
-    RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
+    RECALL, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
 VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     BUILD, PIECE, REFUSAL, RESUME_GRANT, COMMIT

@@ -8,7 +8,7 @@ computed. Shared by node and vHub.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Final, Literal
 
 from foosim.common import limits
@@ -36,11 +36,8 @@ from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import AssetError
-from foosim.world.start import AddedEntity
 
 AGAIN_NS: Final = 200_000_000
-LAYOUTS_KEPT: Final = 4
-"""Layouts of the build's world that are not made again: each epoch and each build asks for one that was there."""
 
 
 def sendable(text: str) -> str:
@@ -84,9 +81,6 @@ class Member:
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
         """The layout of the world at the build."""
-        self.layouts: list[Layout] = []
-        self._made: dict[tuple[tuple[str, str], ...], Layout] = {}
-        """Layouts of the build's world by what is added to it, the last one made at the end."""
         self.deadline_ns = now_ns
         self.is_ready = False
         self.simulation = b""
@@ -94,9 +88,6 @@ class Member:
         self._fingerprint = fingerprint
         self._world = world
         self._actions = actions
-        self._said_ready: Layout | None = None
-        self._built: set[bytes] = set()
-        """Digests of the layouts that were reported ready."""
         self._entered = False
         self._entered_by = ""
         """Boot of the supervisor of the last epoch with this process."""
@@ -139,7 +130,7 @@ class Member:
         except DeploymentError as error:
             raise self._invalid(build, f"the deployment is not valid on its machine: {error.problems[0]}") from None
         if not deployment.lacks_files:  # else when they have come
-            build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+            build_layout(deployment)
         self._coming = build, deployment, Fetching(deployment, self._files)
         self.deadline_ns = 0
 
@@ -149,9 +140,7 @@ class Member:
             deployment = deployment.with_assets(fetching.contents())
         except AssetError as error:
             raise self._invalid(build, f"a file of the deployment is not valid on its machine: {error}") from None
-        more = tuple([(entity.name, entity.model) for entity in build.added])
-        self.layout = build_layout(deployment, more)
-        self.deployment, self._made = deployment, {more: self.layout}
+        self.deployment, self.layout = deployment, build_layout(deployment)
         self.build, self.problem = build, ""
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
@@ -184,7 +173,6 @@ class Member:
             self._actions.append(Log("error", self.refusal))
             return False
         self._recalled_by = ""
-        self.layout = self.layout_with(build.added)
         self.build = build
         self.deadline_ns = 0
         return True
@@ -208,43 +196,23 @@ class Member:
         return True
 
     def check_epoch(self, epoch: Epoch) -> None:
-        """Raise `Malformed` unless every robot has one owner that is a member, and the added entities make a layout."""
+        """Raise `Malformed` unless every robot has one owner that is a member."""
         assert self.deployment is not None
         owners, roster = dict(epoch.owners), set(epoch.roster)
         if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
             raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
         if not set(owners.values()) <= roster or len(roster) != len(epoch.roster):
             raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
-        self.layout_with(epoch.added)
 
-    def layout_with(self, added: Iterable[AddedEntity]) -> Layout:
-        """Return the layout of the build's world with entities added to it, or raise `Malformed`."""
-        assert self.deployment is not None
-        more = tuple([(entity.name, entity.model) for entity in added])
-        if more not in self._made:
-            layout = build_layout(self.deployment, more)
-            while len(self._made) >= LAYOUTS_KEPT:
-                self._made.pop(next(iter(self._made)))
-            self._made[more] = layout
-        return self._made[more]
-
-    def want_layout(self, layout: Layout) -> None:
-        """Ask the shell for the engine of this layout (node)."""
-        if all(layout.digest != wanted.digest for wanted in self.layouts):
-            self.layouts.append(layout)
-        elif layout.digest in self._built:
-            self.ready(layout)
-
-    def ready(self, layout: Layout) -> None:
-        """Report that this layout is built."""
+    def ready(self) -> None:
+        """Report that the world is built."""
+        assert self.layout is not None
         self.is_ready = True
-        self._said_ready = layout
-        self._built.add(layout.digest)
         if self.standing is not None:
             self._actions.append(self.standing())
         versions = foreign_versions(self.deployment) if self.role == "node" and self.deployment is not None else {}
         forms = [FormVersion(name, version) for name, version in versions.items()]
-        ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint, forms)
+        ready = Ready(self.name, self.boot, self.layout.digest, self.simulation or self._fingerprint, forms)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:
@@ -261,8 +229,8 @@ class Member:
         self._entered = self._entered or (is_present and is_known)
 
     def begin_anew(self) -> None:
-        """Begin the handshake again, because the run continues without this process. Built layouts stay."""
-        self.build = self.layout = self._said_ready = self._coming = None
+        """Begin the handshake again, because the run continues without this process. What was built stays."""
+        self.build = self.layout = self._coming = None
         self.is_ready = self._entered = False
         self._recalled_by = ""
         self.deadline_ns = 0
@@ -289,7 +257,7 @@ class Member:
             self.deadline_ns = now_ns + AGAIN_NS
             if self.build is None:
                 return
-        elif not self._entered and self._said_ready is not None:
-            self.ready(self._said_ready)
+        elif not self._entered and self.is_ready:
+            self.ready()
         self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
         self.deadline_ns = now_ns + limits.HEARTBEAT_NS

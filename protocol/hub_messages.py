@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from foosim.common.struct_types import Counter, Digest, Message, Name, Numbers, Text
-from foosim.world.start import Added
 
 
 class ResumeState(Message, frozen=True):
     """The vHub's position: the highest epoch that it knows, the bytes of its last commit (empty before the first), the
-    chain over the frames up to it, the entities added to the deployment's layout, and the last tick whose deliveries
-    are `final`.
+    chain over the frames up to it, and the last tick whose deliveries are `final`.
 
     `supervisor` is the boot of the supervisor that it answers. A vHub that `waits` continues from a journal, and closes
     no tick before its `ResumeGrant`. With `lost_machine` its machine was booted after its journal was begun: the last
@@ -22,7 +20,6 @@ class ResumeState(Message, frozen=True):
     epoch: Counter
     commit: Numbers
     chain: Digest
-    added: Added
     final: Counter
     waits: bool
     lost_machine: bool

@@ -16,7 +16,7 @@ from foosim.common import limits
 from foosim.common.struct_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
 from foosim.world.edits import Edits
 from foosim.world.robot_packets import Delivered, Outboxes, RobotPacket
-from foosim.world.start import Added, Origin
+from foosim.world.start import Origin
 
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 
@@ -187,7 +187,6 @@ class Build(Message, frozen=True):
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     pace: Name
-    added: Added
     origin: Origin | None = None
 
 
@@ -213,12 +212,6 @@ class Ready(Message, frozen=True):
     forms: Annotated[list[FormVersion], Meta(max_length=limits.FORMS_MAX)] = field(default_factory=list)
 
 
-class Prepare(Message, frozen=True):
-    """Build an engine for the layout with these added entities, and answer `Ready`."""
-
-    added: Added
-
-
 class Epoch(Message, frozen=True):
     """Members and owners from tick `tick` on: `owners` is (robot, node) for every robot.
 
@@ -230,7 +223,6 @@ class Epoch(Message, frozen=True):
     digest: Digest
     roster: Names
     owners: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
-    added: Added
     arithmetic: Annotated[bytes, Meta(max_length=32)]
 
 

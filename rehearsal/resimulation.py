@@ -16,14 +16,13 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.asset_transfer import piece_of
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Prepare
+from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order
 from foosim.runtime.roles.bus import Bus
 from foosim.world.assembly.initial_state import first_frame
-from foosim.world.edits import Edit, layout_after
+from foosim.world.edits import Edit
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import Delivered, RobotPacket
-from foosim.world.start import AddedEntity, Start
+from foosim.world.start import Start
 
 SOURCE = "capture"
 
@@ -41,7 +40,6 @@ class Replica:
     ) -> None:
         self.frame: Frame = first_frame(deployment, start)
         self._deployment = deployment
-        self._base = build_layout(deployment)
         self._bus = Bus()
         self._nodes: dict[str, tuple[NodeCore, Solver]] = {}
         for node in sorted(deployment.nodes):
@@ -51,7 +49,7 @@ class Replica:
         self._bus.subscribe(SOURCE, ((channels.FETCH, False),))
         for node in self._nodes:
             origin = None if start is None else start.origin
-            build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
+            build = Build(node, "boot", "first", SOURCE, name, text, "fast", origin)
             self._publish(channels.BUILD, node, encode(build))
         self._settle()
         self._epoch = 0
@@ -61,8 +59,7 @@ class Replica:
         """Continue from a frame, in a new epoch."""
         self.frame = frame
         self._epoch += 1
-        owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
-        who = sorted(self._nodes), owners, added, b""
+        who = sorted(self._nodes), sorted(self._deployment.owners().items()), b""
         self._publish(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
         commit = Commit(
             self._epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], last=False
@@ -84,10 +81,6 @@ class Replica:
     def step(self, edits: Sequence[Edit], delivered: Sequence[Delivered]) -> Frame:
         """Compute the next frame from this tick's order and deliveries."""
         tick = self.frame.tick
-        layout = layout_after(self.frame.layout, edits)
-        if layout is not self.frame.layout:
-            self._publish(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
-            self._settle()
         self._publish(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
         self._publish(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
         self._settle()
@@ -99,7 +92,7 @@ class Replica:
     def sense(self) -> list[RobotPacket]:
         """Return the packets that all robots send at the frame, in (robot, index) order."""
         core, _ = next(iter(self._nodes.values()))
-        packets, _ = core.stepper(self.frame.layout).sense(self.frame, self.frame.layout.robots)
+        packets, _ = core.stepper.sense(self.frame, self.frame.layout.robots)
         return packets
 
     def rebuild_engines(self) -> None:
@@ -110,9 +103,6 @@ class Replica:
     def close(self) -> None:
         for _, solver in self._nodes.values():
             solver.close()
-
-    def _added(self, layout: Layout) -> list[AddedEntity]:
-        return [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in self._base]
 
     def _publish(self, channel: channels.Channel, name: str, payload: bytes) -> None:
         self._bus.put(SOURCE, channel, name, payload, 0)
@@ -128,7 +118,7 @@ class Replica:
             core, solver = self._nodes[receiver]
             core.receive(channel, name, payload, 0)
             core.wake(0)
-            solver.build_wanted()
+            solver.build()
             core.advance(0)
             while core.work is not None:
                 solver.solve(core.work)

@@ -29,11 +29,11 @@ from foosim.rehearsal.stepping.world import SteppedWorld
 from foosim.vhub.network.memory import Joining
 from foosim.world.assembly.initial_state import first_frame
 from foosim.world.assembly.world import build_scene, world_status
-from foosim.world.edits import Disrupt, Set, written
+from foosim.world.edits import Disrupt, Edit, Remove, written
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout
 from foosim.world.scene import Scene
-from foosim.world.setting.settable import set_edits
+from foosim.world.setting.coming import absent_named, check_present
+from foosim.world.setting.settable import add_edit, set_edits
 from foosim.world.start import Start
 
 LEARNER: Final = "learner"
@@ -188,14 +188,14 @@ class Simulation:
         self.period = period
         self._has_network = network
         self._encoder: CommandEncoder | None = None
-        self._scenes: dict[bytes, Scene] = {}
+        self._scene: Scene | None = None
         self.deployment: Deployment = loaded
         """As it is stepped: with the seed of the last `reset`."""
         self._world: SteppedWorld | None = None
         self._carrier: Carrier
         self._residents: dict[str, Resident] = {}
         self._events: list[Disrupt] = []
-        self._edits: list[Set] = []
+        self._edits: list[Edit] = []
         """What happens to the network from the next frame on."""
         self.reset(start, seed)
 
@@ -279,11 +279,10 @@ class Simulation:
 
     @property
     def scene(self) -> Scene:
-        """The bodies and the scenery of the present layout."""
-        layout: Layout = self.frame.layout
-        if layout.digest not in self._scenes:
-            self._scenes[layout.digest] = build_scene(self.deployment, layout)
-        return self._scenes[layout.digest]
+        """The bodies, also those that are absent, and the scenery."""
+        if self._scene is None:
+            self._scene = build_scene(self.deployment, self.frame.layout)
+        return self._scene
 
     @property
     def _stepped(self) -> SteppedWorld:
@@ -317,11 +316,31 @@ class Simulation:
         Raises UnknownName, and BadValue for a field that is not settable, a value beyond its limits, and a place where
         something is.
         """
-        frame = self.frame
-        if name not in frame.layout:
-            raise UnknownName("no entity", name, frame.layout.names)
-        numbers = written(frame.layout, frame.numbers, self._edits)
-        self._edits += set_edits(self.deployment, frame.layout, numbers, frame.layout[name], field, value)
+        layout, numbers = self.frame.layout, self._coming()
+        if name not in layout:
+            raise UnknownName("no entity", name, layout.names)
+        if layout[name].is_absent(numbers):
+            raise BadValue(f"{name} is absent: add it first")
+        self._edits += set_edits(self.deployment, layout, numbers, layout[name], field, value)
+
+    def add(self, name: str, at: object = None) -> str:
+        """Add a spare at the next step, as `foosim add` does: `add("crate", "1,0")`; return its name.
+
+        Raises Refused for what is not absent, and BadValue for a place that is none, or where something is.
+        """
+        layout, numbers = self.frame.layout, self._coming()
+        entity = absent_named(layout, numbers, name)
+        self._edits.append(add_edit(self.deployment, layout, numbers, entity, at))
+        return entity.name
+
+    def remove(self, name: str) -> None:
+        """Remove an entity at the next step, as `foosim remove` does. Raises Refused for what is not there."""
+        check_present(self.frame.layout, self._coming(), name)
+        self._edits.append(Remove(name))
+
+    def _coming(self) -> list[float]:
+        """Return the numbers of the present frame after what is edited at the next step."""
+        return written(self.frame.layout, self.frame.numbers, self._edits)
 
     def partition(self, *groups: str | Sequence[str]) -> None:
         """Cut the network between groups of endpoints, names or selectors, from the next frame on until `heal`:

@@ -143,7 +143,7 @@ class System:
         solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 
         def turn(now_ns: int) -> None:
-            solver.build_wanted()
+            solver.build()
             self._simulation = self._simulation or solver.fingerprint
             core.advance(now_ns)
             while core.work is not None:

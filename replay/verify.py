@@ -19,7 +19,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.node.physics.mesh_trial import check_shapes
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import with_nodes
-from foosim.world.assembly.initial_state import added_to, first_chain, start_with
+from foosim.world.assembly.initial_state import first_chain, start_with
 from foosim.world.frame import CHAIN_START, Frame, chain_next
 from foosim.world.start import Start
 
@@ -91,7 +91,7 @@ def start_of(capture: CaptureData) -> Start | None:
     first = capture.first_frame()
     if first is None or first.digest != origin.digest:
         raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which it begins")
-    return start_with(first, origin.source, origin.chain, added_to(first.layout))
+    return start_with(first, origin.source, origin.chain)
 
 
 def verify(
@@ -177,7 +177,7 @@ class Between:
                 self._replica.set_back(frame)
             return self._replica
         about = self._about
-        start = start_with(frame, about.path.name, CHAIN_START, added_to(frame.layout))
+        start = start_with(frame, about.path.name, CHAIN_START)
         self._replica = replica_of(about.deployment_text, about.deployment_name, about.files, start)
         return self._replica
 

@@ -8,7 +8,7 @@ never changes. The core dispatches messages to its helpers; all share one `RunSt
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final
+from typing import Any
 
 from mypy_extensions import mypyc_attr
 
@@ -52,11 +52,8 @@ from foosim.supervisor.status import SupervisorStatistics, result, status
 from foosim.supervisor.vhub_loss import PlayerLosses, VhubLoss
 from foosim.supervisor.viewing import Viewing
 from foosim.world.components.command_watch import CommandWatch
-from foosim.world.edits import Edit, layout_after
+from foosim.world.edits import Edit
 from foosim.world.frame import Frame, chain_next
-
-PREPARE_NS: Final = 200_000_000
-"""Period at which a layout that nodes have not built yet is requested again."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -80,7 +77,7 @@ class SupervisorCore:
         self.viewing = Viewing(state)
         self.handshake = Handshake(state, self.process_gone)
         self.vhub_loss, self.player_losses = VhubLoss(state, self.progress), PlayerLosses(state)
-        self.node_loss = NodeLoss(state, self.open_epoch, self._layout_ready, self.fail)
+        self.node_loss = NodeLoss(state, self.open_epoch, self.fail)
         ends = self.fail, self.publish_last_commit
         self.failover = Failover(state, self.closing, self.node_loss, *ends)
         self.balancer = Balancer(state.deployment.owners()) if settings.balance else None
@@ -90,7 +87,6 @@ class SupervisorCore:
         self.on_commit: Callable[[Frame], None] | None = None
         """Gets every committed frame, for a rehearsal."""
         self._slots = Slots(state.frame.layout, state.owners)
-        self._prepare_ns = now_ns
         self._patience = Patience(now_ns)
         self._refused = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
@@ -159,9 +155,6 @@ class SupervisorCore:
         self._balance(now_ns)
         if state.lacks_inputs and self._patience.is_over(now_ns):
             self._ask_again(now_ns)
-        if now_ns >= self._prepare_ns:
-            self.requests.prepare()
-            self._prepare_ns = now_ns + PREPARE_NS
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -223,7 +216,6 @@ class SupervisorCore:
         state.log("error" if failed else "info", f"run ends at tick {state.frame.tick}: {reason}")
         state.journal(state.end)
         state.publish_end()
-        self.requests.end()
 
     def fail(self, reason: str, tick: int | None = None) -> None:
         """End the run as failed, by default at the last committed tick."""
@@ -305,9 +297,7 @@ class SupervisorCore:
             return False
         assert state.members, "parts of nobody"
         edits = state.orders[tick]
-        layout = layout_after(state.frame.layout, edits)
-        slots = self._slots if layout is state.frame.layout else Slots(layout, state.owners)
-        barrier = Barrier(tick + 1, state.members, slots)
+        barrier = Barrier(tick + 1, state.members, self._slots)
         digest = input_digest_of(state.frame.digest, edits, deliveries)
         diverged = [part.node for part in parts if part.input_digest != digest]
         if diverged:
@@ -326,7 +316,6 @@ class SupervisorCore:
             state.log("error", f"{bad}: requested again")
             inputs.drop(tick + 1, bad.nodes)
             return False
-        self._slots = slots
         inputs.committed(tick)
         self._commands.committed(state.frame, frame, lambda: decode(Deliveries, deliveries).packets)
         self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
@@ -407,7 +396,7 @@ class SupervisorCore:
     def _start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""
         state = self.state
-        if state.is_open or state.end is not None or state.roster.missing(state.frame.layout.digest):
+        if state.is_open or state.end is not None or state.roster.missing():
             return
         state.pacer.start(now_ns, state.frame.tick)
         state.publish_tempo()
@@ -437,17 +426,14 @@ class SupervisorCore:
             self.open_epoch({**state.owners, shift.robot: shift.target}, now_ns)
             state.log("info", f"{shift} at tick {state.frame.tick}")
 
-    def _layout_ready(self, now_ns: int) -> None:
-        self.requests.layout_ready(now_ns)
-
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def _on_ready(self, ready: Ready, payload: bytes, now_ns: int) -> None:
-        """A layout is built: the run may begin, a node may join, a change of the world may be ordered."""
+        """A process has built the world: the run may begin, a node may join."""
         state, process = self.state, self.handshake.on_ready(ready, now_ns)
         if process is None:
             return
-        is_hub, is_present = process.name == channels.VHUB, ready.layout == state.frame.layout.digest
+        is_hub = process.name == channels.VHUB
         if is_hub:
             self.viewing.hub_ready()
         if state.is_resuming:
@@ -457,13 +443,9 @@ class SupervisorCore:
         elif is_hub:
             self.vhub_loss.on_ready(now_ns)
         elif process.name in state.members:
-            if is_present:
-                state.publish_epoch()
-        elif is_present:
-            self.node_loss.join(process, now_ns)
+            state.publish_epoch()
         else:
-            state.prepare(state.frame.layout)  # the world has changed since its build was sent
-        self.requests.layout_ready(now_ns)
+            self.node_loss.join(process, now_ns)
 
     def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
         """A process lives: a lost one may be back; send it again what it has missed."""

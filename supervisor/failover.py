@@ -103,7 +103,6 @@ class Failover:
         if self._is_ahead(standing) and not lacks_inputs(state, standing):
             self._catch_up(standing)
         state.epoch = max(state.epoch, standing.epoch)
-        state.prepare(state.frame.layout)
         self._standing = standing
         state.resumed()
         return True
@@ -135,9 +134,9 @@ class Failover:
                 wait_s = max(deadlines.orphan_ns, deadlines.start_ns) / 1e9
                 self._fail(f"lost {channels.VHUB}: it has not come to the supervisor within {wait_s:g} s")
             return
-        layout, known = state.frame.layout.digest, state.roster.by_name
+        known = state.roster.by_name
         expected = [name for name in self._roster if name not in state.roster.stopped]
-        here = [name for name in expected if name in known and layout in known[name].ready and not known[name].lost]
+        here = [name for name in expected if name in known and known[name].ready and not known[name].lost]
         waits_until_ns = self._living_ns if state.found_living else self._start_ns
         is_due = len(here) == len(expected) or now_ns >= waits_until_ns
         if lacks_inputs(state, self._standing):

@@ -40,9 +40,9 @@ class Handshake:
         if known is not None and known.in_doubt and known.boot != hello.boot:
             self._process_gone(hello.name, now_ns)  # there is no doubt left
         state.roster.take(hello, now_ns)
-        run, pace, added = state.settings, str(state.pacer.pace), state.added(state.frame.layout)
+        run, pace = state.settings, str(state.pacer.pace)
         deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, state.boot, run.run, *deployment, pace, added, run.origin)
+        build = Build(hello.name, hello.boot, state.boot, run.run, *deployment, pace, run.origin)
         state.publish(channels.BUILD, hello.name, build)
 
     def on_fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
@@ -50,7 +50,7 @@ class Handshake:
         self._state.publish(channels.PIECE, fetch.name, piece_of(self._state.deployment, fetch))
 
     def on_ready(self, ready: Ready, now_ns: int) -> Process | None:
-        """Record a layout that a process has built; return the process when the run continues with it."""
+        """Record that a process has built the world; return the process when the run continues with it."""
         state = self._state
         process = state.roster.by_name.get(ready.name)
         is_known = process is not None and process.boot == ready.boot and ready.name not in state.roster.stopped
@@ -62,7 +62,7 @@ class Handshake:
         if state.end is not None:
             state.publish_end()
             return None
-        reason = state.roster.note_ready(process, ready)
+        reason = state.roster.note_ready(process, ready, state.frame.layout.digest)
         if reason:
             state.actions += refuse(process.role, process.name, process.boot, reason)
             return None

@@ -117,4 +117,4 @@ class Balancer:
         if not state.is_open or state.end is not None or state.pacer.paused:
             return None
         loads = loads_of(state)
-        return self.look(loads, state.owners, now_ns) if len(loads) == len(state.members) else None
+        return self.look(loads, state.present_owners(), now_ns) if len(loads) == len(state.members) else None

@@ -21,14 +21,11 @@ class NodeLoss:
         self,
         state: RunState,
         open_epoch: Callable[[dict[str, str], int, Iterable[str]], None],
-        layout_ready: Callable[[int], None],
         finish: Callable[[str], None],
     ) -> None:
-        """`open_epoch` opens one for owners, the time and members, `layout_ready` orders changes of the layout that
-        waited for a node's engine, `finish` ends the run as failed."""
+        """`open_epoch` opens one for owners, the time and members, `finish` ends the run as failed."""
         self._state = state
         self._open_epoch = open_epoch
-        self._layout_ready = layout_ready
         self._finish = finish
 
     def lose(self, name: str, reason: str, now_ns: int) -> None:
@@ -130,7 +127,6 @@ class NodeLoss:
         state.account.moves += sum(state.owners[robot] != owner for robot, owner in owners.items())
         state.journal(state.control())
         self._open_epoch(owners, now_ns, members)
-        self._layout_ready(now_ns)
 
     def adopted(self, lost: Collection[str], members: Collection[str]) -> dict[str, str]:
         """Return the owners without some nodes: each of their robots goes to the member that then has the fewest, ties

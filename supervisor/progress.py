@@ -146,7 +146,7 @@ class ProgressMonitor:
         """Return the processes and lockstep clients that are waited for, in name order."""
         state = self._state
         if not state.is_open:
-            missing = state.roster.missing(state.frame.layout.digest)
+            missing = state.roster.missing()
             clients = self._hub_waits_for() if missing == [VHUB] else []
             return clients or missing
         tick = state.frame.tick

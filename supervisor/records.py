@@ -23,10 +23,9 @@ from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.kept_answers import KeptAnswers
 from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.assembly.initial_state import first_chain, first_frame
-from foosim.world.edits import Disrupt, Edit, layout_after
+from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.world.layout import Layout, build_layout
-from foosim.world.start import AddedEntity, Start
+from foosim.world.start import Start
 
 ANSWERS_KEPT: Final = 1024
 """Answers that are kept for requests that are repeated."""
@@ -183,11 +182,10 @@ class RecoveredRecord(msgspec.Struct, frozen=True, array_like=True, tag="recover
 class Checkpoint(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
     """The first record of a further journal file: what is still needed of the files before, so that they can go.
 
-    `added` is the layout of the last commit beside the deployment's; epoch and commits are as they were published.
+    Epoch and commits are as they were published.
     """
 
     run: RunRecord
-    added: list[AddedEntity]
     epoch: bytes
     commits: list[bytes]
     chain: bytes
@@ -216,8 +214,6 @@ class History:
     run: RunRecord
     frame: Frame
     """The last committed one; that of the start while none is."""
-    layout: Layout
-    """Of that frame."""
     owners: dict[str, str]
     control: Control
     account: Account
@@ -269,7 +265,7 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
         raise Malformed("a journal of the supervisor without a record")
     if history.commits:
         commit = decode(Commit, history.commits[max(history.commits)])
-        history.frame = frame_from_bytes(commit.tick, history.layout, commit.values, commit.outboxes)
+        history.frame = frame_from_bytes(commit.tick, history.frame.layout, commit.values, commit.outboxes)
         if history.frame.digest != commit.digest:
             raise Malformed(f"commit {commit.tick} of the supervisor's journal has another digest than its frame")
     return history
@@ -283,11 +279,10 @@ def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
         account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)
-        return History(first, frame, frame.layout, deployment.owners(), control, account, chain=chain)
+        return History(first, frame, deployment.owners(), control, account, chain=chain)
     return History(
         first.run,
         first_frame(deployment, first.run.start),
-        build_layout(deployment, [(entity.name, entity.model) for entity in first.added]),
         first.owners,
         first.control,
         first.account,
@@ -338,7 +333,6 @@ def _order(history: History, record: RequestRecord | OrderedRecord) -> None:
 
 def _commit(history: History, record: CommitRecord) -> None:
     commit = decode(Commit, record.commit)
-    history.layout = layout_after(history.layout, commit.edits)
     history.commits[commit.tick] = record.commit
     history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
     history.edits.pop(commit.tick - 1, None)

@@ -1,23 +1,21 @@
 """Requests of operators: pause, resume, step, rate, add, remove, move, balance, push, set, network, stop and start
 (a node), down; and of viewers: status, describe, watch.
 
-A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push and set
-at the first tick not yet released, network with what is sent at the next one, add and remove at the first not yet
-released when all nodes are ready for it, a move at the last commit, with its epoch. A request is journalled when its
-tick is chosen, then answered; one that only reads is neither journalled nor kept. To add a verb: a method and a row.
+A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: add, remove,
+push and set at the first tick not yet released, network with what is sent at the next one, a move at the last commit,
+with its epoch. A request is journalled when its tick is chosen, then answered; one that only reads is neither. To add a
+verb: a method and a row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable
 from math import hypot
 from typing import Any, Final
 
 from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed, Refused, show
 from foosim.common.json_text import decode_json, encode_json
-from foosim.common.names import NAME_RULE, is_name
 from foosim.common.units import parse_pace
 from foosim.deployment.event_requests import event_text
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
@@ -29,29 +27,20 @@ from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.records import RequestRecord, asked
 from foosim.supervisor.state import RunState
 from foosim.supervisor.viewing import Viewing, chosen
-from foosim.world.assembly.world import addition, body_of
+from foosim.world.assembly.world import body_of
 from foosim.world.components.view import ComponentError
-from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
-from foosim.world.layout import Layout
-from foosim.world.setting.settable import set_edits
+from foosim.world.edits import Disrupt, Edit, Push, Remove
+from foosim.world.setting.coming import absent_named, check_present
+from foosim.world.setting.settable import add_edit, set_edits
 
-PENDING_MAX = 256
-"""Changes of layout that may wait for engines at once."""
+EDITS_MAX: Final = limits.ENTITIES_MAX // 2
+"""Edits that requests may put into the order of one tick."""
 READS: Final = ("status", "describe", "watch")
 """Verbs that change nothing: valid before, during and after a run."""
 TEXT_MAX = 4000
 """Characters of a refusal."""
 NUMBER_MAX = 1e100
 """Larger than any useful value, and its square does not overflow."""
-
-
-@dataclass
-class _Waiting:
-    """A change of layout that waits for every node's engine."""
-
-    request: Request
-    edit: Add | Remove
-    layout: Layout
 
 
 class Requests:
@@ -75,7 +64,6 @@ class Requests:
         self._open_epoch = open_epoch
         self._stop_run = stop
         self._finish = finish
-        self._pending: list[_Waiting] = []
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
             "status": self._status,
             "describe": viewing.describe,
@@ -97,13 +85,8 @@ class Requests:
         }
 
     def on_request(self, request: Request, payload: bytes, now_ns: int) -> None:
-        """Answer a request now, or when all nodes are ready for it."""
-        key = request.sender, request.id
-        answer = self._state.answers.get(key)
-        if answer is None:
-            if any((waiting.request.sender, waiting.request.id) == key for waiting in self._pending):
-                return
-            answer = self._decide(request, now_ns)
+        """Answer a request, but where a run is being resumed: then it is repeated."""
+        answer = self._state.answers.get((request.sender, request.id)) or self._decide(request, now_ns)
         if answer is not None:
             self._reply(answer)
 
@@ -151,12 +134,6 @@ class Requests:
         self._state.asked.append(asked(verb, answer))
         self._state.answers.keep(answer)
         return answer
-
-    def end(self) -> None:
-        """The run has ended: refuse the changes that still wait for engines."""
-        pending, self._pending = self._pending, []
-        for waiting in pending:
-            self._reply(self._refuse(waiting.request, "the run has ended"))
 
     def _accept(
         self,
@@ -213,70 +190,40 @@ class Requests:
 
     # --- the world ---------------------------------------------------------------------------------------------------
 
-    def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
-        layout = self._state.next_layout()
-        addable = layout.declared.addable
-        if not addable:
-            raise Refused("nothing can be added to this world: no kit of it says of what there can be more")
-        model = chosen("model", _name(arguments, "model", addable[0]), addable)
-        taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
-        name = _name(arguments, "name", _free_name(model, taken))
-        if not is_name(name):
-            raise Refused(f"{show(name)} is no name; {NAME_RULE}")
-        if name in taken:
-            raise Refused(f"name {show(name)} is taken; taken are {', '.join(sorted(taken))}")
-        if len(taken) >= limits.ENTITIES_MAX:
-            raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
+    def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Add a spare, on a node that owns it from now on if one is named."""
+        state, place = self._state, arguments.get("at")
+        layout, numbers = state.frame.layout, state.coming_numbers()
+        entity = absent_named(layout, numbers, _name(arguments, "name"))
+        owners = state.owners
+        if arguments.get("node") is not None:
+            node = chosen("node", _name(arguments, "node"), state.members)
+            if not entity.is_robot:
+                raise Refused(f"{entity.name} is no robot: it has no node")
+            owners = {**owners, entity.name: node}
+        tick = self._tick_for_edit()
         try:
-            usual, check = addition(self._state.deployment, layout, name, model)
-            position = _vector(arguments, "position", usual)
-            velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
-            check(position, velocity)
+            edit = add_edit(state.deployment, layout, numbers, entity, place)
         except ComponentError as error:
             raise Refused(str(error)) from error
-        self._wait_for_engines(request, Add(name, model, position, velocity))
+        except BadValue as bad:
+            raise Refused(f"at of {entity.name}: {bad}") from bad
+        answer = self._accept(request, tick, f"{entity.name} added at tick {tick}", [edit], owners)
+        if owners != state.owners:
+            self._node_loss.moved(entity.name)
+            state.account.moves += 1
+            self._open_epoch(owners, now_ns)
+        return answer
 
-    def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
+    def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         name = _name(arguments, "name")
-        going = {waiting.edit.name for waiting in self._pending}
-        added = [entity.name for entity in self._state.added(self._state.next_layout()) if entity.name not in going]
-        if name not in added:
-            which = f"those are {', '.join(added)}" if added else "nothing was"
-            raise Refused(f"{show(name)} cannot be removed: only what was added can, and {which}")
-        self._wait_for_engines(request, Remove(name))
-
-    def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
-        """Have the engines built, for one change after the other, since each builds on the one before."""
-        if len(self._pending) >= PENDING_MAX:
-            raise Refused(f"{PENDING_MAX} additions and removals wait for engines already")
-        self._pending.append(_Waiting(request, edit, layout_after(self._state.next_layout(), [edit])))
-        if len(self._pending) == 1:
-            self.prepare()
-
-    def prepare(self) -> None:
-        """Publish (again) the layout of the first change that waits."""
-        if self._pending:
-            self._state.prepare(self._pending[0].layout)
-
-    def layout_ready(self, now_ns: int) -> None:
-        """Order each change whose layout every node has built."""
-        while self._pending:
-            waiting = self._pending[0]
-            if self._state.unready_nodes(waiting.layout.digest):
-                return
-            self._pending.pop(0)
-            tick = self._state.released
-            verb = "added" if isinstance(waiting.edit, Add) else "removed"
-            text = f"{waiting.edit.name} {verb} at tick {tick}"
-            self._reply(self._accept(waiting.request, tick, text, [waiting.edit]))
-            if self._pending:
-                following = self._pending[0]
-                following.layout = layout_after(self._state.next_layout(), [following.edit])
-                self.prepare()
+        check_present(self._state.frame.layout, self._state.coming_numbers(), name)
+        tick = self._tick_for_edit()
+        return self._accept(request, tick, f"{name} removed at tick {tick}", [Remove(name)])
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        layout = self._state.next_layout()
-        free = [body.name for body in layout.free]
+        layout, numbers = self._state.frame.layout, self._state.coming_numbers()
+        free = [body.name for body in layout.free if not body.is_absent(numbers)]
         if not free:
             raise Refused("nothing can be pushed: this world has no free bodies")
         name = chosen("free body", _name(arguments, "name", free[0]), free)
@@ -293,11 +240,13 @@ class Requests:
     def _set(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         """Set a field of an entity, whose numbers follow from the newest frame and what is ordered since."""
         state, field = self._state, _name(arguments, "field")
-        layout = state.frame.layout
+        layout, numbers = state.frame.layout, state.coming_numbers()
         entity = layout[chosen("entity", _name(arguments, "name"), layout.names)]
+        if entity.is_absent(numbers):
+            raise Refused(f"{entity.name} is absent: add it first")
         tick = self._tick_for_edit()
         try:
-            edits = set_edits(state.deployment, layout, state.coming_numbers(), entity, field, arguments.get("value"))
+            edits = set_edits(state.deployment, layout, numbers, entity, field, arguments.get("value"))
         except ComponentError as error:
             raise Refused(str(error)) from error
         except BadValue as bad:
@@ -307,7 +256,7 @@ class Requests:
     def _tick_for_edit(self) -> int:
         """Return the first tick that is not released; raises Refused when its order is full."""
         tick = self._state.released
-        if len(self._state.coming_edits.get(tick, ())) >= limits.ENTITIES_MAX - PENDING_MAX:
+        if len(self._state.coming_edits.get(tick, ())) >= EDITS_MAX:
             raise Refused(f"tick {tick} has {len(self._state.coming_edits[tick])} edits already")
         return tick
 
@@ -346,7 +295,7 @@ class Requests:
         if silent or len(loads) < 2:
             why = f"no load is known of {', '.join(silent)}" if silent else "one node takes part: nothing can move"
             raise Refused(why)
-        shifts = shifts_at_once(loads, state.owners, state.deployment.owners())
+        shifts = shifts_at_once(loads, state.present_owners(), state.deployment.owners())
         shares = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
         if not shifts:
             least = f"no move would win more than a robot's share, or {WORTH:.0%}"
@@ -438,10 +387,3 @@ def _is_small(number: object) -> bool:
 
 def _show_list(value: object) -> str:
     return f"[{', '.join(show(item) for item in value[:4])}]" if isinstance(value, list) else show(value)
-
-
-def _free_name(model: str, taken: Collection[str]) -> str:
-    number = 2
-    while f"{model}{number}" in taken:
-        number += 1
-    return f"{model}{number}"

@@ -36,8 +36,8 @@ class Process:
     role: str
     name: str
     boot: str
-    ready: set[bytes] = field(default_factory=set)
-    """Digests of the layouts that it has built."""
+    ready: bool = False
+    """Whether it has built the world."""
     arithmetic: bytes = b""
     """A node's digest of a fixed small run of its engine, once it has one."""
     heard_ns: int = 0
@@ -137,8 +137,14 @@ class Roster:
         """Exclude a process until it sends a hello again."""
         process.lost = True
 
-    def note_ready(self, process: Process, ready: Ready) -> str:
-        """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
+    def note_ready(self, process: Process, ready: Ready, layout: bytes) -> str:
+        """Note that a process has built the world; return why it cannot take part after all, or an empty string.
+
+        `layout` is the digest of the layout that is to be built.
+        """
+        if ready.layout != layout:
+            self.by_name.pop(process.name)
+            return "its world has another layout than the supervisor's: install the same version on all machines"
         if process.role == "node":
             there = {form.name: form.version for form in ready.forms}
             differing = _differing(there, foreign_versions(self.deployment))
@@ -154,12 +160,12 @@ class Roster:
                     f"{self._simulation.hex()[:16]}: its results would differ (the deployment may say mixed_cpu: true)"
                 )
             process.arithmetic = ready.fingerprint
-        process.ready.add(ready.layout)
+        process.ready = True
         return ""
 
-    def missing(self, layout: bytes) -> list[str]:
-        """Return the declared processes that are not ready for a layout yet."""
-        here = {name for name, process in self.by_name.items() if not process.lost and layout in process.ready}
+    def missing(self) -> list[str]:
+        """Return the declared processes that are not ready yet."""
+        here = {name for name, process in self.by_name.items() if not process.lost and process.ready}
         return [name for name in self.expected if name not in here]
 
     def silent(self, now_ns: int, deadline_ns: int) -> list[str]:

@@ -21,7 +21,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.kept_answers import KeptAnswers
-from foosim.protocol.messages import Commit, Deliveries, End, Epoch, Part, Prepare, Tempo
+from foosim.protocol.messages import Commit, Deliveries, End, Epoch, Part, Tempo
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import (
     ANSWERS_KEPT,
@@ -40,11 +40,9 @@ from foosim.supervisor.records import (
 )
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
-from foosim.world.assembly.initial_state import added_to, first_chain, first_frame
-from foosim.world.edits import Edit, layout_after, written
+from foosim.world.assembly.initial_state import first_chain, first_frame
+from foosim.world.edits import Edit, written
 from foosim.world.frame import Frame, frame_from_bytes
-from foosim.world.layout import Layout, build_layout
-from foosim.world.start import AddedEntity
 
 
 class InputBuffer:
@@ -232,10 +230,6 @@ class RunState:
         if self.end is not None:
             self.publish(channels.END, channels.SUPERVISOR, self.end)
 
-    def prepare(self, layout: Layout) -> None:
-        """Have every node build an engine for a layout."""
-        self.publish(channels.PREPARE, channels.SUPERVISOR, Prepare(self.added(layout)))
-
     def grant(self, standing: ResumeState) -> None:
         """Grant the vHub's resume: its position is known."""
         self.granted_boot = standing.boot
@@ -251,8 +245,7 @@ class RunState:
         if members is not None:
             self.members = tuple(sorted(members))
         self.inputs.parts.clear()
-        frame, added = self.frame, self.added(self.frame.layout)
-        who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
+        frame, who = self.frame, (list(self.members), sorted(owners.items()), self.roster.arithmetic)
         self.epoch_payload = encode(Epoch(self.epoch, frame.tick, frame.digest, *who))
         self.actions.append(Journal(self.epoch_payload))
         self.publish_epoch()
@@ -284,25 +277,16 @@ class RunState:
         """The nodes without whose parts the next frame cannot be put together."""
         return self.inputs.missing(self.frame.tick + 1, self.members)
 
-    def unready_nodes(self, layout: bytes) -> list[str]:
-        """Return the nodes that have no engine for a layout yet."""
-        return [name for name in self.members if layout not in self.roster.by_name[name].ready]
-
-    def added(self, layout: Layout) -> list[AddedEntity]:
-        """Return the entities of a layout beside the deployment's."""
-        return added_to(layout)
-
-    def next_layout(self) -> Layout:
-        """Return the layout after all edits that are ordered, released or not."""
-        return layout_after(self.frame.layout, self._coming())
-
     def coming_numbers(self) -> list[float]:
-        """Return the numbers of the newest frame with the fields that are ordered to be set, released or not."""
-        return written(self.frame.layout, self.frame.numbers, self._coming())
-
-    def _coming(self) -> list[Edit]:
+        """Return the numbers of the newest frame after all edits that are ordered, released or not."""
         edits = [edit for tick in range(self.frame.tick, self.released) for edit in self.orders[tick]]
-        return edits + [edit for tick in sorted(self.coming_edits) for edit in self.coming_edits[tick]]
+        edits += [edit for tick in sorted(self.coming_edits) for edit in self.coming_edits[tick]]
+        return written(self.frame.layout, self.frame.numbers, edits)
+
+    def present_owners(self) -> dict[str, str]:
+        """Return the owners of the robots that are in the world."""
+        frame = self.frame
+        return {name: node for name, node in self.owners.items() if not frame.layout[name].is_absent(frame.numbers)}
 
     def order(self, tick: int, edits: list[Edit]) -> None:
         """Add edits of the supervisor's own to the order of a tick that is not committed.
@@ -363,7 +347,6 @@ class RunState:
         orders = {tick: self.orders[tick] for tick in range(self.frame.tick, self.released)}
         checkpoint = Checkpoint(
             self.run_record,
-            self.added(self.frame.layout),
             self.epoch_payload,
             list(self.commits.values()),
             self.chain,
@@ -419,8 +402,7 @@ class RunState:
     def frame_of(self, standing: ResumeState) -> Frame:
         """Return the vHub's last committed frame. Raises Malformed for a commit that does not fit its frame."""
         commit = decode(Commit, standing.commit)
-        layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in standing.added])
-        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        frame = frame_from_bytes(commit.tick, self.frame.layout, commit.values, commit.outboxes)
         if frame.digest != commit.digest:
             raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
         return frame

@@ -82,7 +82,7 @@ class Viewing:
         return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
 
     def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Answer with deployment, owners and the present layout: what a viewer needs to read the frames."""
+        """Answer with deployment, owners and layout: what a viewer needs to read the frames."""
         state, run = self._state, self._state.settings
         commit = self._last_commit
         has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
@@ -90,7 +90,6 @@ class Viewing:
             "run": run.run,
             "deployment_name": run.deployment_name,
             "deployment": run.deployment_text,
-            "added": [(entity.name, entity.model) for entity in state.added(state.frame.layout)],
             "layout": state.frame.layout.digest.hex(),
             "pace": str(state.pacer.pace),
             "owners": state.owners,
@@ -102,7 +101,7 @@ class Viewing:
         return self._answer(request, what)
 
     def committed(self, payload: bytes, edits: Sequence[Edit], now_ns: int) -> None:
-        """Publish a commit when it is due, or when a new layout begins with it."""
+        """Publish a commit when it is due, or when something comes or goes with it."""
         self._unseen = payload
         if now_ns >= self._due_ns or any(isinstance(edit, Add | Remove) for edit in edits):
             self._show(now_ns)

@@ -69,7 +69,7 @@ from foosim.vhub.state.resume import Past
 from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, report_before, statistics
 from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import Watching
-from foosim.world.assembly.initial_state import added_to, first_chain
+from foosim.world.assembly.initial_state import first_chain
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 
@@ -427,15 +427,11 @@ class HubCore:
         """Return the record with which a journal file starts: the state after the last closed tick."""
         assert self.state is not None and self.member.build is not None
         closed = self.state.closed
-        commit, _, frame = self.commits.get(closed) or (b"", None, None)
-        layout = self.commits.layout if frame is None else frame.layout
-        assert layout is not None
-        added = [(entity.name, entity.model) for entity in added_to(layout)]
+        commit, _, _ = self.commits.get(closed) or (b"", None, None)
         return encode(
             HeadRecord(
                 self.member.build.run,
                 self.state.snapshot(),
-                added,
                 commit,
                 self.epoch_payload,
                 self.capture_file,
@@ -507,11 +503,10 @@ class HubCore:
 
     def ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
-        layout = self.commits.layout
-        if layout is None or self.deployment is None or self.state is None or self.member.is_ready:
+        if self.commits.layout is None or self.deployment is None or self.state is None or self.member.is_ready:
             return
         if self.epoch > 0 or not self.sessions.missing(self.deployment, self.state):
-            self.member.ready(layout)
+            self.member.ready()
 
     def _take_epoch(self, epoch: Epoch) -> None:
         self.epoch, self._epoch_tick = epoch.epoch, epoch.tick
@@ -582,7 +577,7 @@ class HubCore:
             self.member.boot,
             build.supervisor,
             self.epoch,
-            *self.commits.last(state.deployment),
+            *self.commits.last(),
             state.final,
             self.handshake.waits,
             self.handshake.lost_machine,

@@ -1,8 +1,8 @@
-"""The edits of an order: what adds, removes, pushes and sets, and the layout after them. Pure."""
+"""The edits of an order: what adds, removes, pushes and sets, and what they write. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
 from typing import Annotated, Final
 
@@ -11,24 +11,26 @@ from msgspec import Meta
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
-from foosim.world.forms.forms import SLOTS_MAX
-from foosim.world.layout import Layout
+from foosim.world.forms.forms import ABSENT, DOWN, NO_ENTITY, SAMPLES, SLOTS_MAX
+from foosim.world.layout import Entity, Layout
 
 FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX
 """Characters of a field: the names of a component, of a modifier of it, and of a slot, and two points."""
 
+PARKED_Z_M: Final = -1e6
+PARKED_APART_M: Final = 1000.0
+"""What is absent is so far below the world, and so far from the next: nothing that looks at places finds it."""
+
 
 class Add(Message, frozen=True):
-    """Add entity `name` of `model` at `position` (m, world frame) with `velocity` (m/s)."""
+    """Put an absent entity into the world: its slots become `numbers`."""
 
     name: Name
-    model: Name
-    position: Vector
-    velocity: Vector
+    numbers: Annotated[list[float], Meta(max_length=SLOTS_MAX)]
 
 
 class Remove(Message, frozen=True):
-    """Remove an entity that was added."""
+    """Take an entity out of the world: it is absent."""
 
     name: Name
 
@@ -61,65 +63,75 @@ Edit = Add | Remove | Push | Set | Disrupt
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
-def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
-    """Return the edits that do something to a world with this layout, in their order.
+def fitting_edits(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit]) -> Iterator[Edit]:
+    """Yield the edits that do something to a frame with these numbers, in their order: each is fitting to what those
+    before it have left, if the caller applies them one after the other.
 
-    An addition of a name that is taken, or of a model of which the world cannot have more, the removal of what was not
-    added, a push of what is no free body and a field that an entity has not, or not of so many numbers, change nothing,
-    and what happens to the network is the vHub's: a function of the order alone, the same for all who read it.
+    What is present is not added, nothing else is done to what is absent; a push of what is no free body, and a field
+    that an entity has not, or not of so many numbers, change nothing; what happens to the network is the vHub's.
     """
-    models = dict(layout.models)
-    addable, declared = layout.declared.addable, layout.declared.names
-    fitting: list[Edit] = []
     for edit in edits:
-        if isinstance(edit, Disrupt):
+        if isinstance(edit, Disrupt) or edit.name not in layout:
+            continue
+        entity = layout[edit.name]
+        if entity.is_absent(numbers) is not isinstance(edit, Add):
             continue
         if isinstance(edit, Add):
-            if edit.name in models or edit.model not in addable:
-                continue
-            models[edit.name] = edit.model
+            is_fitting = entity.can_leave and len(edit.numbers) == entity.stop - entity.start
         elif isinstance(edit, Remove):
-            if edit.name in declared or edit.name not in models:
-                continue
-            del models[edit.name]
-        elif edit.name not in models:
-            continue
+            is_fitting = entity.can_leave
         elif isinstance(edit, Set):
-            if edit.name not in layout or layout[edit.name].counts.get(edit.field) != len(edit.numbers):
-                continue
-        elif not layout.would_be_free(edit.name, models[edit.name]):
-            continue
-        fitting.append(edit)
-    return fitting
+            is_fitting = entity.counts.get(edit.field) == len(edit.numbers)
+        else:
+            is_fitting = entity.is_free
+        if is_fitting:
+            yield edit
 
 
-def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
-    """Return the layout of frame k+1 when order k carries `edits`."""
-    if not edits:
-        return layout
-    models = dict(layout.models)
-    for edit in fitting_edits(layout, edits):
-        if isinstance(edit, Add):
-            models[edit.name] = edit.model
-        elif isinstance(edit, Remove):
-            del models[edit.name]
-    return layout if models == layout.models else Layout(models, layout.declared)
-
-
-def removed(layout: Layout, edits: Sequence[Edit]) -> frozenset[str]:
-    """Return the names of what an order removes. What it adds under one of them is another entity."""
-    if not edits:
-        return frozenset()
-    return frozenset(edit.name for edit in fitting_edits(layout, edits) if isinstance(edit, Remove))
-
-
-def written(layout: Layout, numbers: Sequence[float], edits: Sequence[Edit]) -> list[float]:
-    """Return the numbers of a frame with the fields that edits set."""
+def written(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit]) -> list[float]:
+    """Return the numbers of a frame after edits, but for pushes and for what follows from an edit elsewhere."""
     found = [*numbers]
-    for edit in edits:
-        if isinstance(edit, Set) and edit.name in layout:
-            at = layout[edit.name].offsets[edit.field]
-            found[at : at + len(edit.numbers)] = edit.numbers
+    for edit in fitting_edits(layout, found, edits):
+        write(layout, found, edit)
+    return found
+
+
+def write(layout: Layout, numbers: list[float], edit: Edit) -> None:
+    """Write what a fitting edit says of its entity's own numbers."""
+    if isinstance(edit, Disrupt | Push):
+        return
+    entity = layout[edit.name]
+    if isinstance(edit, Set):
+        at = entity.offsets[edit.field]
+        numbers[at : at + len(edit.numbers)] = edit.numbers
+        return
+    counted = [(at, numbers[at]) for at in counters(entity)]
+    numbers[entity.start : entity.stop] = parked(layout, entity) if isinstance(edit, Remove) else edit.numbers
+    for at, number in counted:
+        numbers[at] = number
+
+
+def counters(entity: Entity) -> list[int]:
+    """Return the places of the counters of an entity's samples: noise is drawn by them, so they never begin anew."""
+    return [at for field, at in entity.offsets.items() if at >= entity.split and field.endswith(f".{SAMPLES}")]
+
+
+def parked(layout: Layout, entity: Entity) -> list[float]:
+    """Return the numbers of an entity that is absent: it is far below all others, and far from the next one that is."""
+    found = [0.0] * (entity.stop - entity.start)
+    for field, first, values in (
+        (ABSENT, 0, (1.0,)),
+        (DOWN, 0, (1.0,)),
+        ("position", 0, (PARKED_APART_M * (entity.index + 1), 0.0, PARKED_Z_M)),
+        ("orientation", 3, (1.0,)),
+        ("contacts", 2, (-1.0,)),
+    ):
+        if field in entity.offsets:
+            at = entity.offsets[field] - entity.start + first
+            found[at : at + len(values)] = values
+    for at in layout.references:
+        if entity.start <= at < entity.stop:
+            found[at - entity.start] = NO_ENTITY
     return found
 
 
@@ -127,11 +139,9 @@ def check_edits(edits: Sequence[Edit]) -> None:
     """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
     for change in edits:
         numbers: tuple[float, ...] = ()
-        if isinstance(change, Add):
-            numbers = (*change.position, *change.velocity)
-        elif isinstance(change, Push):
+        if isinstance(change, Push):
             numbers = change.impulse
-        elif isinstance(change, Set):
+        elif isinstance(change, Add | Set):
             numbers = tuple(change.numbers)
         if not all(isfinite(number) for number in numbers):
             raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")

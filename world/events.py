@@ -1,9 +1,9 @@
-"""Events of a world in a deployment: fields of entities that are set at a time, or at one that is drawn."""
+"""Events of a world in a deployment: what is set, added and removed at a time, or at one that is drawn."""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -37,18 +37,21 @@ Value = bool | str | dict[str, str]
 
 
 class WorldEvent(SpecBase):
-    """Sets fields of entities (`foosim set`) at the first tick not before a time.
+    """Sets fields of entities (`foosim set`), adds or removes them, at the first tick not before a time.
 
     The time is `at`, or drawn for each entity from those `between` two. The entities are all that `entity` matches, or
-    as many as `choose` says of them (`2 of rover-*`). Draws follow from the seed and the place in the list. A pose is
-    set whatever is there: bodies that overlap are pushed apart.
+    as many as `choose` says of them (`2 of rover-*`). Draws follow from the seed and the place in the list. `add` is
+    where it is added: a pose, or `true` where the deployment has it. What is present is not added, what is absent is
+    neither set nor removed. A pose is set whatever is there: bodies that overlap are pushed apart.
     """
 
     at_ns: Time | None = Field(default=None, alias="at")
     between: Annotated[list[Time], Field(min_length=2, max_length=2)] | None = None
     entity: Selector | None = None
     choose: Choice | None = None
-    fields: dict[str, Value] = Field(alias="set", min_length=1, max_length=FIELDS_MAX)
+    fields: dict[str, Value] | None = Field(default=None, alias="set", min_length=1, max_length=FIELDS_MAX)
+    add: Literal[True] | str | dict[str, str] | None = None
+    remove: Literal[True] | None = None
 
     @model_validator(mode="after")
     def _says_when_and_what(self) -> Self:
@@ -58,6 +61,8 @@ class WorldEvent(SpecBase):
             raise custom_error(BadValue("an event has entities: either `entity` or `choose`"))
         if self.between is not None and self.between[0] > self.between[1]:
             raise custom_error(BadValue("the second time of `between` is before the first one"))
+        if [self.fields, self.add, self.remove].count(None) != 2:
+            raise custom_error(BadValue("an event does one thing: `set`, `add` or `remove`"))
         return self
 
     @property

@@ -2,13 +2,14 @@
 
 An entity's slots stand in one run of float64 numbers: first what its solver writes (the fields of its model, the memory
 of rules, motion and actuators), then what its owner writes (the memory of its sensors). A layout is a pure function of
-the deployment and of what was added since, so every process builds the same one and its digest names it.
+the deployment, so every process builds the same one and its digest names it. What can come and go is in it from the
+start: a slot says whether it is absent.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any, Final
@@ -17,6 +18,7 @@ from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
+    ABSENT,
     LINEAR_VELOCITY,
     POSE,
     ROBOTS,
@@ -86,6 +88,17 @@ class Entity:
         """Whether it is a rigid body that nothing holds: it can be pushed."""
         return self.kind.is_rigid and LINEAR_VELOCITY in self.offsets
 
+    @property
+    def can_leave(self) -> bool:
+        """Whether it can be removed from the world and added to it: what has a place and is solved, but for what a kit
+        always brings."""
+        return ABSENT in self.offsets
+
+    def is_absent(self, numbers: Sequence[float]) -> bool:
+        """Whether it is not in the world in a frame of these numbers."""
+        at = self.offsets.get(ABSENT)
+        return at is not None and numbers[at] != 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Carried:
@@ -101,18 +114,18 @@ NOTHING: Final = Carried({}, {})
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a layout has of the deployment, whatever is added to the world.
+    """What a layout has of the deployment.
 
-    `names` are the entities that are always there; `carried` what entities carry, by name; `memory` what the rules of
-    the world remember of each entity of a model; `addable` the models of which a running world can have more; `fields`
-    those of the state of entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose
-    settings ask for a variant of their model; `demanded` the fields on demand that entities have, by name.
+    `carried` is what entities carry, by name; `memory` what the rules of the world remember of each entity of a model;
+    `spares` the entities that are absent at the start, `lasting` those that never leave; `fields` those of the state of
+    entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose settings ask for a
+    variant of their model; `demanded` the fields on demand that entities have, by name.
     """
 
-    names: frozenset[str] = frozenset()
     carried: Mapping[str, Carried] = field(default_factory=dict)
     memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    addable: tuple[str, ...] = ()
+    spares: frozenset[str] = frozenset()
+    lasting: frozenset[str] = frozenset()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
     demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
@@ -147,6 +160,8 @@ class Layout:
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
             counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
+            if "position" in fields and kind.is_solved and name not in declared.lasting:
+                counts[ABSENT] = 1
             if STILL_TICKS in fields:
                 counts[STILL_POSE] = sum([fields.get(field, 0) for field in POSE])
             for slot, count in counts.items():
@@ -189,19 +204,19 @@ class Layout:
         """Return the entities of a model, in name order."""
         return tuple([entity for entity in self.entities if entity.model == model])
 
-    def would_be_free(self, name: str, model: str) -> bool:
-        """Whether an entity of this name and model is, or would be, a rigid body that nothing holds."""
-        kind = self.declared.kind_of(name, model)
-        return kind.is_rigid and LINEAR_VELOCITY in self.declared.fields_of(name, kind)
-
     @staticmethod
     def kind_of(model: str) -> Model:
         """Return what there is to know of a model."""
         return _model(model)
 
-    def is_added(self, name: str) -> bool:
-        """Whether an entity is there beside those of the deployment."""
-        return name in self._index and name not in self.declared.names
+    @property
+    def spares(self) -> frozenset[str]:
+        """The entities that are absent at the start."""
+        return self.declared.spares
+
+    def present(self, numbers: Sequence[float]) -> list[Entity]:
+        """Return the entities that are in the world in a frame of these numbers, in name order."""
+        return [entity for entity in self.entities if not entity.is_absent(numbers)]
 
     def __getitem__(self, name: str) -> Entity:
         return self._index[name]
@@ -235,16 +250,19 @@ class Layout:
         return self._digest
 
 
-def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layout:
-    """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`.
+def build_layout(spec: WorldSpec) -> Layout:
+    """Return the layout of a deployment's world, or raise `Malformed`.
 
     Where models name files (`WorldSpec.robot_files`), their contents must have been given.
     """
     models: dict[str, str] = {}
-    addable: list[str] = []
+    lasting: set[str] = set()
+    spares = {name for section in (spec.objects, spec.robots) for name, one in section.items() if one.spare}
     for kit in kits_named(spec):
-        models |= kit.entities
-        addable += kit.addable
+        its = spares_of(spec, kit)
+        models |= {**kit.entities, **its}
+        spares |= its.keys()
+        lasting |= kit.entities.keys()
     memory, of_world = _memory(spec)
     if of_world:
         models[WORLD] = WORLD
@@ -255,14 +273,12 @@ def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layo
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
-    declared = Declared(frozenset(models), carried, memory, tuple(addable), fields, variants, demanded)
-    for name, model in added:
-        if not addable:
-            raise Malformed(f"{model} {name} cannot be added: nothing can be to this world")
-        if model not in addable or name in models:
-            raise Malformed(f"{model} {name} cannot be added: {' or '.join(addable)} with a free name can be")
-        models[name] = model
-    return Layout(models, declared)
+    return Layout(models, Declared(carried, memory, frozenset(spares), frozenset(lasting), fields, variants, demanded))
+
+
+def spares_of(spec: WorldSpec, kit: Kit) -> Mapping[str, str]:
+    """Return what a kit of a world brings that is absent at the start, its models by name."""
+    return {} if kit.spares is None else kit.spares(spec.kits[kit.name])
 
 
 def _variants(spec: WorldSpec) -> dict[str, Model]:

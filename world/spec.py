@@ -127,7 +127,7 @@ class WorldSpec(SpecBase):
         return found
 
     def settings_of(self, name: str) -> EntitySettings | None:
-        """Return the settings of a robot or an object; None of an entity that a kit brings, or that was added."""
+        """Return the settings of a robot or an object; None of an entity that a kit brings."""
         return self.robots.get(name) or self.objects.get(name)
 
     def with_contents(self, contents: Contents) -> Self:

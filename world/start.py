@@ -2,24 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import msgspec
-from msgspec import Meta
 
-from foosim.common import limits
-from foosim.common.struct_types import Counter, Digest, Item, Name, Numbers, Text
+from foosim.common.struct_types import Counter, Digest, Item, Numbers, Text
 from foosim.world.robot_packets import Outboxes
-
-
-class AddedEntity(Item, frozen=True):
-    """An entity that is in the layout beside those of the deployment."""
-
-    name: Name
-    model: Name
-
-
-Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 class Origin(Item, frozen=True):
@@ -35,11 +21,9 @@ class Origin(Item, frozen=True):
 class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A frame that a run begins with instead of frame 0, and where it comes from.
 
-    `added` are the entities of its layout beside the deployment's. The frame says all: positions and speeds, score, the
-    memory of rules, actuators and sensors, outboxes.
+    The frame says all: positions and speeds, score, the memory of rules, actuators and sensors, outboxes.
     """
 
     origin: Origin
     values: Numbers
     outboxes: Outboxes
-    added: Added

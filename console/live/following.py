@@ -97,7 +97,7 @@ class Following:
             deployment = load_deployment(what["deployment"], what["deployment_name"])
             if deployment.files():
                 deployment = deployment.with_assets(files(deployment))
-        layout = build_layout(deployment, [(name, model) for name, model in what["added"]])
+        layout = build_layout(deployment)
         if layout.digest.hex() != what["layout"]:
             raise Malformed(
                 f"run {what['run']} has another layout of its deployment: another version of foosim runs it"
@@ -250,7 +250,7 @@ class Following:
 def _first(drawing: Drawing, what: Mapping[str, Any]) -> Frame | None:
     """Return the frame that a description has; before the first tick of a run from the start that is frame 0."""
     if what["frame"] is None:
-        is_start = what["tick"] == 0 and not what["added"]
+        is_start = what["tick"] == 0
         return initial_frame(drawing.deployment) if is_start else None
     commit = decode(Commit, b64decode(what["frame"]))
     return frame_from_bytes(commit.tick, drawing.layout, commit.values, commit.outboxes)

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.client.replay_listener import Replay, ReplayGone
-from foosim.common.errors import Malformed, Refused
+from foosim.common.errors import Refused
 from foosim.common.json_text import decode_json
 from foosim.console.clock.deck import Known, checked, needed
 from foosim.console.shown.drawing import Drawing
@@ -150,16 +150,9 @@ class PlayedSource:
         self._jumps = jumps
 
     def _turn_to(self, feed: Feed, links: Mapping[str, Any]) -> None:
-        """Take the scene of these links: what the deployment does not have was added."""
+        """Take the scene of these links."""
         deployment = self._replay.deployment
-        base = build_layout(deployment)
-        added = sorted({link.partition("/")[0] for link in links} - {*base.names})
-        addable = base.declared.addable
-        try:
-            layout = build_layout(deployment, [(name, addable[0]) for name in added]) if addable else base
-        except Malformed:  # a name that is nobody's
-            layout = base
-        self._drawing = Drawing(deployment, layout)
+        self._drawing = Drawing(deployment, build_layout(deployment))
         names = [link.name for body in self._drawing.scene.bodies.values() for link in body.links]
         self._places = {name: place for place, name in enumerate(names)}
         feed.describe(self.about, self._drawing.content())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -50,14 +50,13 @@ def open_follower(
     deployment: Deployment,
     offset_ns: int = 0,
     recomputing: Recomputing | None = None,
-    added: Iterable[tuple[str, str]] = (),
 ) -> tuple[FileSource | PosesSource, list[str]]:
     """Return the source of a file that follows one with a clock of its own, and the names that both have.
 
-    `deployment` and what was `added` to it (name, model) are the first source's. Raises CaptureError, BadPoses, and
-    BadValue for a file that has nothing of the first source.
+    `deployment` is the first source's. Raises CaptureError, BadPoses, and BadValue for a file that has nothing of the
+    first source.
     """
-    scene = build_scene(deployment, build_layout(deployment, added))
+    scene = build_scene(deployment, build_layout(deployment))
     ours = {*scene.bodies}
     second: FileSource | PosesSource
     if is_table(path):

@@ -15,7 +15,7 @@ def edit_text(edit: EditRow) -> str:
     if edit.kind == "push":
         return f"push {edit.name} by {_vector(edit.impulse)} N s"
     if edit.kind == "add":
-        return f"add {edit.name} ({edit.model}) at {_vector(edit.position)} m, with {_vector(edit.velocity)} m/s"
+        return f"add {edit.name}"
     if edit.kind == "set":
         return _set_text(edit)
     return f"remove {edit.name}" if edit.kind == "remove" else ""

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.deployment.schema import Deployment
-from foosim.world.assembly.world import addition, mark_kinds
+from foosim.world.assembly.world import mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.kinematics import CENTRE_OF_SLOT
@@ -49,7 +49,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "name": name,
                 "model": body.model,
                 "links": list(range(first, len(links))),
-                "removable": layout.is_added(name),
+                "removable": layout[name].can_leave,
                 "pushable": layout[name].is_free,
                 "settable": settable(deployment, layout, layout[name]),
             }
@@ -65,7 +65,6 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
-        "addable": _addable(deployment, layout),
         "marks": {
             name: {"look": kind.look, "text": kind.text, "cut": kind.is_cut}
             for name, kind in sorted(mark_kinds(deployment).items())
@@ -188,14 +187,3 @@ def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:
     boxes += [swept_box(body) for body in scene.bodies.values() if body.links[0].joint != "free"]
     boxes = [box for box in boxes if np.isfinite(box).all()]
     return enclosing(boxes) if boxes else ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
-
-
-def _addable(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
-    """Return what can be added, and where and how fast it is where nothing else is said."""
-    name = "new"
-    while name in layout:
-        name += "_"
-    return [
-        {"model": model, "position": addition(deployment, layout, name, model)[0], "velocity": (0.0, 0.0, 0.0)}
-        for model in layout.declared.addable
-    ]

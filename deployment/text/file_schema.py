@@ -13,7 +13,7 @@ from foosim.common import limits
 from foosim.common.names import NAME_PATTERN, SELECTOR_LENGTH_MAX, SELECTOR_PATTERN
 from foosim.deployment.text.each import EACH
 from foosim.deployment.text.expand import ENTRIES, FLEETS, FOR_ROBOTS
-from foosim.deployment.text.fleets import AXES, COUNT, SPACING
+from foosim.deployment.text.fleets import AXES, COUNT, SPACING, SPARE
 from foosim.deployment.text.includes import INCLUDE
 from foosim.deployment.text.templates import LIKE, PRESET, TEMPLATES
 
@@ -24,6 +24,7 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     TEMPLATES: "partial robots, things of the scenery, players and clients, which entries are `like`",
     LIKE: "the name of a template, which has what is not written here",
     COUNT: "how many of these there are: NAME-1 to NAME-N",
+    SPARE: "whether it is absent until it is added, or how many more of these are: the last ones",
     SPACING: "how much further along x, y and z each of them stands than the one before",
     PRESET: "the name of a preset of the kit, which has what is not written here",
     EACH: "a selector of robots: there is one of these for each, and $robot is its name",
@@ -48,7 +49,7 @@ def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
     for section in ENTRIES:
         own: Schema = {LIKE: _text(LIKE)}
         if section in FLEETS:
-            own |= {COUNT: _count(FLEETS[section]), SPACING: _spacing()}
+            own |= {COUNT: _count(FLEETS[section]), SPARE: _spare(FLEETS[section]), SPACING: _spacing()}
         else:
             own |= {EACH: {**_text(EACH), "maxLength": SELECTOR_LENGTH_MAX, "pattern": SELECTOR_PATTERN}}
         ((pattern, entry),) = properties[section]["patternProperties"].items()
@@ -103,6 +104,11 @@ def _text(key: str) -> Schema:
 
 def _count(entries_max: int) -> Schema:
     return {"description": DESCRIPTIONS[COUNT], "maximum": entries_max, "minimum": 1, "type": "integer"}
+
+
+def _spare(entries_max: int) -> Schema:
+    count = {"maximum": entries_max, "minimum": 1, "type": "integer"}
+    return {"anyOf": [{"type": "boolean"}, count], "default": False, "description": DESCRIPTIONS[SPARE]}
 
 
 def _spacing() -> Schema:

@@ -1,5 +1,7 @@
 """Fleets: an entry with `count: N` is N of them, NAME-1 to NAME-N, each by `spacing` beside the one before.
 
+With `spare: M` there are M more, which are absent until they are added; without a count there are only these.
+
 An entry that is written under the name of one of them holds what is different about it. Lengths are added exactly.
 """
 
@@ -20,6 +22,7 @@ from foosim.deployment.text.yaml import Fields, Leaf, Place, Scalar, Tree, plain
 from foosim.world.forms import registry
 
 COUNT: Final = "count"
+SPARE: Final = "spare"
 SPACING: Final = "spacing"
 AXES: Final = ("x", "y", "z")
 AT: Final = "at"
@@ -40,10 +43,13 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """An entry that makes several. `raw` is what it says of each, without count and spacing."""
+    """An entry that makes several, the last ones of them spares. `raw` is what it says of each, without count and
+    spacing."""
 
     path: tuple[str, str]
     count: int
+    """With the spares."""
+    present: int
     raw: Fields
     spacing: Mapping[str, Step]
 
@@ -65,13 +71,18 @@ def read_fleets(section: Fields, name: str, entries_max: int, report: Report) ->
         if not isinstance(entry, Fields):
             continue
         path = name, key
-        if COUNT in entry.values:
-            count = _count(entry.values[COUNT], (*path, COUNT), entries_max, report)
+        spare = entry.values.get(SPARE)
+        has_spares = spare is not None and not isinstance(plain(spare), bool)
+        if COUNT in entry.values or has_spares:
+            present = _count(entry.values[COUNT], (*path, COUNT), entries_max, report) if COUNT in entry.values else 0
+            spares = _count(spare, (*path, SPARE), entries_max, report) if spare is not None and has_spares else 0
+            count = present + spares
             spacing = _spacing(entry.values.get(SPACING), (*path, SPACING), report)
             if (longest := len(f"{key}-{count}")) > limits.NAME_LENGTH_MAX:
                 what = f"its names have up to {longest} characters, more than {limits.NAME_LENGTH_MAX}"
                 report.add(section.keys[key], path, what, f"{key}-{count}")
-            fleets[key] = Fleet(path, count, without(entry, COUNT, SPACING), spacing)
+            gone = (COUNT, SPACING, SPARE) if has_spares else (COUNT, SPACING)
+            fleets[key] = Fleet(path, count, present, without(entry, *gone), spacing)
         elif SPACING in entry.values:
             report.add(entry.keys[SPACING], path, "a spacing of what has no count", SPACING)
     _check_names(section, name, fleets, entries_max, report)
@@ -86,14 +97,16 @@ def _check_names(section: Fields, name: str, fleets: Mapping[str, Fleet], entrie
     for key in made.keys() & fleets.keys():
         entry, other = section.values[key], made[key].path[1]
         assert isinstance(entry, Fields), "a fleet"
-        report.add(entry.keys[COUNT], (name, key), f"a count of what the count of {other} makes", COUNT)
+        by = COUNT if COUNT in entry.keys else SPARE
+        report.add(entry.keys[by], (name, key), f"a {by} of what the count of {other} makes", by)
     total = len(section.values.keys() - fleets.keys() - made.keys()) + sum(fleet.count for fleet in fleets.values())
     if total > entries_max and fleets:
         key, fleet = max(fleets.items(), key=lambda item: item[1].count)
         entry = section.values[key]
         assert isinstance(entry, Fields), "a fleet"
         what = f"with it there are {total} {name}, more than {entries_max}"
-        report.add(entry.values[COUNT].place, (*fleet.path, COUNT), what, fleet.count)
+        by = COUNT if COUNT in entry.values else SPARE
+        report.add(entry.values[by].place, (*fleet.path, by), what, fleet.count)
 
 
 def _count(node: Tree, path: Location, count_max: int, report: Report) -> int:
@@ -136,6 +149,8 @@ def members(section: Fields, fleet: Fleet, templates: Templates, report: Report)
         else:
             usual = usual or templates.applied(fleet.raw, fleet.path)
             place, entry = section.keys[str(fleet.path[1])], _moved(usual, fleet.spacing, number - 1)
+            if number > fleet.present and isinstance(entry, Fields):
+                entry = _as_spare(entry)
             if fleet.path in report.broken:
                 report.broken.add((fleet.path[0], name))
         report.count(entry, place, fleet.path)
@@ -146,10 +161,18 @@ def member(fleet: Fleet, number: int, own: Tree | None, templates: Templates) ->
     """Return one entry of a fleet, with what is written of it alone."""
     raw = fleet.raw if own is None else merged(fleet.raw, own)
     entry = templates.applied(raw, (fleet.path[0], f"{fleet.path[1]}-{number}"))
+    if number > fleet.present and isinstance(entry, Fields) and SPARE not in entry.values:
+        entry = _as_spare(entry)
     placed = own.values if isinstance(own, Fields) else {}
     if isinstance(placed.get(AT), Fields):
         placed = placed[AT].values  # type: ignore[union-attr]
     return _moved(entry, {axis: step for axis, step in fleet.spacing.items() if axis not in placed}, number - 1)
+
+
+def _as_spare(entry: Fields) -> Fields:
+    """Return an entry that is absent until it is added."""
+    at = entry.place
+    return Fields(at, {**entry.values, SPARE: Leaf(at, True)}, {**entry.keys, SPARE: at})
 
 
 def _moved(entry: Tree, spacing: Mapping[str, Step], steps: int) -> Tree:

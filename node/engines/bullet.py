@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 from foosim.world.forms.registry import engine
@@ -22,15 +21,3 @@ class Bullet:
         from foosim.node.physics.bullet_engine import BulletEngine
 
         return BulletEngine(deployment, layout)
-
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
-        """Build an engine a body at a time."""
-        from foosim.node.physics.bullet_engine import BulletEngine
-
-        return (yield from BulletEngine.in_steps(deployment, layout))
-
-    def prepare_spares(self, count: int) -> None:
-        """Connect clients of the library, each of which takes 15 ms."""
-        from foosim.node.physics.bullet_client import connect_spares
-
-        connect_spares(count)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 from foosim.world.forms.registry import engine
@@ -22,11 +21,3 @@ class Mujoco:
         from foosim.node.physics.mujoco_islands import MujocoIslands
 
         return MujocoIslands(deployment, layout)
-
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
-        """Build an engine in one step, which is short: models are made when their composition comes about."""
-        yield
-        return self.make(deployment, layout)
-
-    def prepare_spares(self, count: int) -> None:
-        """Nothing that it needs takes long."""

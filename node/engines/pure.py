@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 from foosim.world.forms.registry import engine
@@ -22,11 +21,3 @@ class Pure:
         from foosim.node.physics.pure_engine import PureEngine
 
         return PureEngine(deployment, layout)
-
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
-        """Build an engine in one step, which is short."""
-        yield
-        return self.make(deployment, layout)
-
-    def prepare_spares(self, count: int) -> None:
-        """Nothing that it needs takes long."""

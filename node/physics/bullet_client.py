@@ -19,7 +19,6 @@ __all__ = [
     "MESH_PIECE",
     "REST",
     "bullet_indices",
-    "connect_spares",
     "give_client",
     "make_dynamics",
     "make_scenery",
@@ -47,12 +46,6 @@ SHAPE_TYPES: Final = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_C
 
 _spare_clients: list[int] = []
 """Connected clients without bodies. Emptied, a client is as new; the laws are tested with such ones, too."""
-
-
-def connect_spares(count: int) -> None:
-    """Connect this many spare clients, so that an engine can be built while ticks continue."""
-    while len(_spare_clients) < count:
-        _spare_clients.append(_connect())
 
 
 def start_client(settings: dict[str, Any], gravity: float) -> int:

@@ -9,7 +9,7 @@ It is for bodies whose joints do not couple: all that a node solves in a tick sh
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import fsum, isfinite
 from struct import Struct
@@ -113,25 +113,10 @@ class BulletEngine:
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         """Build scenery and bodies, all parked. Takes about 20 ms for ten bodies, holding the interpreter."""
-        for _ in self._build(deployment, layout):
-            pass
-
-    @classmethod
-    def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletEngine]:
-        """Build one a body at a time, with ticks of another engine in between; a step takes up to 0.5 ms.
-
-        So long as there is a spare client: connecting one takes 15 ms.
-        """
-        engine = cls.__new__(cls)
-        yield from engine._build(deployment, layout)
-        return engine
-
-    def _build(self, deployment: Deployment, layout: Layout) -> Iterator[None]:
         self._physics = physics_of(deployment)
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
         self._client: int = start_client(self._settings(), self._physics.gravity)
-        yield
         scene = build_scene(deployment, layout)
         self._silent: set[int] = set()
         felt = [shape for shape in scene.scenery if shape.surface in self._physics.surfaces]
@@ -139,7 +124,6 @@ class BulletEngine:
             made = self._make_scenery(shape)
             if self._physics.surfaces[shape.surface].silent:
                 self._silent.add(made)
-            yield
         bodies = {entity.name: scene.bodies[entity.name] for entity in layout.entities if entity.is_rigid}
         self._free: dict[str, int] = {}
         self._chains: dict[str, Chain] = {}
@@ -148,7 +132,6 @@ class BulletEngine:
                 self._free[name] = self._make_free(bodies[name])
             else:
                 self._chains[name] = _chain(self._make_jointed(bodies[name]), bodies[name], layout[name])
-            yield
         self._tick_s = deployment.tick_ns / 1e9
         self._comers = [(layout[name].offsets["position"], _reach(bodies[name], self._tick_s)) for name in self._free]
         """Of free bodies: the place of their position in the frame, and how far from it they are felt within a tick."""

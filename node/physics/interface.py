@@ -1,8 +1,8 @@
 """The interface of a physics engine to a node: load, command, step, read; and of what makes one.
 
 An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
-complete load of what is solved, from the frame. A change of layout builds another engine. Its bodies are the scene's
-bodies of those entities that are rigid (`Entity.is_rigid`).
+complete load of what is solved, from the frame. Its bodies are the scene's bodies of those entities that are rigid
+(`Entity.is_rigid`).
 
 An `IslandEngine` solves bodies of any kind, an island at a time. An `Engine` solves all bodies in one go, and parks
 what is not loaded: *free* ones are one link each, a sphere; *jointed* ones are chains of two links on a fixed base.
@@ -10,7 +10,7 @@ what is not loaded: *free* ones are one link each, a sphere; *jointed* ones are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias, runtime_checkable
 
@@ -73,12 +73,6 @@ class EngineKind(Protocol):
 
     def make(self, deployment: Deployment, layout: Layout) -> Engine | IslandEngine:
         """Return an engine, built at once."""
-
-    def in_steps(self, deployment: Deployment, layout: Layout) -> Generator[None, None, Engine | IslandEngine]:
-        """Build an engine in steps, each short enough to do between two ticks of another one."""
-
-    def prepare_spares(self, count: int) -> None:
-        """Get ready what would hold up the ticks when so many more engines are built beside them."""
 
 
 AnyEngine: TypeAlias = Engine | IslandEngine

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from typing import Final
+from collections.abc import Sequence
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine, EngineKind
 from foosim.world.forms import registry
 from foosim.world.layout import Entity, Layout
-
-SPARES: Final = 2
-"""Engines that a node may build before the first one is given back: the next layout's, and the one after that."""
 
 
 def kind_of(deployment: Deployment) -> EngineKind:
@@ -48,17 +44,3 @@ def has_rigid(layout: Layout) -> bool:
 def make_engine(deployment: Deployment, layout: Layout) -> AnyEngine:
     """Return the engine of a layout's rigid bodies, built at once."""
     return kind_of(deployment).make(deployment, layout) if has_rigid(layout) else NoEngine()
-
-
-def prepare_spares(deployment: Deployment, layout: Layout) -> None:
-    """Get ready what would hold up the ticks later, when another engine is built beside them."""
-    if has_rigid(layout):
-        kind_of(deployment).prepare_spares(SPARES)
-
-
-def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, AnyEngine]:
-    """Build the engine of a layout's rigid bodies in steps, each short enough to do between two ticks."""
-    if has_rigid(layout):
-        return (yield from kind_of(deployment).in_steps(deployment, layout))
-    yield
-    return NoEngine()

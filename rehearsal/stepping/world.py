@@ -27,28 +27,26 @@ class SteppedWorld:
     """A world at a frame. `sense` and `step` by turns lead from frame to frame."""
 
     def __init__(self, deployment: Deployment, frame: Frame) -> None:
-        self._engines: dict[bytes, AnyEngine] = {}
-        """By layout."""
+        self._engine: AnyEngine | None = None
         self._remembered: dict[int, float] = {}
         """What sensors remember of the frame: numbers of the next one, by place."""
         self._share: Share | None = None
         self._members: tuple[Groups, Groups] = ((), ())
         self._deployment, self.frame = deployment, frame
-        self._stepper, self._assignment, self._engine = self._made(deployment, frame.layout)
+        self._stepper, self._assignment = self._made(deployment, frame.layout)
 
     def begin(self, deployment: Deployment, frame: Frame) -> None:
         """Go on from a frame, in the same deployment or one that differs in its seed."""
         self._deployment, self.frame = deployment, frame
         self._remembered, self._share = {}, None
-        self._stepper, self._assignment, self._engine = self._made(deployment, frame.layout)
+        self._stepper, self._assignment = self._made(deployment, frame.layout)
 
-    def _made(self, deployment: Deployment, layout: Layout) -> tuple[Stepper, Assignment, AnyEngine]:
-        engine = self._engines.get(layout.digest)
-        if engine is None:
-            engine = self._engines[layout.digest] = make_engine(deployment, layout)
+    def _made(self, deployment: Deployment, layout: Layout) -> tuple[Stepper, Assignment]:
+        if self._engine is None:
+            self._engine = make_engine(deployment, layout)
         owners = {robot.name: NODE for robot in layout.robots}
         assignment = Assignment(layout, reach_of(deployment, layout), (NODE,), owners)
-        return Stepper(deployment, layout), assignment, engine
+        return Stepper(deployment, layout), assignment
 
     def sense(self) -> list[RobotPacket]:
         """Return what the robots send at the frame, in (robot, index) order. Raises ComponentError."""
@@ -68,12 +66,14 @@ class SteppedWorld:
         """
         frame, stepper = self.frame, self._stepper
         tick = frame.tick
-        layout, numbers = stepper.edited(frame, edits)
+        layout = frame.layout
+        numbers, self._remembered = stepper.edited(frame, edits, self._remembered)
         share = self._assignment.shares(numbers)[NODE]
         start = numbers.copy() if delivered or stepper.waits else numbers
         outboxes = stepper.deliver(delivered, share.solved, numbers, tick, start)
         islands, movers = self._groups(share, layout)
         work = Work(tick, layout, islands, share.solved, numbers, outboxes, [] if start is numbers else start, movers)
+        assert self._engine is not None, "closed"
         stepper.solve(self._engine, work)
         for place, number in self._remembered.items():
             numbers[place] = number
@@ -97,7 +97,7 @@ class SteppedWorld:
         return self._stepper.quarantined
 
     def close(self) -> None:
-        """Free the engines."""
-        for engine in self._engines.values():
-            engine.close()
-        self._engines.clear()
+        """Free the engine."""
+        if self._engine is not None:
+            self._engine.close()
+            self._engine = None

@@ -173,19 +173,17 @@ class CaptureFile:
 
     def _pass(self, frame: Frame) -> None:
         """Record that the file has a frame."""
-        known = self._known
-        if known is None or known.layout.digest != frame.layout.digest:
-            self._view.turn_to(frame)
+        self._view.turn_to(frame)
         self._known = frame
 
     def _write_views(self, frame: Frame) -> None:
         known = self._known
         if known is not None and known.tick == frame.tick:
             return
-        changed = known is None or known.layout.digest != frame.layout.digest
-        if changed:
-            self._write_view(SCENE, frame.tick, self._view.turn_to(frame))
-        if changed or frame.tick % self._view.poses_every == 0:
+        scene = self._view.turn_to(frame)
+        if scene is not None:
+            self._write_view(SCENE, frame.tick, scene)
+        if scene is not None or frame.tick % self._view.poses_every == 0:
             self._write_view(POSES, frame.tick, self._view.poses(frame))
 
     def _write_view(self, topic: str, tick: int, data: bytes) -> None:
@@ -354,10 +352,10 @@ class CaptureFile:
 
         There is always something in it: who comes from the file before passes the first chunk by.
         """
-        split, known = self._split, self._known
+        split = self._split
         assert split is not None
         at_ns = frame.tick * self._plan.tick_ns
-        is_new = known is None or known.layout.digest != frame.layout.digest
+        is_new = self._known is None
         text = f"goes on from {split.path.name}"
         line = Message(LOG, at_ns, at_ns, 0, self._view.log_line("info", text, frame.tick))
         for message in (*split.in_force.messages(), line):

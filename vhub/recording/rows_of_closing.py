@@ -21,7 +21,6 @@ from foosim.capture.rows import (
     PACKETS,
     RECOVERIES,
     TICK,
-    AddedRow,
     AgeRow,
     ClientRow,
     DecidedRow,
@@ -54,7 +53,6 @@ from foosim.vhub.stages.receiver import RECEIVER_FULL
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout, build_layout
 
 Entry = tuple[str, int, int, int, Row]
 """A row with its place: topic, log time and publish time (simulated ns), sequence number."""
@@ -66,12 +64,11 @@ class Plan:
 
     tick_ns: int
     frames_every: int
-    base: Layout
 
 
 def plan_of(deployment: Deployment) -> Plan:
     """Return the plan of a deployment's captures."""
-    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
+    return Plan(deployment.tick_ns, deployment.capture.frames_every)
 
 
 def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
@@ -85,8 +82,8 @@ def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]
     mark = frame.tick & 0xFFFF_FFFF
     entries: list[Entry] = []
     if known is None or known.tick != frame.tick:
-        if known is None or known.layout.digest != frame.layout.digest:
-            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
+        if known is None:
+            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame)))
         entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
         entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
@@ -256,15 +253,14 @@ def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
     return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
 
 
-def layout_row(frame: Frame, base: Layout) -> LayoutRow:
-    """Return the row of a frame's layout; `base` is the deployment's own."""
+def layout_row(frame: Frame) -> LayoutRow:
+    """Return the row of a frame's layout."""
     layout = frame.layout
     return LayoutRow(
         frame.tick,
         layout.digest.hex(),
         layout.size,
         [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
-        [AddedRow(e.name, e.model) for e in layout.entities if e.name not in base],
     )
 
 
@@ -288,7 +284,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
 def edit_row(edit: Edit) -> EditRow:
     """Return the row of an edit."""
     if isinstance(edit, Add):
-        return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
+        return EditRow("add", edit.name, numbers=edit.numbers)
     if isinstance(edit, Remove):
         return EditRow("remove", edit.name)
     if isinstance(edit, Push):

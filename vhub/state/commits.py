@@ -1,27 +1,22 @@
 """The commits that the vHub has received: frames in order, and early ones until their turn.
 
-A frame's layout follows from the commits before it, so they are read in order. A supervisor that takes over may lack
-the last one, and gets it from here.
+A supervisor that takes over may lack the last one, and gets it from here.
 """
 
 from __future__ import annotations
 
 from foosim.common import limits
 from foosim.common.errors import Malformed
-from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Commit
-from foosim.world.assembly.initial_state import added_to
-from foosim.world.edits import layout_after
 from foosim.world.frame import Frame, chain_next, frame_from_bytes
 from foosim.world.layout import Layout
-from foosim.world.start import AddedEntity
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as received, decoded, and its frame."""
 
 
 class Commits:
-    """Committed frames by tick. `layout` is that of the newest, None before the world's first frame."""
+    """Committed frames by tick. `layout` is that of the world, None before it is known."""
 
     def __init__(self) -> None:
         self.layout: Layout | None = None
@@ -65,12 +60,10 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
-    def last(self, deployment: Deployment) -> tuple[bytes, bytes, list[AddedEntity]]:
-        """Return the newest commit (empty before the first), the chain up to it, and its layout's added entities."""
-        assert self.layout is not None
+    def last(self) -> tuple[bytes, bytes]:
+        """Return the newest commit (empty before the first), and the chain up to it."""
         last = self._frames.get(self.next_tick - 1)
-        chain, added = self._chains[self.next_tick - 1], added_to(self.layout)
-        return b"" if last is None else last[0], chain, added
+        return b"" if last is None else last[0], self._chains[self.next_tick - 1]
 
     def forget(self, tick: int) -> None:
         """Drop the commit of a tick that is not needed any longer."""
@@ -79,13 +72,11 @@ class Commits:
 
     def _read(self, commit: Commit, payload: bytes) -> int:
         assert self.layout is not None
-        layout = layout_after(self.layout, commit.edits)
-        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        frame = frame_from_bytes(commit.tick, self.layout, commit.values, commit.outboxes)
         if frame.digest != commit.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         chain, begins = self._chains[commit.tick - 1], commit.tick - 1 not in self._frames
         self._chains[commit.tick] = chain if begins else chain_next(chain, commit.digest)
-        self.layout = layout
         self.next_tick += 1
         self._frames[commit.tick] = payload, commit, frame
         return commit.tick

@@ -22,7 +22,7 @@ from foosim.vhub.network.memory import Age, Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.assembly.initial_state import first_chain
-from foosim.world.edits import Edit, layout_after
+from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -43,14 +43,13 @@ NONE_AWAY: Final = AbsencesRecord([], [])
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
-    """The first record of a journal file: the run, the state after the last closed tick, the layout's added entities.
+    """The first record of a journal file: the run, the state after the last closed tick.
 
     Commit and epoch are the last ones as they came, empty before the first.
     """
 
     run: str
     state: bytes
-    added: list[tuple[str, str]]
     commit: bytes = b""
     epoch: bytes = b""
     capture: str = ""
@@ -65,9 +64,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
 def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
     """Return the head of a vHub before its first closing, which is about to create `capture`."""
     tick = 0 if build.origin is None else build.origin.tick
-    added = [(entity.name, entity.model) for entity in build.added]
     state = HubState(deployment, tick).snapshot()
-    return encode(HeadRecord(build.run, state, added, b"", b"", capture, first_chain(build.origin)))
+    return encode(HeadRecord(build.run, state, b"", b"", capture, first_chain(build.origin)))
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):
@@ -205,7 +203,7 @@ class Fold:
             raise Malformed("a journal of the vHub that does not start with its head")
         self.run = head.run
         self.state = HubState.restore(deployment, head.state)
-        self.layout = build_layout(deployment, head.added)
+        self.layout = build_layout(deployment)
         self.commit = head.commit
         self.epoch = head.epoch
         self.chain = head.chain
@@ -230,7 +228,6 @@ class Fold:
     def _close(self, record: TickRecord) -> Folded:
         state = self.state
         commit = decode(Commit, record.commit)
-        self.layout = layout_after(self.layout, commit.edits)
         frame = frame_from_bytes(commit.tick, self.layout, commit.values, commit.outboxes)
         samples = [decode(Samples, raw) for raw in record.samples]
         packets = world_packets(samples, commit.digest, frame, state.sampling)

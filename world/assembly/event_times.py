@@ -1,42 +1,56 @@
-"""When the events of a world set what: a function of the deployment, so that it is the same for all who compute it."""
+"""When the events of a world do what: a function of the deployment, so that it is the same for all who compute it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.world.events import Value, WorldEvent
+from foosim.world.layout import kits_named, spares_of
 from foosim.world.spec import WorldSpec
 
 
 class Scheduled(NamedTuple):
-    """A field of an entity that an event sets."""
+    """What an event does to an entity: it sets a field, or where there is none adds or removes it."""
 
     name: str
+    verb: Literal["set", "add", "remove"]
     field: str
     value: Value
 
     @property
     def text(self) -> str:
         """What happens, in words."""
+        if self.verb != "set":
+            return f"{self.name} is {'added' if self.verb == 'add' else 'removed'}"
         value = str(self.value).lower() if isinstance(self.value, bool) else self.value
         return f"{self.field} of {self.name} is set to {value}"
 
 
 def events_by_tick(spec: WorldSpec) -> dict[int, list[Scheduled]]:
-    """Return what the events of a world set, by the tick at whose start they do, in the order of their list."""
+    """Return what the events of a world do, by the tick at whose start they do, in the order of their list."""
     found: dict[int, list[Scheduled]] = {}
     for number, event in enumerate(spec.events):
         for name, tick in _drawn(spec, number, event):
-            found.setdefault(tick, []).extend([Scheduled(name, *item) for item in event.fields.items()])
+            found.setdefault(tick, []).extend(done_to(name, event))
     return found
 
 
+def done_to(name: str, event: WorldEvent) -> list[Scheduled]:
+    """Return what an event does to an entity, in the order of its fields."""
+    if event.add is not None:
+        return [Scheduled(name, "add", "", event.add)]
+    if event.fields is None:
+        return [Scheduled(name, "remove", "", True)]
+    return [Scheduled(name, "set", *item) for item in event.fields.items()]
+
+
 def matched(spec: WorldSpec, selector: str) -> list[str]:
-    """Return the robots and objects that a selector matches, in name order."""
-    return [name for name in sorted((*spec.robots, *spec.objects)) if fnmatchcase(name, selector)]
+    """Return the robots, objects and what kits bring that a selector matches, in name order."""
+    brought = [name for kit in kits_named(spec) for name in (*kit.entities, *spares_of(spec, kit))]
+    return [name for name in sorted((*spec.robots, *spec.objects, *brought)) if fnmatchcase(name, selector)]
 
 
 def _drawn(spec: WorldSpec, number: int, event: WorldEvent) -> Iterator[tuple[str, int]]:

@@ -10,10 +10,11 @@ comparisons, so that all CPUs agree.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import sqrt
 
+from foosim.world.assembly.presence import Presence
 from foosim.world.assembly.volumes import BodyIsland, Volumes, solver_by_name
 from foosim.world.layout import Layout
 from foosim.world.models.rod import RodRobot, line_x_m
@@ -38,6 +39,11 @@ class Reach:
     z_high_m: float
     balls: tuple[tuple[int, int], ...]
     alone: tuple[tuple[int, str], ...] = ()
+
+    def without(self, absent: Collection[int]) -> Reach:
+        """Return those of all but some entities, by their indices."""
+        balls = tuple([ball for ball in self.balls if ball[0] not in absent])
+        return replace(self, balls=balls, alone=tuple([one for one in self.alone if one[0] not in absent]))
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,11 @@ class Assignment:
     ) -> None:
         assert roster and list(roster) == sorted(roster), roster
         self.layout = layout
+        self.presence = Presence(layout)
         self.reach = reach
+        """Of those who are present."""
+        self._everybody = reach
+        self._absent: frozenset[int] = frozenset()
         self.roster = tuple(roster)
         self.owners = dict(owners)
         self._shares: dict[Touching, dict[str, Share]] = {}
@@ -177,6 +187,10 @@ class Assignment:
 
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers."""
+        absent = self.presence.absent(numbers)
+        if absent is not self._absent:
+            self._absent, self.reach = absent, self._everybody.without(absent)
+            self._shares, self._divided = {}, ([], {})
         if isinstance(self.reach, Volumes):
             islands = self.reach.islands(numbers)
             if not self._divided[1] or islands is not self._divided[0]:
@@ -223,7 +237,7 @@ class Assignment:
         }
 
     def _add_unsolved(self, solved: dict[str, list[int]]) -> None:
-        """Add who stays as it is: its owner copies it, the first node what has none."""
+        """Add who stays as it is, or is absent: its owner copies it, the first node what has none."""
         for entity in self.layout.entities:
-            if not entity.is_solved:
+            if not entity.is_solved or entity.index in self._absent:
                 solved[self.owners.get(entity.name, self.roster[0])].append(entity.index)

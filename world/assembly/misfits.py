@@ -43,8 +43,6 @@ from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
 """The rigid models that may share a solve (`assembly.islands.table_reach_of`)."""
-PLACED_BY: Final = ("check_place", "place_at")
-"""The methods of a model of which a running world can have more."""
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
 
@@ -156,12 +154,14 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
                 yield f"{word_of('rule')} that {word} {model}: {error}"
 
 
-def kit_problems(name: str, kit: Kit, kits: Mapping[str, Kit], reserved: Sequence[str]) -> Iterator[str]:
-    """Yield what a kit puts into a world with these kits that cannot be there.
+def kit_problems(
+    name: str, entities: Mapping[str, str], kits: Mapping[str, Kit], reserved: Sequence[str]
+) -> Iterator[str]:
+    """Yield what a kit puts into a world with these kits that cannot be there: `entities`, models by name.
 
     `reserved` are names that no entity can have.
     """
-    for entity, model in kit.entities.items():
+    for entity, model in entities.items():
         if entity in reserved:
             yield f"its entity {entity} has a reserved name"
         for other in kits:
@@ -169,9 +169,6 @@ def kit_problems(name: str, kit: Kit, kits: Mapping[str, Kit], reserved: Sequenc
                 yield f"its entity {entity} has a name that is also one of the kit {other}'s"
         for problem in _not_there(model, kits):
             yield f"its entity {entity} is {problem}"
-    for model in kit.addable:
-        for problem in (*_not_there(model, kits), *_not_placed(model)):
-            yield f"what can be added is {problem}"
 
 
 def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
@@ -186,16 +183,6 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
     for problem in needs_kit(model, kits, model.name):
         yield f"of a model that cannot be there: {problem}"
     yield from model_problems(model, kits)
-
-
-def _not_placed(name: str) -> Iterator[str]:
-    """Yield why a running world cannot have one more of a model."""
-    model = find_kit_model(name)
-    if model is not None and not model.is_robot:
-        missing = [f"method {method}" for method in PLACED_BY if not hasattr(model.made, method)]
-        missing += ["field position"] if "position" not in (model.declared or ()) else []
-        if missing:
-            yield f"of the model {model.name}, which has no {' and no '.join(missing)}"
 
 
 # --- a world with its files ------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.world.components.drives import Drives
-from foosim.world.edits import Edit, Set
+from foosim.world.edits import Add, Edit, Remove, Set
 from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -24,8 +24,8 @@ STILL_M: Final = 50e-6
 STILL_RAD: Final = 50e-6
 """What stays within these of a pose is still. In the time of rest a box creeps by 22 um down a slope of 15 degrees; a
 ball on one of 0.05 degrees rolls by 760 um, a pole that is 2 mrad past its balance turns by 3 mrad."""
-MAY_CHANGE: Final = frozenset((STILL_TICKS, STILL_POSE, "partners", "refused", "clamped"))
-"""Fields of a body at rest that may change: references follow their entities into another layout."""
+MAY_CHANGE: Final = frozenset((STILL_TICKS, STILL_POSE, "refused", "clamped"))
+"""Fields of a body at rest that may change."""
 REST_NS: Final = 500_000_000
 """How long all bodies of an island are still before they are at rest."""
 
@@ -70,21 +70,20 @@ class Rest:
                 stop(entity, numbers)
 
 
-def wake_edited(before: Frame, layout: Layout, numbers: list[float], edits: Sequence[Edit]) -> None:
+def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> None:
     """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order puts
-    something elsewhere: they may have leaned on it."""
+    something elsewhere, or takes it away: they may have leaned on it."""
     old = before.numbers
-    if any(isinstance(edit, Set) and edit.field == "position" for edit in edits):
-        for entity in layout.resting:
+    if any(isinstance(edit, Add | Remove) or (isinstance(edit, Set) and edit.field == "position") for edit in edits):
+        for entity in before.layout.resting:
             numbers[entity.offsets[STILL_TICKS]] = 0.0
-    for entity in layout.resting:
+    for entity in before.layout.resting:
         at = entity.offsets[STILL_TICKS]
-        if numbers[at] == 0.0 or entity.name not in before.layout:
+        if numbers[at] == 0.0:
             continue
-        was = before.layout[entity.name]
         for field in entity.fields:
-            here, there, count = entity.offsets[field], was.offsets[field], entity.counts[field]
-            if field not in MAY_CHANGE and numbers[here : here + count] != old[there : there + count]:
+            here, count = entity.offsets[field], entity.counts[field]
+            if field not in MAY_CHANGE and numbers[here : here + count] != old[here : here + count]:
                 numbers[at] = 0.0
 
 

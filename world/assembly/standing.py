@@ -54,13 +54,12 @@ class Standing:
                 first, last = entity.start, entity.split
                 numbers[at] = 1.0 if numbers[first:last] == before[first:last] else 0.0
 
-    def wake_edited(self, before: Frame, layout: Layout, numbers: list[float]) -> None:
+    def wake_edited(self, before: Frame, numbers: list[float]) -> None:
         """Let those be solved that an order or a rule of the world has changed."""
         old = before.numbers
-        for entity in layout.entities:
+        for entity in before.layout.entities:
             at = entity.offsets.get(UNMOVED, -1)
-            if at < 0 or numbers[at] == 0.0 or entity.name not in before.layout:
+            if at < 0 or numbers[at] == 0.0:
                 continue
-            was = before.layout[entity.name]
-            if numbers[entity.start : entity.split] != old[was.start : was.split]:
+            if numbers[entity.start : entity.split] != old[entity.start : entity.split]:
                 numbers[at] = 0.0

@@ -24,7 +24,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.failures import OURS, in_library
 from foosim.world.forms.forms import Form, Model
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
-from foosim.world.layout import find_motion, kits_named, world_rules
+from foosim.world.layout import find_motion, kits_named, spares_of, world_rules
 from foosim.world.spec import WorldSpec
 
 DIGEST_BYTES: Final = 8
@@ -40,7 +40,7 @@ def _forms_of(spec: WorldSpec) -> Iterator[Form]:
     yield registry.find("engine", spec.engine)
     for kit in kits_named(spec):
         yield kit
-        for name in (*kit.entities.values(), *kit.addable):
+        for name in (*kit.entities.values(), *spares_of(spec, kit).values()):
             yield from _with_motion(registry.find_model(name))
     for rule in world_rules(spec).values():
         yield registry.find("rule", rule.kind)

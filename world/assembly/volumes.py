@@ -9,7 +9,8 @@ go on by a motion) are in no island: each island has those in whose way it is. E
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 from math import sqrt
@@ -23,7 +24,7 @@ from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.physics import Physics
-from foosim.world.scene import UPRIGHT, Body, Vector, conjugate, moved, rotate, swept_box
+from foosim.world.scene import ORIGIN, UPRIGHT, Body, Vector, conjugate, moved, rotate, swept_box
 from foosim.world.spec import WorldSpec
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -78,6 +79,26 @@ def _near(boxes: Numbers) -> _Near:
     return _Near(boxes, pairs[:, 0], pairs[:, 1])
 
 
+class _Felt(NamedTuple):
+    """A rigid body or a mover: of a free one the middle of the box around it, half of its sides, and its radius; of any
+    other the box around all that it reaches."""
+
+    entity: Entity
+    body: Body
+    middle: Vector
+    half: Vector
+    radius: float
+    box: tuple[Vector, Vector]
+
+
+def _felt_of(entity: Entity, body: Body) -> _Felt:
+    if body.is_free:
+        return _Felt(entity, body, *_own_box(body), radius_of(body), (ORIGIN, ORIGIN))
+    (x, y, z), (u, v, w) = swept_box(body)
+    box = (x - MARGIN_M, y - MARGIN_M, z - MARGIN_M), (u + MARGIN_M, v + MARGIN_M, w + MARGIN_M)
+    return _Felt(entity, body, ORIGIN, ORIGIN, 0.0, box)
+
+
 def is_felt(body: Body, physics: Physics) -> bool:
     """Whether rigid bodies feel a body: it has a shape, and all of its shapes have surfaces that they know."""
     surfaces = [shape.surface for link in body.links for shape in link.shapes]
@@ -95,39 +116,48 @@ class Volumes:
             for entity in layout.entities
             if entity.is_solved and entity.name in bodies and is_felt(bodies[entity.name], physics)
         ]
-        self._layout = layout
-        self._entities = [entity for entity, _ in felt]
-        self.rows = {entity.index: row for row, entity in enumerate(self._entities)}
-        """The row of each entity in `boxes_at`."""
-        self._is_mover = [not entity.is_rigid for entity in self._entities]
-        free = [(row, entity, body) for row, (entity, body) in enumerate(felt) if body.is_free]
-        self._free = np.array([row for row, _, _ in free], np.intp)
-        self._poses = itemgetter(*[at for _, entity, _ in free for at in _pose_places(entity)]) if free else None
-        """Returns the position and the quaternion's parts of each free body, from a frame's numbers."""
-        self._position_of = {entity.index: entity.offsets["position"] for _, entity, _ in free}
-        middles, halves = zip(*[_own_box(body) for _, _, body in free], strict=True) if free else ((), ())
-        self._middles = np.array(middles).reshape(-1, 1, 3)
-        self._halves = np.array(halves).reshape(-1, 1, 3)
-        self._moves = itemgetter(*[at for _, entity, _ in free for at in _move_places(entity)]) if free else None
-        """Returns the velocity and the spin of each free body."""
-        self._radii = np.array([radius_of(body) for _, _, body in free])
-        self._limits = np.array([body.speed_limit for _, _, body in free])
-        self._tick_s = tick_s
-        self._boxes = np.zeros((len(felt), 2, 3))
-        for row, (_, body) in enumerate(felt):
-            if not body.is_free:
-                low, high = swept_box(body)
-                self._boxes[row] = [[side - MARGIN_M for side in low], [side + MARGIN_M for side in high]]
-        self._fixed = {entity.index: body.position for entity, body in felt if not body.is_free}
-        robots = [entity.is_robot for entity in self._entities if entity.is_rigid]
-        self._has_choice = sum(robots) > 1 and not all(robots)
-        """Whether an island may have several robots and an object: then its solver depends on where they are."""
-        self._alone = [
+        self._layout, self._tick_s = layout, tick_s
+        self._all = [_felt_of(entity, body) for entity, body in felt]
+        self._all_alone = [
             (entity.index, entity.name if entity.is_robot else "")
             for entity in layout.entities
             if entity.is_solved and not entity.is_rigid
         ]
         """Movers and others that touch nobody: each is solved by itself."""
+        self._take(self._all, self._all_alone)
+
+    def without(self, absent: Collection[int]) -> Volumes:
+        """Return those of all but some entities, by their indices."""
+        found = copy(self)
+        found._take(
+            [one for one in self._all if one.entity.index not in absent],
+            [one for one in self._all_alone if one[0] not in absent],
+        )
+        return found
+
+    def _take(self, felt: Sequence[_Felt], alone: list[tuple[int, str]]) -> None:
+        """Be the volumes of these."""
+        self._entities = [one.entity for one in felt]
+        self.rows = {entity.index: row for row, entity in enumerate(self._entities)}
+        """The row of each entity in `boxes_at`."""
+        self._is_mover = [not entity.is_rigid for entity in self._entities]
+        free = [one for one in felt if one.body.is_free]
+        self._free = np.array([row for row, one in enumerate(felt) if one.body.is_free], np.intp)
+        self._poses = itemgetter(*[at for one in free for at in _pose_places(one.entity)]) if free else None
+        """Returns the position and the quaternion's parts of each free body, from a frame's numbers."""
+        self._position_of = {one.entity.index: one.entity.offsets["position"] for one in free}
+        self._middles = np.array([one.middle for one in free]).reshape(-1, 1, 3)
+        self._halves = np.array([one.half for one in free]).reshape(-1, 1, 3)
+        self._moves = itemgetter(*[at for one in free for at in _move_places(one.entity)]) if free else None
+        """Returns the velocity and the spin of each free body."""
+        self._radii = np.array([one.radius for one in free])
+        self._limits = np.array([one.body.speed_limit for one in free])
+        self._boxes = np.array([one.box for one in felt]).reshape(-1, 2, 3)
+        self._fixed = {one.entity.index: one.body.position for one in felt if not one.body.is_free}
+        robots = [entity.is_robot for entity in self._entities if entity.is_rigid]
+        self._has_choice = sum(robots) > 1 and not all(robots)
+        """Whether an island may have several robots and an object: then its solver depends on where they are."""
+        self._alone = alone
         self._found: tuple[list[tuple[int, int]], list[BodyIsland]] | None = None
         """The pairs and the islands that were found last."""
         self._near: _Near | None = None

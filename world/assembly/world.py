@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.common.errors import Refused
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
@@ -37,13 +36,14 @@ from foosim.world.components.view import (
     has_together,
 )
 from foosim.world.components.watching import watched, watched_actuator
+from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult, failure_of
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_motion, find_rule, world_rules
-from foosim.world.scene import Body, Scene, Vector
+from foosim.world.scene import Body, Scene
 from foosim.world.spec import WorldSpec
 
 NO_FORCE: Final = (0.0, 0.0)
@@ -111,7 +111,7 @@ def initial_numbers(
     spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None, *, is_watched: bool = False
 ) -> list[float]:
     """Return the numbers of a world at tick 0: each entity as its model places it, then what its rules set, then
-    those of the world.
+    those of the world; spares are parked.
 
     `models` are those of the layout where they are made already. `is_watched`: rules that write to them otherwise than
     by their views are errors (`watching`). Raises ComponentError.
@@ -133,30 +133,10 @@ def initial_numbers(
         if hasattr(rule, "place"):
             placed = watched(rule) if is_watched else rule
             called(f"rule {label}", WORLD, 0, placed.place, view)
+    for name in layout.spares:
+        entity = layout[name]
+        numbers[entity.start : entity.stop] = parked(layout, entity)
     return numbers
-
-
-def addition(spec: WorldSpec, layout: Layout, name: str, model: str) -> tuple[Vector, Callable[[Vector, Vector], None]]:
-    """Return where another entity of a model is put if nothing is said (m), and what checks a place and a velocity.
-
-    The latter raises BadValue. Both raise ComponentError.
-    """
-    after = Layout({**layout.models, name: model}, layout.declared)
-    made: Any = model_of(spec, after, after[name])
-    numbers = [0.0] * after.size
-    called(f"model {model}", name, 0, made.place, WritableView(0, numbers))
-    start = after[name].offsets["position"]
-    x, y, z = numbers[start : start + 3]
-
-    def check(position: Vector, velocity: Vector) -> None:
-        try:
-            made.check_place(position, velocity)
-        except Refused:
-            raise
-        except BaseException as error:
-            raise component_error(f"model {model}", name, 0, error) from error
-
-    return (x, y, z), check
 
 
 def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
@@ -238,8 +218,6 @@ class WorldMarks:
             ticks = [tick for tick in self._events if before.tick <= tick < after.tick]
             found += [(tick + 1, EVENT, event.text) for tick in sorted(ticks) for event in self._events[tick]]
         for (entity, label), rule in [*self._rules.items()]:
-            if entity != WORLD and entity not in before.layout:
-                continue
             try:
                 found += called(f"marks of rule {label}", entity, after.tick, _marks_of, rule, before, after)
             except ComponentError as error:
@@ -496,9 +474,11 @@ class World:
         view = WritableView(0, numbers)
         for index, model in self.models.items():
             entity = self._layout.entities[index]
-            if hasattr(model, "stir") and entity.name in self._layout.declared.names:
+            if hasattr(model, "stir") and not entity.is_absent(numbers):
                 called(f"model {entity.model}", entity.name, 0, model.stir, view)
-        for fitted in self.actuators.values():
+        for index, fitted in self.actuators.items():
+            if self._layout.entities[index].is_absent(numbers):
+                continue
             for one in fitted:
                 called(f"actuator {one.channel}", one.robot, 0, one.actuator.stir, view)
 

@@ -43,7 +43,7 @@ class Surroundings:
         return frozenset((*entity.kind.tags, *(() if settings is None else settings.tags)))
 
     def tagged(self, tag: str) -> list[Entity]:
-        """Return the entities that have a tag."""
+        """Return the entities that have a tag, with those that are absent: these are far from all places."""
         return [entity for entity in self._layout.entities if tag in self.tags(entity)]
 
     def poses(self, view: View, entity: Entity) -> list[Pose]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class References(int):
     """How many references to entities a slot has, in place of numbers.
 
-    A reference is the index of an entity, -1 for none: it follows its entity when others come and go.
+    A reference is the index of an entity, -1 for none: it becomes that when its entity leaves the world.
     """
 
 
@@ -121,6 +121,8 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
     return f"{numbers} numbers in all, at most {SLOTS_MAX} are valid" if numbers > SLOTS_MAX else ""
 
 
+ABSENT: Final = "absent"
+"""The slot of each entity that has a place: 1 of one that is not in the world, 0 of one that is."""
 DOWN: Final = "down"
 OF_ROBOTS: Final = (DOWN, "refused", "clamped")
 """Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
@@ -373,12 +375,12 @@ class Scene(Form):
 class Kit(Form):
     """A section of a deployment that makes a world from few numbers.
 
-    `entities` are what is in the world beside the robots, their models by name; `addable` the models of which a running
-    world can have more; `rules` the rules of the world, by name. `presets` are whole sections, as plain data, by name:
-    a section may name one in place of what it leaves out.
+    `entities` are what is in the world beside the robots, their models by name; `spares` returns the same of what is
+    absent at the start, from the section; `rules` are the rules of the world, by name. `presets` are whole sections, as
+    plain data, by name: a section may name one in place of what it leaves out.
     """
 
     entities: Mapping[str, str] = field(default_factory=dict)
-    addable: tuple[str, ...] = ()
+    spares: Callable[[Any], Mapping[str, str]] | None = None
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from foosim.world.forms.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """What the values of a form are called."""
-NAMES: Final = ("needs", "writes", "shared", "tags", "addable")
+NAMES: Final = ("needs", "writes", "shared", "tags")
 TEXTS: Final = ("kit", "motion", "several", "speaks", "joints")
 MAPPINGS: Final = {
     "actuators": "names to settings",

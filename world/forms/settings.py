@@ -55,10 +55,12 @@ class SceneSettings(ComponentSettings):
 class EntitySettings(SpecBase):
     """What the settings of every entity have: its model, a registered name or `module:Class`.
 
-    `tags` are for those who look for entities of a kind, beside the tags of its model.
+    `tags` are for those who look for entities of a kind, beside the tags of its model. A `spare` is absent until it is
+    added.
     """
 
     model: str
+    spare: bool = False
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
 
     @property

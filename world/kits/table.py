@@ -20,14 +20,23 @@ if TYPE_CHECKING:
     from foosim.world.frame import Frame
 
 BALL = "ball"
-"""Name of the ball that every table has; further ones have other names and can be removed again."""
+"""Name of the ball that every table has; spare ones are `ball-2` and so on."""
 WALLS = "walls"
 SILENT = frozenset({"floor", "ramps"})
 """What a ball rolls on: its contacts are not logged."""
 
 
+def _spares(section: Table) -> dict[str, str]:
+    return {f"{BALL}-{number + 2}": "ball" for number in range(section.spare_balls)}
+
+
 @kit(
-    TABLE, Table, entities={BALL: "ball"}, addable=("ball",), rules={"football": {"kind": "football"}}, presets=PRESETS
+    TABLE,
+    Table,
+    entities={BALL: "ball"},
+    spares=_spares,
+    rules={"football": {"kind": "football"}},
+    presets=PRESETS,
 )
 class TableKit:
     """A football table with its ball, which rods play by the rules of the game."""

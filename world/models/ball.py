@@ -53,9 +53,9 @@ class Ball:
 
     def place(self, view: WritableView) -> None:
         """Lay it on the kick-off spot, at rest."""
-        self.place_at(view, (0.0, 0.0, self._table.ball.radius), ORIGIN)
+        self.place_at(view, (0.0, 0.0, self._table.ball.radius))
 
-    def place_at(self, view: WritableView, position: Vector, velocity: Vector) -> None:
+    def place_at(self, view: WritableView, position: Vector, velocity: Vector = ORIGIN) -> None:
         """Set it to a place (m) with a velocity (m/s) and without spin, and out of quarantine."""
         at = self._at
         view.write(at.slot("position"), *position)
@@ -65,14 +65,13 @@ class Ball:
         view.write(at.slot("quarantined"), 0.0)
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
-    def check_place(self, position: Vector, velocity: Vector) -> None:
-        """Raise BadValue for a place outside of the table, or more than its greatest speed."""
+    def check_place(self, position: Vector) -> None:
+        """Raise BadValue for a place outside of the table."""
         table = self._table
-        bounds = (table.field.length / 2, table.field.width / 2, table.walls.height)
+        x, y, z = bounds = (table.field.length / 2, table.field.width / 2, table.walls.height)
         if any(abs(value) > bound for value, bound in zip(position, bounds, strict=True)) or position[2] <= 0.0:
-            raise BadValue(f"position {position} is outside the table: at most {bounds} m")
-        if sum(value * value for value in velocity) > table.ball.speed_limit**2:
-            raise BadValue(f"velocity {velocity} is above the ball's limit of {table.ball.speed_limit} m/s")
+            valid = f"valid are x up to {x:g} m and y up to {y:g} m from the middle, z above 0 m up to {z:g} m"
+            raise BadValue(f"a place outside of the table: {valid}", ", ".join(f"{value:g} m" for value in position))
 
     def stir(self, view: WritableView) -> None:
         """Kick it, for the small run that tells engines apart."""

@@ -105,6 +105,8 @@ class Football:
             return
         is_played = False
         for ball in self._balls:
+            if ball.entity.is_absent(numbers):
+                continue
             is_played = is_played or numbers[ball.wait.at] == 0.0
             self._apply_to(ball, view)
         if is_played:
@@ -196,7 +198,7 @@ class Football:
         """Lay the balls on the middle line, at rest, where no figure reaches them."""
         view.write(self._is_over, 1.0)
         view.write(self._over_since, float(view.tick))
-        for number, ball in enumerate(self._balls):
+        for number, ball in enumerate([ball for ball in self._balls if not ball.entity.is_absent(view.numbers)]):
             aside = 2.0 * self._radius * (number + number % 2) * (-1.0) ** number
             ball.place(view, (0.0, aside, self._radius))
 
@@ -232,7 +234,7 @@ class Football:
         returned: list[tuple[int, str]] = []
         kickoffs = 0
         for ball in after.layout.of("ball"):
-            if ball.name not in before.layout:
+            if ball.is_absent(before.numbers) or ball.is_absent(after.numbers):
                 continue
             waits, waited = int(after.at(ball.name, wait)), int(before.at(ball.name, wait))
             if waits > waited or (waits and not waited):
@@ -287,6 +289,7 @@ class _Ball:
     """Where a ball's numbers are, and what the rules remember of it."""
 
     def __init__(self, at: RuleMounting, entity: Entity) -> None:
+        self.entity = entity
         self.still, self.out, self.wait, self.spot, self.serve, self.touched_by = (
             at.of(entity, field) for field in OF_BALL
         )

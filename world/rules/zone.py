@@ -74,15 +74,19 @@ class Zone:
 
     def apply(self, view: WritableView) -> None:
         """Count."""
-        inside = sum(self._has(place[0], place[1]) for place in self._places(view))
+        places = list(self._places(view))
+        inside = sum(self._has(place[0], place[1]) for place in places)
         view.write(self._count, float(inside))
-        is_all = 0 < inside == len(self._entities)
+        is_all = 0 < inside == len(places)
         if is_all and view.numbers[self._all_in.at] == 0.0:
             view.write(self._since, float(view.tick))
         view.write(self._all_in, float(is_all))
 
     def _places(self, view: View) -> Iterator[tuple[float, float, float]]:
+        """Yield where those are that are present."""
         for entity in self._entities:
+            if entity.is_absent(view.numbers):
+                continue
             place = self._around.position(view, entity)
             if place is not None:
                 yield place
@@ -99,7 +103,7 @@ class Zone:
         """Return how many are in the zone and how many there are, whether all are, and since when (s, or None)."""
         (count,), (all_in,), (since,) = view.read(self._count), view.read(self._all_in), view.read(self._since)
         since_s = round(since * self._tick_s, 9) if all_in else None
-        found = {"in": int(count), "of": len(self._entities), "all_in": bool(all_in), "since_s": since_s}
+        found = {"in": int(count), "of": len(list(self._places(view))), "all_in": bool(all_in), "since_s": since_s}
         return {f"zone {self._name}": found}
 
     @staticmethod

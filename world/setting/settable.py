@@ -1,5 +1,5 @@
 """What can be set of an entity while a run goes on: its pose, whether a robot is out of service, what its rules
-declare; and the edits that set it.
+declare; and the edits that set it, and that add an entity.
 
 A pose is set as the deployment would place it: the model places it at tick 0, elsewhere.
 """
@@ -16,12 +16,12 @@ from pydantic_core import PydanticCustomError
 from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.common.units import Quantity
-from foosim.world.assembly.world import body_of, entity_rules_of
+from foosim.world.assembly.world import body_of, entity_rules_of, model_of
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
-from foosim.world.edits import Set, written
+from foosim.world.edits import Add, Set, write, written
 from foosim.world.forms.failures import WrongResult
-from foosim.world.forms.forms import DOWN
+from foosim.world.forms.forms import DOWN, NO_ENTITY
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout, find_entity_rule
 from foosim.world.parameters.vehicles import leaning
@@ -70,8 +70,10 @@ def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
 
 
 def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
+    if "position" not in entity.fields:
+        return False
     settings = spec.settings_of(entity.name)
-    return "position" in entity.fields and settings is not None and is_placed(type(settings))
+    return hasattr(entity.kind.made, "place_at") if settings is None else is_placed(type(settings))
 
 
 def set_edits(
@@ -97,7 +99,7 @@ def set_edits(
     if field == AT and _is_placed(spec, entity):
         edits = _put(spec, layout, numbers, entity, value)
         if is_checked:
-            _check_place(spec, layout, numbers, entity, edits)
+            check_place(spec, layout, written(layout, numbers, edits), entity)
         return edits
     label, _, name = field.partition(".")
     found = [(made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label and name in its]
@@ -138,11 +140,8 @@ def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple
 
 def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, value: object) -> list[Set]:
     """Return the edits that put an entity elsewhere, at rest and out of quarantine."""
-    settings = _elsewhere(spec, entity, _completed(spec, layout, numbers, entity, value))
     placed = [0.0] * layout.size
-    what = f"model {entity.model}"
-    made: Any = called(what, entity.name, 0, entity.kind.made, settings, mounting_of(spec, layout, entity))
-    called(what, entity.name, 0, made.place, WritableView(0, placed))
+    _place(spec, layout, entity, _completed(spec, layout, numbers, entity, value), WritableView(0, placed))
     edits = []
     for field, count in entity.fields.items():
         at = entity.offsets[field]
@@ -153,15 +152,57 @@ def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Enti
     return edits
 
 
-def _check_place(
-    spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, edits: Sequence[Set]
-) -> None:
-    """Raise BadValue where edits put an entity into something."""
-    after = written(layout, numbers, edits)
-    what = occupied_by(spec, layout, after, entity)
+def _place(spec: WorldSpec, layout: Layout, entity: Entity, pose: Pose, view: WritableView) -> None:
+    """Write the state of an entity that starts with a pose. What has no settings is put by its model's `place_at`."""
+    what, at = f"model {entity.model}", mounting_of(spec, layout, entity)
+    if spec.settings_of(entity.name) is not None:
+        made: Any = called(what, entity.name, 0, entity.kind.made, _elsewhere(spec, entity, pose), at)
+        called(what, entity.name, 0, made.place, view)
+        return
+    made = called(what, entity.name, 0, entity.kind.made, None, at)
+    made.check_place(pose.position)
+    called(what, entity.name, 0, made.place_at, view, pose.position)
+
+
+def add_edit(
+    spec: WorldSpec,
+    layout: Layout,
+    numbers: Sequence[float],
+    entity: Entity,
+    place: object = None,
+    *,
+    is_checked: bool = True,
+) -> Add:
+    """Return the edit that adds an absent entity, as it would be at tick 0; `place` is where, if not there.
+
+    Rules of the world remember nothing of it. It raises as `set_edits` does.
+    """
+    after, start = [*numbers], entity.start
+    after[start : entity.stop] = [0.0] * (entity.stop - start)
+    for at in layout.references:
+        if start <= at < entity.stop:
+            after[at] = NO_ENTITY
+    view = WritableView(0, after)
+    called(f"model {entity.model}", entity.name, 0, model_of(spec, layout, entity).place, view)
+    if place is not None:
+        if not _is_placed(spec, entity):
+            raise BadValue(f"{entity.name} has no place that can be chosen: it starts where its {entity.model} does")
+        for edit in _put(spec, layout, after, entity, place):
+            write(layout, after, edit)
+    for label, rule in entity_rules_of(spec, layout, entity) if entity.is_robot else ():
+        if hasattr(rule, "place"):
+            called(f"rule {label}", entity.name, 0, rule.place, view)
+    if is_checked:
+        check_place(spec, layout, after, entity)
+    return Add(entity.name, after[start : entity.stop])
+
+
+def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> None:
+    """Raise BadValue where an entity is in something in a frame of these numbers."""
+    what = occupied_by(spec, layout, numbers, entity)
     if what:
         at = entity.offsets["position"]
-        x, y, z = after[at : at + 3]
+        x, y, z = numbers[at : at + 3]
         raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", f"{x:g} m, {y:g} m, {z:g} m")
 
 
@@ -179,7 +220,7 @@ def _completed(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity
 
     Without an angle the entity keeps its orientation, with one the angles that are not said are 0.
     """
-    keys = dict(zip("xyz", _lengths(value), strict=False)) if isinstance(value, str) else value
+    keys = read_place(value) if isinstance(value, str) else value
     if not isinstance(keys, dict) or not keys:
         raise BadValue("no place: valid are X,Y or X,Y,Z, or some of x, y, z, roll, pitch, yaw", value)
     try:
@@ -197,11 +238,13 @@ def _completed(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity
     return Pose(x, y, z, asked.yaw, asked.orientation)
 
 
-def _lengths(text: str) -> list[str]:
+def read_place(text: str) -> dict[str, str]:
+    """Return the x, y and maybe z of `X,Y` or `X,Y,Z`, in m where no unit is given. Raises BadValue."""
     parts = [part.strip() for part in text.split(",")]
     if not 2 <= len(parts) <= 3:
         raise BadValue("no place: valid are X,Y or X,Y,Z", text)
-    return [f"{part} m" if part[-1:].isdigit() or part[-1:] == "." else part for part in parts]
+    lengths = [f"{part} m" if part[-1:].isdigit() or part[-1:] == "." else part for part in parts]
+    return dict(zip("xyz", lengths, strict=False))
 
 
 def _frame_of(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> tuple[Vector, Quaternion]:

@@ -1,0 +1,50 @@
+"""Who can come into a world and leave it, by the name that somebody has typed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from operator import itemgetter
+from typing import Final
+
+from foosim.common.errors import Refused, UnknownName, show
+from foosim.world.layout import Entity, Layout
+
+_NUMBERED: Final = re.compile(r"(?P<fleet>.+)-(?P<number>[0-9]+)")
+
+
+def absent_named(layout: Layout, numbers: Sequence[float], name: str) -> Entity:
+    """Return the absent entity that a name is of: its own, or that of its fleet, of which it is the first one absent.
+
+    Raises Refused where nothing of that name is absent.
+    """
+    if name in layout and layout[name].is_absent(numbers):
+        return layout[name]
+    fleet = sorted(_numbered(layout, name), key=itemgetter(0))
+    absent = [entity for _, entity in fleet if entity.is_absent(numbers)]
+    if absent:
+        return absent[0]
+    if fleet:
+        raise Refused(f"no {name} is left to add: all {len(fleet)} that the deployment declares are in the world")
+    if name not in layout:
+        stems = {found["fleet"] for entity in layout.entities if (found := _NUMBERED.fullmatch(entity.name))}
+        known = [entity.name for entity in layout.entities if entity.can_leave]
+        raise Refused(UnknownName("nothing to add", name, [*known, *sorted(stems)]).what)
+    why = "is in the world already" if layout[name].can_leave else "has no place of its own: it is always there"
+    raise Refused(f"{name} {why}")
+
+
+def _numbered(layout: Layout, name: str) -> list[tuple[int, Entity]]:
+    found = [(_NUMBERED.fullmatch(entity.name), entity) for entity in layout.entities if entity.can_leave]
+    return [(int(match["number"]), entity) for match, entity in found if match is not None and match["fleet"] == name]
+
+
+def check_present(layout: Layout, numbers: Sequence[float], name: str) -> None:
+    """Raise Refused for what cannot be removed: it is not in the world, or always."""
+    if name not in layout:
+        known = [entity.name for entity in layout.entities if entity.can_leave and not entity.is_absent(numbers)]
+        raise Refused(UnknownName("nothing to remove", name, known).what)
+    if not layout[name].can_leave:
+        raise Refused(f"{show(name)} cannot be removed: it has no place of its own")
+    if layout[name].is_absent(numbers):
+        raise Refused(f"{show(name)} is absent already")
