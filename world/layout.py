@@ -9,7 +9,7 @@ start: a slot says whether it is absent.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any, Final
@@ -196,9 +196,17 @@ class Layout:
         """Whether it has rigid bodies whose islands need a solve of their own."""
         self.resting = tuple([entity for entity in entities if STILL_TICKS in entity.offsets])
         """Bodies that may come to rest, in name order."""
-        self.shared: dict[int, tuple[WorldSpec, object]] = {}
-        """What the forms of this layout share, by the identity of the world, which is kept with it."""
+        self._shared: dict[tuple[str, int], tuple[WorldSpec, object]] = {}
+        """By what it is and the identity of the world, which is kept with it."""
         self._digest = b""
+
+    def shared(self, what: str, spec: WorldSpec, make: Callable[[], object]) -> object:
+        """Return what all that look at this layout in a world share, made when it is first asked for."""
+        _, found = self._shared.get((what, id(spec)), (None, None))
+        if found is None:
+            found = make()
+            self._shared[what, id(spec)] = spec, found
+        return found
 
     def of(self, model: str) -> tuple[Entity, ...]:
         """Return the entities of a model, in name order."""
