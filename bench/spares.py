@@ -11,6 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from statistics import median
 
 import yaml
@@ -61,7 +62,7 @@ def ticks_us(spares: int, ticks: int, adds: int = 0) -> list[float]:
     text, settings = spares_text(spares), Settings(on_commit=committed)
     run = rehearse(text, "fleet.yaml", WARM_TICKS + ticks, 1, settings=settings, prepare=prepare)
     assert all(answer.accepted for answer in run.answers.values()), run.answers
-    return [(after - before) / 1e3 for before, after in zip(times, times[1:], strict=False)]
+    return [(after - before) / 1e3 for before, after in pairwise(times)]
 
 
 def spares(seconds: float = 30.0, pairs: int = 3) -> list[Spares]:
