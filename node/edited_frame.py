@@ -53,6 +53,8 @@ def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Lay
     """Have the actuators of a robot that goes out of service, or comes back, hold it where it is."""
     for one in actuators_of(spec, layout, robot):
         called(f"actuator {one.channel}", robot.name, view.tick, one.actuator.hold, view)
+        if one.jobs is not None:
+            one.jobs.drop(view)
         for field, at in robot.offsets.items():
             if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
                 numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

@@ -83,7 +83,7 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
-        self._standing = Standing(layout, self.world.actuators, self.world.ruled)
+        self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
         """Bodies that are islands by themselves, of the islands that were solved last."""
         self._divided: tuple[
@@ -199,7 +199,7 @@ class Stepper:
             return True
         for one in self.world.actuators.get(entity.index, ()):
             if one.channel == packet.channel:
-                return one.accept(packet.payload, view)
+                return one.accept(packet.payload, view, packet.source)
         return False
 
     def solve(self, engine: AnyEngine, work: Work) -> None:
@@ -221,6 +221,7 @@ class Stepper:
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick, work.values if work.start else None)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
+        world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
             self._standing.note(bodies, numbers, before)
         if not isfinite(sum(numbers)) or any(self._problem(entity, before, work) for entity in changed):

@@ -19,4 +19,6 @@ Watts: TypeAlias = Annotated[float, Meta(extra={"unit": "W"})]
 Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """Of a whole: 0 to 1."""
 Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+JobNumber: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+"""The last field of a command that may be a job (`forms.jobs`)."""
 QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
