@@ -113,35 +113,34 @@ class GoTo:
         if view.numbers[self._given.at] == 0.0 or left_m <= self._tolerance:
             return self._drive.asked(Steering(0.0, 0.0, 0.0), view)
         felt = NOTHING_FELT if self._feelers is None else self._feelers.felt(view, heading, left_m)
-        its = self._drive
-        steering = steered(left_m, shorter(atan2(y, x) - heading), felt, its.speed, its.acceleration, its.turn_rate)
-        return its.asked(steering, view)
+        bearing, its = shorter(atan2(y, x) - heading), self._drive
+        return its.asked(steered(left_m, bearing, felt, its.most, its.acceleration, its.turning), view)
 
 
 class _Base:
     """The drive of a base that goes in any direction, and turns to where it goes."""
 
     def __init__(self, robot: HolonomicRobot) -> None:
-        self.speed, self.acceleration, self.turn_rate = robot.speed, robot.acceleration, robot.turn_rate
-        self._turning = robot.acceleration / robot.radius
+        self.most = Steering(robot.speed, 0.0, robot.turn_rate)
+        self.acceleration, self.turning = robot.acceleration, robot.acceleration / robot.radius
 
     def asked(self, steering: Steering, view: View) -> Motors:
         ahead, left = steering.speed * cos(steering.direction), steering.speed * sin(steering.direction)
-        return (ahead, self.acceleration), (left, self.acceleration), (steering.turning, self._turning)
+        return (ahead, self.acceleration), (left, self.acceleration), (steering.turning, self.turning)
 
 
 class _OnWheels:
     """The drive of a robot on two wheels: it turns on the spot until the place is ahead."""
 
     def __init__(self, at: Mounting) -> None:
-        self._wheels = wheels_of(at.spec, at.layout, at.robot)
-        self.speed, self.acceleration = self._wheels.speed, self._wheels.acceleration
-        self.turn_rate = self._wheels.turn_rate
+        its = self._wheels = wheels_of(at.spec, at.layout, at.robot)
+        self.most = Steering(its.speed, 0.0, its.turn_rate)
+        self.acceleration, self.turning = its.acceleration, 2.0 * its.acceleration / its.track
 
     def asked(self, steering: Steering, view: View) -> Motors:
         is_ahead = abs(steering.direction) < AHEAD_RAD
         speed = steering.speed * cos(steering.direction) if is_ahead else 0.0
         aside = steering.turning * self._wheels.track / 2.0
         left, right = speed - aside, speed + aside
-        share = min(1.0, self.speed / max(abs(left), abs(right), self.speed))
+        share = self.most.speed / max(abs(left), abs(right), self.most.speed)
         return self._wheels.asked(left * share, right * share, view)

@@ -1,8 +1,10 @@
 """How who goes to a place on the ground steers: towards it, and away from what its feelers meet. It plans nothing.
 
-The speed is that from which half of the acceleration stops at the place: v = sqrt(a d). A feeler that meets something
-at a share s of its length asks for a turn away from it by (1 - s) x 90 degrees from where the robot looks, whatever the
-place is; the nearer one of two decides, and the right one where both are as near.
+The speed is that from which half of the acceleration stops at the place, v = sqrt(a d), and the turning likewise by the
+angle that is left. A ray of a feeler that points r from ahead, and meets something at a share s of its length, lets the
+robot turn its way to that side by no more than s 90 degrees - (1 - s) (120 degrees - r): what is far away hardly
+counts, and from what it touches it goes away. The ray takes (1 - s) cos r off the speed. Where both feelers ask for
+more than there is between them, the one that asks for more decides, the left one if they ask for the same.
 """
 
 from __future__ import annotations
@@ -21,13 +23,26 @@ from foosim.world.scene import shape_box
 
 TURN_GAIN: Final = 3.0
 """rad/s of turning per rad of error."""
-AWAY_RAD: Final = pi / 2.0
+ACROSS_RAD: Final = pi / 2.0
+OFF_RAD: Final = 2.0 * pi / 3.0
+"""Where the robot has what it touches: a little behind."""
 AHEAD_RAD: Final = pi / 3.0
 """Who cannot go aside turns on the spot as long as the place is not within this ahead."""
-RAYS: Final = 7
+RAYS: Final = 13
 """Of each feeler."""
-ASIDE: Final = 1.4
-NOTHING_FELT: Final = (1.0, 1.0)
+ASIDE: Final = 1.7
+
+
+class Felt(NamedTuple):
+    """The most to the left and the least (the most to the right) that the robot may turn its way from where it looks,
+    by what its feelers meet (rad); and the share of its speed that it keeps."""
+
+    most: float
+    least: float
+    speed: float
+
+
+NOTHING_FELT: Final = Felt(pi, -pi, 1.0)
 
 
 class Steering(NamedTuple):
@@ -43,28 +58,26 @@ def shorter(angle: float) -> float:
     return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
 
 
-def steered(
-    left_m: float, bearing: float, felt: tuple[float, float], speed: float, acceleration: float, turn_rate: float
-) -> Steering:
+def steered(left_m: float, bearing: float, felt: Felt, most: Steering, acceleration: float, turning: float) -> Steering:
     """Return how to go to a place `left_m` away, at a bearing from where the robot looks (rad).
 
-    `felt` is at which share of its length the left feeler meets something, and the right one; 1 for nothing.
+    `most` are the greatest speed and turn rate; the accelerations are along its way (m/s2) and of its turning (rad/s2).
     """
-    nearest = min(felt)
-    if nearest < 1.0:
-        aside = (1.0 - nearest) * AWAY_RAD
-        bearing = -aside if felt[0] <= felt[1] else aside
-    turning = min(max(TURN_GAIN * bearing, -turn_rate), turn_rate)
-    return Steering(min(speed, sqrt(acceleration * left_m)) * nearest, bearing, turning)
+    if felt.least <= felt.most:
+        bearing = min(max(bearing, felt.least), felt.most)
+    else:
+        bearing = felt.most if -felt.most >= felt.least else felt.least
+    rate = min(TURN_GAIN * abs(bearing), sqrt(turning * abs(bearing)), most.turning)
+    speed = min(most.speed, sqrt(acceleration * left_m)) * felt.speed
+    return Steering(speed, bearing, rate if bearing > 0.0 else -rate)
 
 
 class Feelers:
     """The two feelers of one robot: level fans of rays from the middle of its hull, from ahead to the left and to the
-    right as far as across.
+    right, as far as 120 degrees.
 
     A ray goes as far as the feelers are long, and no farther aside than `ASIDE` times the hull's half width: what the
-    robot would pass does not count. A feeler meets what the ray does that meets something at the least share of its
-    length.
+    robot would pass does not count. It meets something at a share of the way from the hull to its end.
     """
 
     def __init__(self, at: Mounting, length: float) -> None:
@@ -73,18 +86,23 @@ class Feelers:
         self._mount = Mounted(at, mounted_at(hull_middle(hull)))
         self._around, self._robot = Surroundings(at.spec, at.layout), at.robot
         (lx, ly, _), (hx, hy, _) = shape_box(hull.shapes[0])
-        aside = ASIDE * max(hx - lx, hy - ly) / 2.0
-        self._turns = [AWAY_RAD * ray / (RAYS - 1) for ray in range(RAYS)]
-        reaches = [min(length, aside / max(sin(turn), aside / length)) for turn in self._turns]
+        self._radius = max(hx - lx, hy - ly) / 2.0
+        aside = ASIDE * self._radius
+        turns = [OFF_RAD * ray / (RAYS - 1) for ray in range(RAYS)]
+        reaches = [max(min(length, aside / max(sin(turn), aside / length)), aside) for turn in turns]
+        self._turns = [*turns, *(-turn for turn in turns)]
+        self._aside = np.array([OFF_RAD - turn for turn in turns])
         self._reaches = np.array([*reaches, *reaches])
+        self._ahead = np.array([cos(turn) for turn in self._turns])
 
-    def felt(self, view: View, heading: float, reach_m: float) -> tuple[float, float]:
-        """Return at which share of its length each meets something at the start of the tick; what is farther away than
-        `reach_m` does not count."""
+    def felt(self, view: View, heading: float, reach_m: float) -> Felt:
+        """Return what they meet at the start of the tick; what is farther away than `reach_m` does not count."""
         place, _ = self._mount.pose(view.start)
-        turns = [heading + side * turn for side in (1.0, -1.0) for turn in self._turns]
-        ways = np.array([(cos(turn), sin(turn), 0.0) for turn in turns])
+        ways = np.array([(cos(heading + turn), sin(heading + turn), 0.0) for turn in self._turns])
         reaches = np.minimum(self._reaches, reach_m)
-        hits = self._around.rays(view, np.array([place] * len(turns)), ways, reaches, ignoring=self._robot)
-        shares = np.minimum(hits.distances / self._reaches, 1.0).tolist()
-        return min(shares[:RAYS]), min(shares[RAYS:])
+        hits = self._around.rays(view, np.array([place] * len(ways)), ways, reaches, ignoring=self._robot)
+        free = (hits.distances - self._radius) / (self._reaches - self._radius)
+        shares = np.minimum(np.maximum(free, 0.0), 1.0)
+        taken = np.maximum((1.0 - shares) * self._ahead, 0.0)
+        bounds = [np.where(its < 1.0, its * ACROSS_RAD - (1.0 - its) * self._aside, pi) for its in np.split(shares, 2)]
+        return Felt(float(bounds[0].min()), -float(bounds[1].min()), 1.0 - float(taken.max()))
