@@ -235,7 +235,7 @@ def _driven(kind: str, bounds: Sequence[float]) -> World:
 
 def _going() -> dict[str, Any]:
     """The yard with robots that are sent to places, and tell how that goes."""
-    data = json.loads(json.dumps(_yard()))
+    data: dict[str, Any] = json.loads(json.dumps(_yard()))
     for name in ("one", "two", "base"):
         data["robots"][name]["actuators"] = {"go": {"kind": "go_to", "feelers": "60 cm", "patience": "0.3 s"}}
         data["robots"][name]["sensors"] = {"sensed": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}

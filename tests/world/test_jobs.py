@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise, permutations
 from typing import Any, Final
@@ -38,7 +38,9 @@ class Silent(Player):
 
 
 @contextmanager
-def yard(robot: dict[str, Any] | None = None, drive: dict[str, Any] | None = None, **sections: Any) -> Iterator[Any]:
+def yard(
+    robot: Mapping[str, Any] | None = None, drive: Mapping[str, Any] | None = None, **sections: Any
+) -> Iterator[Simulation]:
     """A base that ann and ben may command, and eve only hears."""
     about = {"class": f"{__name__}:Silent", "rate": "100 Hz"}
     players = {ANN: {**about, "robots": {"base": ["jobs"]}}, BEN: {**about, "robots": {"base": ["jobs"]}}}
@@ -247,7 +249,7 @@ def test_a_rotorcraft_that_has_come_to_its_waypoint_is_done() -> None:
 def test_with_feelers_it_goes_round_what_is_in_its_way(model: str) -> None:
     """Without it stands before the box until its patience is over."""
     robot: dict[str, Any] = {"model": model}
-    engine = {}
+    engine: dict[str, Any] = {}
     if model == "rigid":
         robot, engine = {"model": "differential_drive", "dynamics": "rigid"}, {"engine": "mujoco", "substeps": 4}
     box = {"length": "50 cm", "width": "50 cm", "height": "50 cm", "at": {"x": "2 m", "y": "5 cm"}}
