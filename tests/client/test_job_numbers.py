@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from runpy import run_path
 from typing import Any, Final
 
 import pytest
@@ -16,6 +19,7 @@ from foosim.world.forms.jobs import JobState
 from foosim.world.sensors.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
+GUIDE: Final = Path(__file__).parents[2] / "docs" / "how-to" / "give_jobs.md"
 SCOUT: Final = {
     "model": "holonomic",
     "actuators": {"drive": {"kind": "go_to"}},
@@ -151,3 +155,15 @@ def test_a_command_that_is_none_is_refused() -> None:
     for numbers in commands:
         with pytest.raises(BadValue, match="scout/drive takes"):
             jobs().call(*numbers)
+
+
+def test_the_guides_simulation_comes_to_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocks = re.findall(r"```\w+\n# (\S+)\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    for name, text in blocks:
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert [name for name, _ in blocks] == ["scout.yaml", "send.py", "walk.py"]
+    run_path("walk.py")
+    assert re.fullmatch(r"there at [2-6]\.\d s\n", capsys.readouterr().out)
