@@ -146,7 +146,7 @@ def test_a_component_that_is_switched_off_does_nothing_until_it_is_switched_on()
             before = state_of(simulation)
             simulation.step(moves, ticks=10)
             after = state_of(simulation)
-            assert [now > then for now, then in zip(after, before, strict=True)] == [
+            assert [one > other for one, other in zip(after, before, strict=True)] == [
                 is_moving,
                 not is_moving,
                 is_measured,
