@@ -409,7 +409,8 @@ class Received(Item, frozen=True):
 class Go(Message, frozen=True):
     """Downlink `number` to a lockstep client: it is due at `tick`; these packets have reached it since its last.
 
-    A player exists since the frame of tick `since`, and is another one than before it; of its robots these are `absent`.
+    The client exists since the frame of tick `since`, as another one than before it. `absent` are those of its robots
+    that are.
     """
 
     number: Counter

@@ -27,8 +27,8 @@ Told = TypeVar("Told")
 class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64]]):  # type: ignore[misc]
     """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
 
-    `agents` are those that exist. One whose last robot is removed is terminated; when one is added it comes back, with an
-    observation.
+    `agents` are those that exist. One whose last robot is removed is terminated; when one is added it comes back, with
+    an observation.
 
     `infos` have the tick and the simulated time (`tick`, `time_s`). `metadata["render_fps"]` of an environment is the
     rate at which its agents act.
