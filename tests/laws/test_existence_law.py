@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
@@ -10,8 +10,10 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
 from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue
+from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode_any
@@ -22,6 +24,7 @@ from foosim.rehearsal.simulation import Simulation
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.replay.verify import verify_capture
+from foosim.replay.what_if import what_if
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
 from foosim.vhub.state.records import Closing
 from tests.kinematic_yard import yard_text
@@ -39,8 +42,12 @@ HERE: Final[Mapping[str, tuple[tuple[int, int], ...]]] = {
 """From which frame on a cart is present, and from which one on it is not. cart-3 and cart-4 are spares."""
 
 
-def changes() -> list[tuple[int, str, str]]:
-    """Tick, verb and name of what leads to these frames."""
+Change = tuple[int, str, str]
+"""Tick, verb and name."""
+
+
+def changes() -> list[Change]:
+    """What leads to these frames."""
     spans = [(name, span) for name, spans in HERE.items() for span in spans]
     found = [(first - 1, "add", name) for name, (first, _) in spans if first]
     return sorted(found + [(last - 1, "remove", name) for name, (_, last) in spans if last < TICKS])
@@ -60,7 +67,8 @@ class Counting(Player):
         return Turn(dict.fromkeys(self.robots, command), [Packet("", "log", said)])
 
 
-def text(events: bool = True) -> str:
+def text(events: Sequence[Change]) -> str:
+    """Four carts, two of them spares, each with its pilot on board; one player of two carts, and one at arrivals."""
     path = f"{__name__}:{Counting.__name__}"
     pose = {"kind": "pose", "rate": "50 Hz"}
     about = {"class": path, "rate": "50 Hz", "lockstep": True}
@@ -80,10 +88,8 @@ def text(events: bool = True) -> str:
         ALWAYS: {**about, "hears": {"*": ["log"]}},
     }
     link = {"id": "all", "from": "*", "to": "*", "delay": "7 ms", "loss": "10 %"}
-    told = [{"at": f"{10 * tick} ms", "entity": name, verb: True} for tick, verb, name in changes()]
-    return yard_text(
-        {"cart": cart}, players=players, network={"links": [link]}, events=told if events else []
-    )
+    told = [{"at": f"{10 * tick} ms", "entity": name, verb: True} for tick, verb, name in events]
+    return yard_text({"cart": cart}, players=players, network={"links": [link]}, events=told)
 
 
 @dataclass
@@ -115,10 +121,10 @@ class Seen:
 def fly(
     nodes: int = 1,
     prepare: Callable[[System], None] | None = None,
-    events: bool = True,
+    events: Sequence[Change] | None = None,
     **chosen: Any,
 ) -> Seen:
-    seen = Seen()
+    seen, events = Seen(), changes() if events is None else events
     settings = Settings(observer=seen.watch, on_closing=seen.closings.append)
     seen.run = rehearse(text(events), "yard.yaml", TICKS, nodes, settings=settings, prepare=prepare, **chosen)
     assert seen.run.json["reason"] == "done", seen.run.json
@@ -190,22 +196,120 @@ def assert_the_same(seen: Seen) -> None:
     assert seen.fates() == usual().fates()
 
 
-def test_by_requests_it_is_the_same_as_by_events() -> None:
-    """Each request is answered with the tick of the order that has it; the run stands until that is there."""
-    asked: dict[str, tuple[int, str, str]] = {}
+def test_by_requests_it_is_the_same_as_by_events_at_their_ticks(tmp_path: Path) -> None:
+    asked: dict[str, tuple[str, str]] = {}
 
-    def ask(system: System, tick: int, verb: str, name: str) -> None:
-        asked[system.request(verb, again_ns=3_000_000, name=name)] = tick, verb, name
+    def ask(system: System, verb: str, name: str) -> None:
+        asked[system.request(verb, again_ns=3_000_000, name=name)] = verb, name
 
     def prepare(system: System) -> None:
         for tick, verb, name in changes():
-            system.at_tick(max(1, tick - 5), partial(ask, system, tick, verb, name))
+            system.at_tick(tick - 5, partial(ask, system, verb, name))
 
-    seen = fly(2, prepare, events=False)
-    answered = {identity: seen.run.answers[identity] for identity in asked}
-    assert all(answer.accepted for answer in answered.values()), answered
-    for player, carts in PLAYERS.items():
-        begun = sorted({go.since for go in seen.gos.get(player, {}).values()})
-        added = [answered[one].tick + 1 for one, (_, verb, name) in asked.items() if (verb, name) == ("add", carts[0])]
-        if len(carts) == 1:
-            assert [tick for tick in begun if tick] == added, player
+    path = tmp_path / "asked.mcap"
+    seen = fly(2, prepare, events=(), capture=path)
+    answers = seen.run.answers
+    assert all(answers[one].accepted for one in asked), answers
+    events = sorted((answers[one].tick, *what) for one, what in asked.items())
+    assert [what for _, *what in events] == [[*what] for _, *what in changes()]
+    other = fly(1, events=events)
+    assert (seen.run.digests, seen.gos, seen.fates()) == (other.run.digests, other.gos, other.fates())
+    assert verify_capture(path, 3).equal
+    assert what_if(open_capture(path)).changed == 0
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_vhub_that_is_killed_between_remove_and_add_comes_back_and_nothing_changes(
+    ending: Ending, tmp_path: Path
+) -> None:
+    """At a frame without cart-3 and one with it again, and while others are away."""
+
+    def prepare(system: System) -> None:
+        for tick in (20, 51, 52, 64, 85, 110, 135):
+            system.at_tick(tick, partial(system.kill_hub, ending, 5_000_000))
+        systems.append(system)
+
+    systems: list[System] = []
+    path = tmp_path / "killed.mcap"
+    assert_the_same(fly(2, prepare, capture=path))
+    assert verify_capture(path, 3).equal
+    assert what_if(open_capture(path)).changed == 0
+    (system,) = systems
+    assert sum(entry["name"] == "vhub" for entry in system.supervisor.result()["recoveries"]) >= 5
+
+
+@pytest.mark.parametrize("back_ms", [1, 3_000])
+def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_back(back_ms: int) -> None:
+    """The run waits for it where it is called again, not before."""
+    times: dict[int, int] = {}
+
+    def prepare(system: System) -> None:
+        def kill() -> None:
+            for name in ("pilot-4", "waits"):
+                system.kill(name)
+                system.later(back_ms * 1_000_000, partial(system.start, name))
+
+        system.at_tick(75, kill)
+        for tick in (75, 109, 120):
+            system.at_tick(tick, lambda tick=tick: times.update({tick: system.bus.now_ns}))
+
+    assert_the_same(fly(2, prepare))
+    assert times[109] - times[75] < 1_000_000, "nobody waits"
+    assert (times[120] - times[75] > 1_000_000_000) is (back_ms > 1000)
+
+
+def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
+    """In the end, either: its process is gone, and the run is done."""
+
+    def prepare(system: System) -> None:
+        system.at_tick(132, lambda: system.kill("pilot-4"))
+
+    assert_the_same(fly(2, prepare))
+
+
+def test_a_simulation_over_the_network_has_the_digests_of_the_run() -> None:
+    for agents in ([], ["pilot-2"]):
+        with Simulation(load_deployment(text(changes()), "yard.yaml"), agents=agents, network=True) as simulation:
+            found = []
+            for _ in range(TICKS):
+                simulation.step()
+                found.append(simulation.frame.digest)
+        assert (found == usual().run.digests) is not bool(agents)
+
+
+def test_without_a_network_its_players_come_and_go_as_well() -> None:
+    """At each frame the newest command is that of the call at it: as many as since the player exists."""
+    with Simulation(load_deployment(text(()), "yard.yaml"), agents=["both"]) as simulation:
+        for tick in range(TICKS):
+            for at, verb, name in changes():
+                if at == tick:
+                    getattr(simulation, verb)(name)
+            agent, its = simulation.agents["both"], spans_of("cart-3", "cart-4")
+            assert agent.exists is any(first <= tick < last for first, last in its)
+            simulation.step()
+            for player in ("pilot-1", "pilot-3"):
+                cart = player.replace("pilot", "cart")
+                spans = [first for first, last in HERE[cart] if first <= tick < last and tick + 1 < last]
+                if spans:
+                    calls = sum(at % PERIOD == 0 for at in range(spans[0], tick + 1))
+                    assert simulation.frame.vector(cart, "motion.set_point", 1) == [pytest.approx(calls / 1000.0)]
+
+
+def test_an_agent_that_comes_back_has_heard_nothing_and_commands_nothing_that_is_absent() -> None:
+    with Simulation(load_deployment(text(()), "yard.yaml"), agents=["both"]) as simulation:
+        agent = simulation.agents["both"]
+        assert not agent.exists and simulation.readings == {}
+        with pytest.raises(BadValue, match="cart-3 is absent: add it first"):
+            simulation.step({"cart-3": {"linear": 0.1, "angular": 0.0}})
+        simulation.add("cart-3")
+        simulation.step(ticks=3)
+        assert agent.exists and [*simulation.readings] == [("cart-3", "pose")]
+        with pytest.raises(BadValue, match="cart-4 is absent: add it first"):
+            simulation.step({"cart-4": {"linear": 0.1, "angular": 0.0}})
+        simulation.step({"cart-3": {"linear": 0.1, "angular": 0.0}})
+        simulation.remove("cart-3")
+        simulation.step(ticks=4)
+        assert not agent.exists and simulation.readings
+        simulation.add("cart-4")
+        simulation.step()
+        assert agent.exists and not any(robot == "cart-3" for robot, _ in simulation.readings)
