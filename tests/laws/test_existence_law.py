@@ -16,8 +16,8 @@ from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.codec import decode_any
-from foosim.protocol.messages import Go
+from foosim.protocol.codec import decode, decode_any
+from foosim.protocol.messages import Deliveries, Go
 from foosim.rehearsal.journals import ENDINGS, Ending
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.simulation import Simulation
@@ -25,8 +25,14 @@ from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
+from foosim.vhub.network.memory import Joining
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
-from foosim.vhub.state.records import Closing
+from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.edits import written
+from foosim.world.frame import Frame
+from foosim.world.setting.settable import add_edit
 from tests.kinematic_yard import yard_text
 
 TICKS: Final = 140
@@ -75,7 +81,13 @@ def text(events: Sequence[Change]) -> str:
     cart = {"model": "differential_drive", "count": 2, "spare": 2, "spacing": {"y": "3 m"}, "sensors": {"pose": pose}}
     players = {
         "pilot-$1": {**about, "each": "cart-*", "on": "$robot", "robots": {"$robot": ["pose"]}},
-        "both": {**about, "rate": "25 Hz", "robots": {"cart-3": ["pose"], "cart-4": ["pose"]}, "process": "one"},
+        "both": {
+            **about,
+            "rate": "25 Hz",
+            "offset": "10 ms",
+            "robots": {"cart-3": ["pose"], "cart-4": ["pose"]},
+            "process": "one",
+        },
         "waits": {
             **about,
             "rate": "5 Hz",
@@ -153,9 +165,9 @@ PLAYERS: Final = {
 def test_it_is_called_while_a_robot_of_its_own_is_there_and_each_time_is_another_one(
     player: str, carts: tuple[str, ...]
 ) -> None:
-    seen, period = usual(), 2 * PERIOD if player == "both" else PERIOD
+    seen, (period, offset) = usual(), (2 * PERIOD, 1) if player == "both" else (PERIOD, 0)
     spans = spans_of(*carts)
-    turns = [[tick for tick in range(first, last) if tick % period == 0] for first, last in spans]
+    turns = [[tick for tick in range(first, last) if tick % period == offset] for first, last in spans]
     assert [*seen.gos[player]] == [tick for ticks in turns for tick in ticks], "no Go while it does not exist"
     for (first, _), ticks in zip(spans, turns, strict=True):
         for number, tick in enumerate(ticks, 1):
@@ -267,14 +279,64 @@ def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
     assert_the_same(fly(2, prepare))
 
 
+def quiet(events: Sequence[Change]) -> str:
+    """Two carts that measure nothing, the second one a spare, with a pilot at 10 Hz and a player at arrivals or 20 Hz."""
+    about = {"class": f"{__name__}:{Counting.__name__}", "lockstep": True}
+    cart = {"model": "differential_drive", "count": 1, "spare": 1, "spacing": {"y": "3 m"}}
+    calls = {"act": "arrival", "arrivals": {"pilot-2": ["log"]}, "hears": {"pilot-2": ["log"]}}
+    players = {
+        "pilot-1": {**about, "rate": "1 Hz", "robots": {"cart-1": []}},
+        "pilot-2": {**about, "rate": "10 Hz", "robots": {"cart-2": []}},
+        "waits": {**about, "rate": "20 Hz", "robots": {"cart-2": []}, **calls},
+    }
+    told = [{"at": f"{10 * tick} ms", "entity": name, verb: True} for tick, verb, name in events]
+    return yard_text({"cart": cart}, players=players, events=told)
+
+
+@pytest.mark.parametrize("nodes", [1, 2])
+def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(nodes: int) -> None:
+    """Deliveries are final ahead where nobody can send: not beyond a tick at which somebody may come and act."""
+    seen, final = Seen(), []
+    settings = Settings(observer=seen.watch)
+    settings.on_journal = lambda name, record: final.append(record) if name == "vhub" else None
+    changed = [(53, "add", "cart-2"), (76, "remove", "cart-2"), (86, "add", "cart-2")]
+    rehearse(quiet(changed), "yard.yaml", TICKS, nodes, settings=settings)
+    closed = [record for raw in final if isinstance(record := decode_any(HubRecord, raw), TickRecord)]
+    ahead = [decode(Deliveries, record.deliveries).following for record in closed]
+    assert max(ahead[:50]) >= 3, "else this test shows nothing"
+    assert [*seen.gos["pilot-2"]] == [60, 70, 90, 100, 110, 120, 130]
+    assert [*seen.gos["waits"]][:3] == [59, 61, 66], "5 ticks after it exists, or at what it hears"
+    assert {go.since for go in seen.gos["waits"].values()} == {54, 87}
+
+
+def test_who_leaves_and_comes_back_exists_since_it_did_and_who_missed_an_add_is_another() -> None:
+    """Of the vHub's state: a process that was cut off has its memory, and is told whether that counts."""
+    deployment = load_deployment(quiet(()), "yard.yaml")
+    state, frame = HubState(deployment), initial_frame(deployment)
+    layout, absent = frame.layout, frame.numbers
+    there = written(layout, absent, [add_edit(deployment, layout, absent, layout["cart-2"], None)])
+    joining = Joining("pilot-2", 1, [], 0)
+    found = []
+    for tick, numbers in enumerate((absent, there, there, there, absent, there, there)):
+        if tick in (0, 3, 6):
+            state.join(joining, tick)
+        if tick in (2, 4):
+            state.leave("pilot-2")
+        frame = Frame(tick, layout, None, numbers=[*numbers])
+        state.close_world(frame, [], [])
+        found.append((state.members["pilot-2"].since, state.due_members(tick) == ["pilot-2"]))
+        state.close_clients(frame, {}, [])
+        state = HubState.restore(deployment, state.snapshot())
+    assert found == [(-1, False), (1, True), (1, False), (1, True), (-1, False), (5, False), (5, True)]
+
+
 def test_a_simulation_over_the_network_has_the_digests_of_the_run() -> None:
-    for agents in ([], ["pilot-2"]):
-        with Simulation(load_deployment(text(changes()), "yard.yaml"), agents=agents, network=True) as simulation:
-            found = []
-            for _ in range(TICKS):
-                simulation.step()
-                found.append(simulation.frame.digest)
-        assert (found == usual().run.digests) is not bool(agents)
+    with Simulation(load_deployment(text(changes()), "yard.yaml"), agents=[], network=True) as simulation:
+        found = []
+        for _ in range(TICKS):
+            simulation.step()
+            found.append(simulation.frame.digest)
+    assert found == usual().run.digests
 
 
 def test_without_a_network_its_players_come_and_go_as_well() -> None:
