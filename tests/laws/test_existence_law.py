@@ -255,6 +255,9 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
     """The run waits for it where it is called again, not before."""
     times: dict[int, int] = {}
 
+    def look(system: System, tick: int) -> None:
+        times[tick] = system.bus.now_ns
+
     def prepare(system: System) -> None:
         def kill() -> None:
             for name in ("pilot-4", "waits"):
@@ -263,7 +266,7 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
 
         system.at_tick(75, kill)
         for tick in (75, 109, 120):
-            system.at_tick(tick, lambda tick=tick: times.update({tick: system.bus.now_ns}))
+            system.at_tick(tick, partial(look, system, tick))
 
     assert_the_same(fly(2, prepare))
     assert times[109] - times[75] < 1_000_000, "nobody waits"
@@ -280,7 +283,7 @@ def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
 
 
 def quiet(events: Sequence[Change]) -> str:
-    """Two carts that measure nothing, the second one a spare, with a pilot at 10 Hz and a player at arrivals or 20 Hz."""
+    """Two carts that measure nothing, the second one a spare, with a pilot and a player that acts at arrivals."""
     about = {"class": f"{__name__}:{Counting.__name__}", "lockstep": True}
     cart = {"model": "differential_drive", "count": 1, "spare": 1, "spacing": {"y": "3 m"}}
     calls = {"act": "arrival", "arrivals": {"pilot-2": ["log"]}, "hears": {"pilot-2": ["log"]}}
@@ -359,19 +362,21 @@ def test_without_a_network_its_players_come_and_go_as_well() -> None:
 
 def test_an_agent_that_comes_back_has_heard_nothing_and_commands_nothing_that_is_absent() -> None:
     with Simulation(load_deployment(text(()), "yard.yaml"), agents=["both"]) as simulation:
-        agent = simulation.agents["both"]
-        assert not agent.exists and simulation.readings == {}
+        agents = simulation.agents
+        assert agents["both"].since == -1 and simulation.readings == {}
         with pytest.raises(BadValue, match="cart-3 is absent: add it first"):
             simulation.step({"cart-3": {"linear": 0.1, "angular": 0.0}})
         simulation.add("cart-3")
         simulation.step(ticks=3)
-        assert agent.exists and [*simulation.readings] == [("cart-3", "pose")]
+        assert agents["both"].since == 1 and [*simulation.readings] == [("cart-3", "pose")]
         with pytest.raises(BadValue, match="cart-4 is absent: add it first"):
             simulation.step({"cart-4": {"linear": 0.1, "angular": 0.0}})
         simulation.step({"cart-3": {"linear": 0.1, "angular": 0.0}})
         simulation.remove("cart-3")
         simulation.step(ticks=4)
-        assert not agent.exists and simulation.readings
+        assert agents["both"].since == -1 and simulation.readings, "the last ones"
         simulation.add("cart-4")
         simulation.step()
-        assert agent.exists and not any(robot == "cart-3" for robot, _ in simulation.readings)
+        assert agents["both"].since == simulation.tick and not any(
+            robot == "cart-3" for robot, _ in simulation.readings
+        )
