@@ -69,10 +69,10 @@ def check_component(
 ) -> None:
     """Check that a form obeys the laws, in a deployment that uses it.
 
-    Rehearses on one, two and three nodes with moved robots and objects made anew, in another process, with all named
-    in another order, beside a robot that does nothing and beside a second one of each sensor; compares sensors alone
-    with many at once. Prints what differs, with tick and slot. On a terminal, standard error has the rehearsal that it
-    is in.
+    Rehearses on one, two and three nodes with moved robots and objects made anew, with everything leaving and coming
+    back, in another process, with all named in another order, beside a robot that does nothing and beside a second one
+    of each sensor; compares sensors alone with many at once. Prints what differs, with tick and slot. On a terminal,
+    standard error has the rehearsal that it is in.
 
     Exit codes: 0 nothing differs, 1 something does, 2 bad input, 130 Ctrl-C.
     """

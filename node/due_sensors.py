@@ -26,7 +26,8 @@ class Turn(NamedTuple):
 class DueSensors:
     """The sensors of some robots of one layout.
 
-    Sensors that are due at one tick are due together again: what follows from who they are is kept.
+    Sensors that are due at one tick are due together again: what follows from who they are is kept while the same
+    robots are in service.
     """
 
     def __init__(self, robots: Sequence[Entity], sensors: Mapping[str, Sequence[FittedSensor]]) -> None:
@@ -37,12 +38,18 @@ class DueSensors:
         self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._turns: dict[tuple[bool, ...], Turn] = {}
+        """Of those who are in service now."""
+        self._out = [0.0] * len(robots)
+        """Who was out of service when they were made."""
 
     def at(self, tick: int, numbers: Sequence[float]) -> Turn:
         """Return who measures at a tick, at whose start the numbers of the frame are these."""
         value = numbers.__getitem__
-        if any(map(value, self._down)) or any(map(value, self._speaks)):
+        if any(map(value, self._speaks)):
             return self._turn(tick, numbers)
+        out = [*map(value, self._down)]
+        if out != self._out:
+            self._turns, self._out = {}, out
         due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])
         turn = self._turns.get(due)
         if turn is None:

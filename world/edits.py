@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
 from typing import Annotated, Final
+from zlib import crc32
 
 from msgspec import Meta
 
@@ -18,8 +19,10 @@ FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX
 """Characters of a field: the names of a component, of a modifier of it, and of a slot, and two points."""
 
 PARKED_Z_M: Final = -1e6
-PARKED_APART_M: Final = 1000.0
-"""What is absent is so far below the world, and so far from the next: nothing that looks at places finds it."""
+PARKED_APART_M: Final = 100.0
+PARKED_MAX: Final = 1 << 16
+"""What is absent is so far below the world that nothing that looks at places finds it, and where its name says: in
+any company at one place, and hardly ever two at the same."""
 
 
 class Add(Message, frozen=True):
@@ -117,12 +120,12 @@ def counters(entity: Entity) -> list[int]:
 
 
 def parked(layout: Layout, entity: Entity) -> list[float]:
-    """Return the numbers of an entity that is absent: it is far below all others, and far from the next one that is."""
+    """Return the numbers of an entity that is absent."""
     found = [0.0] * (entity.stop - entity.start)
     for field, first, values in (
         (ABSENT, 0, (1.0,)),
         (DOWN, 0, (1.0,)),
-        ("position", 0, (PARKED_APART_M * (entity.index + 1), 0.0, PARKED_Z_M)),
+        ("position", 0, (PARKED_APART_M * (1 + crc32(entity.name.encode()) % PARKED_MAX), 0.0, PARKED_Z_M)),
         ("orientation", 3, (1.0,)),
         ("contacts", 2, (-1.0,)),
     ):

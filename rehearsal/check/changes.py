@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
-from foosim.deployment.loader import expanded_text
+from foosim.deployment.loader import expanded_text, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
+from foosim.world.layout import build_layout
+
+COMING_MAX: Final = 64
+"""Entities that leave and come back in a check."""
 
 
 class BystanderRobot(RobotSettings):
@@ -48,6 +52,24 @@ def changed(text: str, name: str) -> Iterator[tuple[str, str]]:
     twice = {robot: about | {"sensors": _twice(about.get("sensors") or {})} for robot, about in robots.items()}
     if any(about["sensors"] for about in twice.values()):
         yield "beside a second one of each sensor", write_yaml({**data, "robots": twice})
+
+
+def with_comings(text: str, name: str, ticks: int, files: Mapping[str, bytes]) -> str | None:
+    """Return the deployment with events that remove what can leave, one after the other, and add it again; None where
+    nothing can. `files` are the contents of the files that it names, by path."""
+    deployment = load_deployment(text, name).with_assets(files)
+    layout = build_layout(deployment)
+    leaving = [entity.name for entity in layout.entities if entity.can_leave][:COMING_MAX]
+    tree, _ = read_tree(expanded_text(text, name), locate_in(name))
+    assert tree is not None, "checked"
+    data: Any = plain(tree)
+    events = []
+    for number, entity in enumerate(leaving):
+        gone = 1 + ticks // 4 + number % max(1, ticks // 4)
+        for tick, verb in ((gone, "remove"), (gone + 1 + ticks // 4, "add")):
+            at = f"{tick * deployment.tick_ns / 1e6:.4f} ms"
+            events.append({"at": at, "entity": entity, verb: True})
+    return write_yaml({**data, "events": [*data.get("events", []), *events]}) if events else None
 
 
 def _reversed(data: Any) -> Any:

@@ -16,7 +16,7 @@ from typing import Any, Final
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.changes import changed
+from foosim.rehearsal.check.changes import changed, with_comings
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.assembly.used_forms import forms_of
@@ -84,7 +84,8 @@ class ComponentCheck:
     def __post_init__(self) -> None:
         self._begun = 0
         self._changed = list(changed(self.text, self.name))
-        self.count = 1 + len(NODES) + len(self._changed) + 1
+        self._coming = with_comings(self.text, self.name, self.ticks, self.files)
+        self.count = 1 + len(NODES) + len(self._changed) + (0 if self._coming is None else 2) + 1
         """The rehearsals, with that of another process."""
 
     def begin(self, what: str) -> None:
@@ -109,6 +110,8 @@ class ComponentCheck:
             if many.json["failed"] or many.digests != first.digests:
                 where = _first_difference(alone, frames) or str(many.json["reason"])
                 yield f"{shared} the world is another one: {where}"
+        if self._coming is not None:
+            yield from self._with_comings(self._coming)
         fitted, found = _Fitted(self.text, self.name, self.files), _Compared()
         try:
             for frame in alone:
@@ -129,6 +132,18 @@ class ComponentCheck:
             where = where or _first_other_reading(fitted, alone, _Fitted(other, self.name, self.files), frames)
             if beside.json["failed"] or where:
                 yield f"{what} the world is another one: {where or beside.json['reason']}"
+
+    def _with_comings(self, text: str) -> Iterator[str]:
+        """Yield where the world on several nodes is another one than on one while everybody leaves and comes back."""
+        self.begin("on one node, where everything leaves and comes back")
+        first, alone = self._rehearsed(text, 1)
+        nodes = NODES[-1]
+        what = f"on {nodes} nodes, where everything leaves and comes back,"
+        self.begin(what.removesuffix(","))
+        many, frames = self._rehearsed(text, nodes, partial(_shuffle, seed=self.seed, ticks=self.ticks))
+        if first.json["failed"] or many.digests != first.digests:
+            where = _first_difference(alone, frames) or str(first.json["reason"])
+            yield f"{what} the world is another one: {where}"
 
     def _rehearsed(
         self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_watched: bool = False

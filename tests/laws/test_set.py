@@ -203,8 +203,8 @@ def ask(system: System, asked: list[str], name: str, field: str, value: object) 
 @pytest.mark.parametrize(
     ("event", "why"),
     [
-        ({"at": "1 s", "entity": "c-*", "set": {"at": "0,0"}}, "events[0].entity: no robot and no object matches"),
-        ({"at": "1 s", "choose": "3 of w-*", "set": {"down": True}}, "events[0].choose: 2 robots and objects match"),
+        ({"at": "1 s", "entity": "c-*", "set": {"at": "0,0"}}, "events[0].entity: no entity matches"),
+        ({"at": "1 s", "choose": "3 of w-*", "set": {"down": True}}, "events[0].choose: 2 entities match"),
         ({"at": "1 s", "choose": "w-1", "set": {"down": True}}, "no choice, such as `2 of rover-*`"),
         ({"at": "1 s", "entity": "b-*", "set": {"down": True}}, "events[0].set.down: not settable on b-0"),
         ({"at": "1 s", "entity": "k-1", "set": {"battery.charge": "2 J"}}, "events[0].set.battery.charge: not a"),

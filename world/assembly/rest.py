@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.world.components.drives import Drives
-from foosim.world.edits import Add, Edit, Remove, Set
+from foosim.world.edits import Edit, Remove, Set
 from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -74,7 +74,7 @@ def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> N
     """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order puts
     something elsewhere, or takes it away: they may have leaned on it."""
     old = before.numbers
-    if any(isinstance(edit, Add | Remove) or (isinstance(edit, Set) and edit.field == "position") for edit in edits):
+    if any(isinstance(edit, Remove) or (isinstance(edit, Set) and edit.field == "position") for edit in edits):
         for entity in before.layout.resting:
             numbers[entity.offsets[STILL_TICKS]] = 0.0
     for entity in before.layout.resting:
