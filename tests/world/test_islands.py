@@ -54,7 +54,9 @@ def numbers_with(layout: Layout, balls: Mapping[str, Position], deployment: Depl
 
 
 def islands(layout: Layout, balls: Mapping[str, Position], deployment: Deployment = DEPLOYMENT) -> list[set[str]]:
-    numbers, reach = numbers_with(layout, balls, deployment), table_reach_of(deployment, layout)
+    numbers = numbers_with(layout, balls, deployment)
+    absent = [entity.index for entity in layout.entities if entity.is_absent(numbers)]
+    reach = table_reach_of(deployment, layout).without(absent)
     found = islands_of(numbers, reach, touching_of(numbers, reach))
     return [{layout.entities[index].name for index in island.entities} for island in found]
 

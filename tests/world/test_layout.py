@@ -65,19 +65,19 @@ def with_spares(count: int) -> Deployment:
 
 
 def test_spares_are_in_the_layout_from_the_start_and_the_ball_never_leaves() -> None:
-    layout = build_layout(with_spares(2))
-    assert {*layout.names} == {*LAYOUT.names, "ball-2", "ball-3"} and layout.spares == {"ball-2", "ball-3"}
-    assert [entity.name for entity in layout.entities if entity.can_leave] == ["ball-2", "ball-3"]
-    assert not LAYOUT.spares and not any(entity.can_leave for entity in LAYOUT.entities)
+    none = build_layout(with_spares(0))
+    assert not none.spares and not any(entity.can_leave for entity in none.entities)
+    assert {*LAYOUT.names} == {*none.names, "ball-2", "ball-3"} and LAYOUT.spares == {"ball-2", "ball-3"}
+    assert [entity.name for entity in LAYOUT.entities if entity.can_leave] == ["ball-2", "ball-3"]
 
 
 def test_the_table_has_its_entities() -> None:
-    assert set(LAYOUT.names) == {BALL, WORLD, *DEPLOYMENT.robots}
+    assert set(LAYOUT.names) == {BALL, *LAYOUT.spares, WORLD, *DEPLOYMENT.robots}
     assert [entity.name for entity in LAYOUT.of("rod")] == sorted(
         name for name in DEPLOYMENT.robots if name != "camera"
     )
     assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
-    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL]
+    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL, "ball-2", "ball-3"]
     assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
     models = [find_model(name) for name in names("model")]
     assert {model.name for model in models if model.is_solved and model.is_robot and model.kit} == {"rod", "rover"}
@@ -154,8 +154,8 @@ def test_every_difference_has_another_digest() -> None:
     ]
     layouts = [
         LAYOUT,
+        build_layout(with_spares(0)),
         build_layout(with_spares(1)),
-        build_layout(with_spares(2)),
         Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.declared),
         *(
             Layout(LAYOUT.models, replace(LAYOUT.declared, carried={**LAYOUT.declared.carried, "red.goal": other}))
