@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import bodies, distributed, env, fleet, lateness, machine, realtime, table_one_process, verdict
+from bench import bodies, distributed, env, fleet, lateness, machine, realtime, spares, table_one_process, verdict
 from bench.runs import BenchError
 
 
@@ -45,6 +45,7 @@ BENCHES: Final = (
         distributed.lines,
     ),
     Bench("realtime", "the table as processes in real time", with_default(realtime.realtime), realtime.lines),
+    Bench("spares", "what is absent, and what comes", with_default(spares.spares), spares.lines),
     Bench("fleet", "kinematic robots with their poses, in one process", with_default(fleet.fleet), fleet.lines),
     Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),

@@ -30,8 +30,9 @@ from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
+from foosim.world.forms.forms import INACTIVE
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
 from foosim.world.setting.scheduled import Schedule
@@ -97,7 +98,8 @@ class Stepper:
         """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
-        self._due = DueSensors((), self._sensors)
+        self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
+        self._due = DueSensors((), self._sensors, self._switches)
         self._sensing = Sensing()
         self._waiting = [
             (layout.entities[index], one)
@@ -119,7 +121,7 @@ class Stepper:
         """
         tick, numbers = frame.tick, frame.numbers
         if self._due.robots is not robots and self._due.robots != robots:
-            self._due = DueSensors(robots, self._sensors)
+            self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view)
@@ -199,7 +201,8 @@ class Stepper:
             return True
         for one in self.world.actuators.get(entity.index, ()):
             if one.channel == packet.channel:
-                return one.accept(packet.payload, view)
+                off = int(view.numbers[entity.offsets[INACTIVE]])
+                return not off & self._switches[entity.name][one.channel] and one.accept(packet.payload, view)
         return False
 
     def solve(self, engine: AnyEngine, work: Work) -> None:

@@ -24,7 +24,7 @@ def edit_text(edit: EditRow) -> str:
 def _set_text(edit: EditRow) -> str:
     """Return a description of a field that is set; empty for what comes with a place."""
     if edit.field == DOWN:
-        return f"{edit.name} is {'out of' if edit.numbers == [1.0] else 'in'} service"
+        return f"{edit.name} is {'in' if edit.numbers == [0.0] else 'out of'} service"
     if edit.field == "position":
         return f"put {edit.name} at {_vector(edit.numbers)} m"
     return "" if edit.field in WITH_A_PLACE else f"set {edit.name} {edit.field} to {_vector(edit.numbers)}"

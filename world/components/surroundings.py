@@ -84,10 +84,7 @@ class Surroundings:
     @property
     def caster(self) -> Caster:
         """The ray caster of the layout, which all forms of it share."""
-        _, found = self._layout.shared.get(id(self._spec), (None, None))
-        if found is None:
-            found = self._made_caster()
-            self._layout.shared[id(self._spec)] = self._spec, found
+        found = self._layout.shared("caster", self._spec, self._made_caster)
         assert isinstance(found, Caster)
         return found
 

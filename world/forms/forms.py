@@ -123,6 +123,9 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
 
 ABSENT: Final = "absent"
 """The slot of each entity that has a place: 1 of one that is not in the world, 0 of one that is."""
+INACTIVE: Final = "inactive"
+"""The slot of each robot with components that says which are switched off: a bit for each of its sensors and actuators,
+the lowest for the first by name."""
 DOWN: Final = "down"
 OF_ROBOTS: Final = (DOWN, "refused", "clamped")
 """Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""

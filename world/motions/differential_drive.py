@@ -8,7 +8,7 @@ its wheels slipping.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -20,8 +20,8 @@ from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
 from foosim.world.moving.asked import asked_of
-from foosim.world.moving.columns import Columns
-from foosim.world.moving.wheels import wheels_of
+from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.wheels import Wheels, wheels_of
 
 STATE: Final = (
     "position",
@@ -40,13 +40,16 @@ STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
 class _Batch:
     """Robots that one node moves in a tick."""
 
-    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+    def __init__(
+        self, way: FreeWay, state: EntityColumns, wheels: Mapping[int, Wheels], entities: Sequence[Entity]
+    ) -> None:
+        """`wheels` are by the entities' indices."""
         self.entities = list(entities)
-        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
+        self.state = state.of(entities)
         self.movers = way.movers(entities, is_level=True)
-        wheels = [wheels_of(at.spec, at.layout, entity) for entity in entities]
-        self.track = np.array([its.track for its in wheels])
-        self.rolls = np.array([[1.0 - its.slips[0], 1.0 - its.slips[1]] for its in wheels])
+        its = [wheels[entity.index] for entity in entities]
+        self.track = np.array([one.track for one in its])
+        self.rolls = np.array([[1.0 - one.slips[0], 1.0 - one.slips[1]] for one in its])
 
 
 @motion("differential_drive", needs=STATE, writes=STATE)
@@ -56,16 +59,20 @@ class DifferentialDrive:
     takes_arrays: Final = True
 
     def __init__(self, at: MotionMounting) -> None:
-        self._at = at
         self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
         self._substeps = at.spec.substeps
         self._way = FreeWay(at)
-        self._batch = _Batch(at, self._way, at.entities)
+        self._state = EntityColumns(at, STATE)
+        self._wheels = {entity.index: wheels_of(at.spec, at.layout, entity) for entity in at.entities}
+        self._batch = self._batch_of(at.entities)
+
+    def _batch_of(self, entities: Sequence[Entity]) -> _Batch:
+        return _Batch(self._way, self._state, self._wheels, entities)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors] | Floats, view: SolvingView) -> None:
         """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
         if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, entities)
+            self._batch = self._batch_of(entities)
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, heading = state[:, 0:3].copy(), state[:, 13].copy()

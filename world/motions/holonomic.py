@@ -19,7 +19,7 @@ from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import along_arcs, approached, approached_together
 from foosim.world.moving.asked import asked_of
-from foosim.world.moving.columns import Columns
+from foosim.world.moving.columns import EntityColumns
 
 STATE: Final = (
     "position",
@@ -37,9 +37,9 @@ STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 class _Batch:
     """Bases that one node moves in a tick."""
 
-    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+    def __init__(self, way: FreeWay, state: EntityColumns, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
-        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
+        self.state = state.of(entities)
         self.movers = way.movers(entities, is_level=True)
 
 
@@ -48,11 +48,11 @@ class HolonomicMotion:
     """In any direction, along arcs, as far as nothing is in the way."""
 
     def __init__(self, at: MotionMounting) -> None:
-        self._at = at
         self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
         self._substeps = at.spec.substeps
         self._way = FreeWay(at)
-        self._batch = _Batch(at, self._way, at.entities)
+        self._state = EntityColumns(at, STATE)
+        self._batch = _Batch(self._way, self._state, at.entities)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these bases by a tick.
@@ -61,7 +61,7 @@ class HolonomicMotion:
         acceleration (m/s2, rad/s2); that of the first holds for the vector of the first two.
         """
         if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, entities)
+            self._batch = _Batch(self._way, self._state, entities)
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()

@@ -26,7 +26,7 @@ from foosim.world.layout import Entity
 from foosim.world.models.rotorcraft import RotorcraftRobot
 from foosim.world.moving.arcs import Floats, approached, approached_together, shorter, upright_turn, wrapped
 from foosim.world.moving.asked import asked_of
-from foosim.world.moving.columns import Columns
+from foosim.world.moving.columns import EntityColumns
 
 STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "arrived", "blocked")
 """The fields that this motion writes."""
@@ -40,9 +40,9 @@ ARRIVED_M: Final = 1e-6
 class _Batch:
     """Rotorcraft that one node moves in a tick."""
 
-    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+    def __init__(self, at: MotionMounting, way: FreeWay, state: EntityColumns, entities: Sequence[Entity]) -> None:
         self.entities = list(entities)
-        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
+        self.state = state.of(entities)
         self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.acceleration = np.array([its.acceleration for its in robots if isinstance(its, RotorcraftRobot)])
@@ -58,7 +58,8 @@ class RotorcraftMotion:
         self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
         self._substeps = at.spec.substeps
         self._way = FreeWay(at)
-        self._batch = _Batch(at, self._way, at.entities)
+        self._state = EntityColumns(at, STATE)
+        self._batch = _Batch(at, self._way, self._state, at.entities)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these rotorcraft by a tick.
@@ -67,7 +68,7 @@ class RotorcraftMotion:
         one without a waypoint, which brakes.
         """
         if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, entities)
+            self._batch = _Batch(self._at, self._way, self._state, entities)
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, velocity, heading = state[:, 0:3].copy(), state[:, 7:10].copy(), state[:, 13].copy()

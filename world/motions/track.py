@@ -18,7 +18,7 @@ from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.models.mover import MoverRobot
 from foosim.world.moving.arcs import Floats, shorter, upright_turn
-from foosim.world.moving.columns import Columns
+from foosim.world.moving.columns import EntityColumns
 
 STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "blocked")
 """The fields that this motion writes."""
@@ -27,10 +27,12 @@ STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity"
 class _Batch:
     """Things that one node moves in a tick."""
 
-    def __init__(self, at: MotionMounting, way: FreeWay, entities: Sequence[Entity]) -> None:
+    def __init__(
+        self, at: MotionMounting, way: FreeWay, state: EntityColumns, clock: EntityColumns, entities: Sequence[Entity]
+    ) -> None:
         self.entities = list(entities)
-        self.state = Columns([[at.slot(entity, field) for field in STATE] for entity in entities])
-        self.clock = Columns([[at.slot(entity, "clock")] for entity in entities])
+        self.state = state.of(entities)
+        self.clock = clock.of(entities)
         self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
@@ -45,12 +47,14 @@ class Track:
         self._at = at
         self._tick_s = at.spec.tick_ns / 1e9
         self._way = FreeWay(at)
-        self._batch = _Batch(at, self._way, at.entities)
+        self._state = EntityColumns(at, STATE)
+        self._clock = EntityColumns(at, ("clock",))
+        self._batch = _Batch(at, self._way, self._state, self._clock, at.entities)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these things by a tick; they have no motors."""
         if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, entities)
+            self._batch = _Batch(self._at, self._way, self._state, self._clock, entities)
         batch, tick_s = self._batch, self._tick_s
         state, clocks = batch.state.read_at_start(view), batch.clock.read_at_start(view)[:, 0].tolist()
 

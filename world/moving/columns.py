@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from operator import itemgetter
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.world.components.entities import MotionMounting
 from foosim.world.components.view import Slot, SolvingView, WritableView
+from foosim.world.layout import Entity
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -19,18 +22,31 @@ class Columns:
 
     def __init__(self, rows: Sequence[Sequence[Slot]]) -> None:
         places = [place for slots in rows for slot in slots for place in range(slot.at, slot.at + slot.size)]
-        self._count = len(rows)
         self.width = len(places) // len(rows)
         assert all(sum(slot.size for slot in slots) == self.width for slots in rows), rows
-        self._numbers: Callable[[Sequence[float]], Any] = itemgetter(*places, places[0])
-        """With the first one once more, so that there are always several."""
-        self._places = np.array(places).reshape(self._count, self.width)
         self._rows = [tuple(slots) for slots in rows]
         runs = [_run(slots) for slots in rows]
         self._runs = [run for run in runs if run is not None] if None not in runs else []
+        self._take(np.array(places).reshape(len(rows), self.width))
+
+    def taken(self, rows: Sequence[int]) -> Columns:
+        """Return those of some of the entities, by their rows."""
+        found = copy(self)
+        found._rows = [self._rows[row] for row in rows]
+        found._runs = [self._runs[row] for row in rows] if self._runs else []
+        found._take(self._places[rows])
+        return found
+
+    def _take(self, places: NDArray[np.int64]) -> None:
+        self._count, self._places = len(places), places
+        self._numbers: Callable[[Sequence[float]], Any] | None = None
+        """With the first one once more, so that there are always several; made when it is first needed."""
 
     def read(self, numbers: Sequence[float]) -> Floats:
         """Return the numbers, of shape (entities, numbers)."""
+        if self._numbers is None:
+            places = self._places.ravel().tolist()
+            self._numbers = itemgetter(*places, places[0])
         return np.array(self._numbers(numbers)[:-1]).reshape(self._count, self.width)
 
     def read_at_start(self, view: SolvingView) -> Floats:
@@ -49,6 +65,18 @@ class Columns:
             for slot in slots:
                 view.write(slot, *row[first : first + slot.size])
                 first += slot.size
+
+
+class EntityColumns:
+    """The same fields of all entities that a motion moves: columns of any of them."""
+
+    def __init__(self, at: MotionMounting, fields: Sequence[str]) -> None:
+        self._rows = {entity.index: row for row, entity in enumerate(at.entities)}
+        self._all = Columns([[at.slot(entity, field) for field in fields] for entity in at.entities])
+
+    def of(self, entities: Sequence[Entity]) -> Columns:
+        """Return those of these entities."""
+        return self._all.taken([self._rows[entity.index] for entity in entities])
 
 
 def _run(slots: Sequence[Slot]) -> Slot | None:

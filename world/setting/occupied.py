@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -24,29 +25,40 @@ def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
 
 
 def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    standing: dict[int, Upright] = {
-        index: model.upright()
-        for index, model in models_of(spec, layout).items()
-        if hasattr(model, "upright") and "position" in layout.entities[index].offsets
-    }
-    its = standing.pop(entity.index, None)
+    made = layout.shared("uprights", spec, partial(_Standing, spec, layout))
+    assert isinstance(made, _Standing)
+    its = made.uprights.get(entity.index)
     if its is None:
         return ""
     x, y, z = _place(entity, numbers)
-    shapes = list(scenery_of(spec))
-    rows = solids([solid(shape) for shape in shapes])
+    shapes, rows = made.shapes, made.rows
     is_in = distance(*rows.beside(np.array([x]), np.array([y]))) < its.radius + rows.radius
     is_in &= (rows.low < z + its.high) & (rows.high > z + its.low)
     for shape, met in zip(shapes, is_in.tolist(), strict=True):
         if met:
             return f"the {shape.name or 'scenery'}"
-    for index, other in standing.items():
+    for index, other in made.uprights.items():
+        if index == entity.index:
+            continue
         there_x, there_y, there_z = _place(layout.entities[index], numbers)
         dx, dy, least = there_x - x, there_y - y, its.radius + other.radius
         is_level = z + its.low < there_z + other.high and there_z + other.low < z + its.high
         if dx * dx + dy * dy < least * least and is_level:
             return layout.entities[index].name
     return ""
+
+
+class _Standing:
+    """What moves by kinematics in the frames of a layout, by index, and the scenery."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        self.uprights: dict[int, Upright] = {
+            index: model.upright()
+            for index, model in models_of(spec, layout).items()
+            if hasattr(model, "upright") and "position" in layout.entities[index].offsets
+        }
+        self.shapes = list(scenery_of(spec))
+        self.rows = solids([solid(shape) for shape in self.shapes])
 
 
 def _place(entity: Entity, numbers: Sequence[float]) -> Sequence[float]:

@@ -1,5 +1,5 @@
-"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, what its rules
-declare; and the edits that set it, and that add an entity.
+"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, which of its
+components are switched off, what its rules declare; and the edits that set it, and that add an entity.
 
 A pose is set as the deployment would place it: the model places it at tick 0, elsewhere.
 """
@@ -21,9 +21,9 @@ from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
 from foosim.world.forms.failures import WrongResult
-from foosim.world.forms.forms import DOWN, NO_ENTITY
+from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Entity, Layout, find_entity_rule
+from foosim.world.layout import Entity, Layout, find_entity_rule, switches_of
 from foosim.world.parameters.vehicles import leaning
 from foosim.world.placing import At, is_placed
 from foosim.world.scene import Quaternion, Vector
@@ -31,6 +31,7 @@ from foosim.world.setting.occupied import occupied_by
 from foosim.world.spec import WorldSpec
 
 AT: Final = "at"
+ACTIVE: Final = "active"
 PLACED: Final = ("position", "orientation", "heading")
 STOPPED: Final = ("linear_velocity", "angular_velocity", "base_velocity", "wheel_speeds", "joint_velocities")
 """The fields of a state that are 0 in an entity that was put elsewhere."""
@@ -64,6 +65,8 @@ def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
         found[DOWN] = "true or false"
     if _is_placed(spec, entity):
         found[AT] = "X,Y or X,Y,Z in m, or keys of x, y, z, roll, pitch, yaw"
+    if INACTIVE in entity.offsets:
+        found |= dict.fromkeys([f"{name}.{ACTIVE}" for name in switches_of(spec.robots[entity.name])], "true or false")
     for label, _, quantities in _declared(spec, layout, entity):
         found |= {f"{label}.{name}": f"{one.low} to {one.high}" for name, one in quantities.items()}
     return found
@@ -102,6 +105,11 @@ def set_edits(
             check_place(spec, layout, written(layout, numbers, edits), entity)
         return edits
     label, _, name = field.partition(".")
+    if name == ACTIVE and INACTIVE in entity.offsets and label in (bits := switches_of(spec.robots[entity.name])):
+        if not isinstance(value, bool):
+            raise BadValue("neither true nor false", value)
+        others = int(numbers[entity.offsets[INACTIVE]]) & ~bits[label]
+        return [Set(entity.name, INACTIVE, [float(others if value else others | bits[label])])]
     found = [(made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label and name in its]
     if not found:
         fields = settable(spec, layout, entity)
