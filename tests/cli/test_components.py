@@ -103,7 +103,7 @@ TOLD: Final = {
     ],
     ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
-    ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)", "can be added: ball"],
+    ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)"],
     ("entity_rule", "battery"): ["slots: charge", "slots that are the model's where it has them: charge"],
     ("model", "differential_drive"): [
         "moved by: differential_drive",
@@ -133,7 +133,7 @@ def test_all_are_told_of_in_json(told: Telling) -> None:
     )
     assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"
     assert football["writes"] == ["ball"] and football["each"]["ball"]["still_ticks"] == 1
-    assert by_name["kit", "table"]["entities"] == {"ball": "ball"} and by_name["kit", "table"]["addable"] == ["ball"]
+    assert by_name["kit", "table"]["entities"] == {"ball": "ball"}
 
 
 @pytest.mark.usefixtures("site")

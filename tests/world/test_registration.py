@@ -91,7 +91,7 @@ REFUSED: Final = {
     "a kind, not 'wheel_speeds'",
     'kit("own", SpecBase, entities=("ball",))': "entities is a mapping of names to models, not a list of 1",
     'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
-    'kit("own", SpecBase, addable="ball")': "addable is a tuple of names, not 'ball'",
+    'kit("own", SpecBase, spares={"ball-2": "ball"})': "spares is a function of the section, not a mapping of 1",
     'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
 }
 """Registrations, and what is said of each."""

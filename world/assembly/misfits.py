@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName, show
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
-from foosim.common.names import nearest_name
+from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
 from foosim.world.components.view import Misfit, Mounting
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     ROBOTS,
     Component,
@@ -37,6 +38,7 @@ from foosim.world.layout import (
     kits_named,
     of_motion,
     slot_that_speaks,
+    spares_of,
     world_rules,
 )
 from foosim.world.spec import WorldSpec
@@ -154,18 +156,36 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
                 yield f"{word_of('rule')} that {word} {model}: {error}"
 
 
-def kit_problems(
-    name: str, entities: Mapping[str, str], kits: Mapping[str, Kit], reserved: Sequence[str]
-) -> Iterator[str]:
-    """Yield what a kit puts into a world with these kits that cannot be there: `entities`, models by name.
+def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
+    """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
+    try:
+        found = spares_of(spec, kit)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # SystemExit, too: a kit may do anything
+        if kit.is_own:
+            raise
+        return {}, [f"spares fails: {failure_of(error, kit.module)}"]
+    if not isinstance(found, Mapping) or not all(isinstance(text, str) for one in found.items() for text in one):
+        return {}, [f"spares returns a mapping of names to models, not {show(found)}"]
+    wrong = [name for name in found if not is_robot_name(name)]
+    if wrong:
+        return {}, [f"spares returns the entity {show(wrong[0])}: {NAME_RULE}"]
+    return found, []
 
-    `reserved` are names that no entity can have.
+
+def kit_problems(
+    name: str, entities: Mapping[str, Mapping[str, str]], kits: Collection[str], reserved: Sequence[str]
+) -> Iterator[str]:
+    """Yield what a kit puts into a world with these kits that cannot be there.
+
+    `entities` are those of each kit, models by name, `reserved` names that no entity can have.
     """
-    for entity, model in entities.items():
+    for entity, model in entities[name].items():
         if entity in reserved:
             yield f"its entity {entity} has a reserved name"
         for other in kits:
-            if other < name and entity in kits[other].entities:
+            if other < name and entity in entities[other]:
                 yield f"its entity {entity} has a name that is also one of the kit {other}'s"
         for problem in _not_there(model, kits):
             yield f"its entity {entity} is {problem}"
@@ -285,6 +305,27 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
             if other is not one:
                 what = f"the {one.what} declares the slot {slot} of {entity}, which the {other.what} has already"
                 yield Finding(one.location, what, slot.partition(".")[2], at="key")
+
+
+def lasting_spares(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
+    sections = {"objects": spec.objects, "robots": spec.robots}
+    named: dict[str, Location] = {
+        name: (section, name, "spare")
+        for section, entities in sections.items()
+        for name, settings in entities.items()
+        if settings.spare
+    }
+    named |= {name: (kit.name,) for kit in kits_named(spec) for name in spares_of(spec, kit)}
+    layout = build_layout(spec) if named else None
+    for name, location in named.items():
+        assert layout is not None
+        if not layout[name].can_leave:
+            what = f"a spare that could not be absent: {with_article(layout[name].model)} without a place of its own"
+            if len(location) > 1:
+                yield Finding(location, what)
+            else:
+                yield Finding(location, f"kit {location[0]}: {name}, {what}", at="key")
 
 
 # --- engines ---------------------------------------------------------------------------------------------------------

@@ -157,6 +157,11 @@ def _entities(found: Any, key: str) -> Iterator[str]:
             yield f"the model of the entity {name} is a name, not {show(model)}"
 
 
+def _spares(found: Any, key: str) -> Iterator[str]:
+    if found.spares is not None and not callable(found.spares):
+        yield f"spares is a function of the section, not {_shown(found.spares)}"
+
+
 def _kinds(found: Any, key: str) -> Iterator[str]:
     """Yield what is wrong with settings by name, each with its kind."""
     for name, its in getattr(found, key).items():
@@ -182,6 +187,7 @@ OF_FIELD: Final[Mapping[str, Callable[[Any, str], Iterator[str]]]] = {
     "variants": _variants,
     "each": _each,
     "entities": _entities,
+    "spares": _spares,
     "actuators": _kinds,
     "rules": _kinds,
 }
