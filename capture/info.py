@@ -135,7 +135,7 @@ class _Counts:
         self.arithmetic: set[str] = set()
         self.clients: set[str] = set()
         self._last: dict[str, Message] = {}
-        """The last layout, then the last frame."""
+        """The layout, then the last frame."""
         self._scan = scan
 
     def take(self, message: Message) -> None:
@@ -149,8 +149,6 @@ class _Counts:
             if packet.cause:
                 self.causes[packet.cause] += 1
         elif topic in FrameReader.TOPICS:
-            if topic == LAYOUT:
-                self._last.clear()  # the frames before it have another layout
             self._last[topic] = message
         elif topic == TICK:
             self._take_tick(decode(TICK_MARKS, message))
