@@ -14,7 +14,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.parts import files_from
 from foosim.capture.reader import DECODERS, TICK_MARKS, FrameReader, Scan, TickMark, chain_at_start, deployment_of
-from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, RECOVERIES, TICK, Fate
+from foosim.capture.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
 from foosim.common import struct_types
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import count_commands

@@ -89,9 +89,7 @@ class Rows:
         return lambda: [*_points(rows, place_in, has_gaps)]
 
 
-def _points(
-    rows: list[Row], place_in: Callable[[Any], int | None], has_gaps: bool
-) -> Iterator[tuple[float, float]]:
+def _points(rows: list[Row], place_in: Callable[[Any], int | None], has_gaps: bool) -> Iterator[tuple[float, float]]:
     what: Any = None
     place: int | None = None
     for tick, known, numbers in rows:
