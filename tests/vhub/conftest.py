@@ -201,7 +201,7 @@ class Driver:
 
     def frame(self, tick: int) -> Frame:
         """A frame whose numbers are all different from tick to tick; `down` is the only one that means something."""
-        added = [AddedEntity("ball2", "ball")] if ADDED_AT <= tick < REMOVED_AT else []
+        added = [AddedEntity("ball-2", "ball")] if ADDED_AT <= tick < REMOVED_AT else []
         layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
         numbers = initial_numbers(self.deployment, layout)
         for entity in layout.of("rod"):
@@ -214,10 +214,10 @@ class Driver:
     def edits(self, tick: int) -> list[Edit]:
         """The edits of the order that led to frame `tick`."""
         if tick == ADDED_AT:
-            return [Add("ball2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
+            return [Add("ball-2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
         if tick == PUSHED_AT:
-            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball2", (0.0, -1e-300, 2.5))]
-        return [Remove("ball2")] if tick == REMOVED_AT else []
+            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball-2", (0.0, -1e-300, 2.5))]
+        return [Remove("ball-2")] if tick == REMOVED_AT else []
 
     def _samples(self, tick: int, robot: str) -> list[RobotPacket]:
         sensors = sorted(self.deployment.robots[robot].sensors)

@@ -79,25 +79,25 @@ def test_a_column_goes_across_layouts_with_gaps_where_the_entity_was_not_there(
     kept = [hub_run.closings[tick].frame for tick in frames.ticks]
     positions = frames.column("ball", "position", 3)
     assert positions.tolist() == [frame.vector("ball", "position", 3) for frame in kept]
-    added = frames.column("ball2", "position", 3)
+    added = frames.column("ball-2", "position", 3)
     assert np.isnan(added).all(axis=1).tolist() == [True] * 3 + [False] * 2 + [True] * 3
-    assert added[3:5].tolist() == [frame.vector("ball2", "position", 3) for frame in kept[3:5]]
-    assert np.isnan(frames.column("ball2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
+    assert added[3:5].tolist() == [frame.vector("ball-2", "position", 3) for frame in kept[3:5]]
+    assert np.isnan(frames.column("ball-2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
     for index in (0, 3, 7, -1, -8):
         assert frames.frame(index).digest == kept[index].digest
     for index in (8, -9):
         with pytest.raises(IndexError, match=f"frame {index} of 8"):
             frames.frame(index)
-    with pytest.raises(CaptureError, match=r"no frame has an entity 'bal2', nearest is ball2"):
+    with pytest.raises(CaptureError, match=r"no frame has an entity 'bal2', nearest is ball-2"):
         frames.column("bal2", "position", 3)
     with pytest.raises(CaptureError, match=r"ball has no field 'positions', nearest is position; it has .*velocity"):
         frames.column("ball", "positions", 3)
 
 
 def test_poses_are_those_of_the_one_forward_kinematics(capture: CaptureData, hub_run: HubRun) -> None:
-    poses = {name: capture.poses(name) for name in ("red.goal/slide", "red.goal/spin", "red.goal", "ball", "ball2")}
+    poses = {name: capture.poses(name) for name in ("red.goal/slide", "red.goal/spin", "red.goal", "ball", "ball-2")}
     assert poses["ball"].ticks.tolist() == [0, 10, 20, 30, 40, 50, 60, 64]
-    assert poses["ball2"].ticks.tolist() == [30, 40]
+    assert poses["ball-2"].ticks.tolist() == [30, 40]
     assert poses["red.goal"].positions.tolist() == poses["red.goal/spin"].positions.tolist()
     for index, tick in enumerate(poses["ball"].ticks):
         frame = hub_run.closings[tick].frame
@@ -307,8 +307,8 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
         assert len(entity.cubes) + len(entity.spheres) + len(entity.cylinders) == len(shapes) > 0
     ball = next(entity for entity in first.entities if entity.id == "ball").spheres[0]
     assert (ball.size.x, ball.color.r, ball.color.a) == (2 * table_of(hub_run.deployment).ball.radius, 1.0, 1.0)
-    assert "ball2" in {entity.id for entity in added.entities}
-    assert [deletion.id for deletion in removed.deletions] == ["ball2"]
+    assert "ball-2" in {entity.id for entity in added.entities}
+    assert [deletion.id for deletion in removed.deletions] == ["ball-2"]
     assert not first.deletions and not added.deletions
 
 

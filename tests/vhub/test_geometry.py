@@ -485,11 +485,11 @@ def test_a_frame_is_looked_at_once_and_a_new_layout_has_its_bodies() -> None:
     (pole,) = sight.between(a, b)
     assert pole[:2] == ("pole", UNKNOWN) and pole.chord_m == pytest.approx(0.02)
     assert rays.at(frame) is sight and sight.between(b, a) is sight.between(a, b)
-    more = build_layout(deployment, [("ball2", "ball")])
+    more = build_layout(deployment, [("ball-2", "ball")])
     numbers = initial_numbers(deployment, more)
-    place_ball(numbers, more["ball2"], (0.0, 0.0, 0.3))
+    place_ball(numbers, more["ball-2"], (0.0, 0.0, 0.3))
     found = rays.at(Frame(1, more, np.array(numbers))).between(a, b)
-    assert [crossing.name for crossing in found] == ["ball2", "pole"] and found[1] is pole, "scenery stays prepared"
+    assert [crossing.name for crossing in found] == ["ball-2", "pole"] and found[1] is pole, "scenery stays prepared"
     assert [c.name for c in rays.at(frame).between(a, b)] == ["pole"]
 
 

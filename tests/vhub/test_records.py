@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def head_of(run: HubRun, tick: int) -> bytes:
     """The head that a journal file would start with behind the record of `tick`."""
     names = [entity.name for entity in run.closings[tick].frame.layout.entities]
-    added = [("ball2", "ball")] if "ball2" in names else []
+    added = [("ball-2", "ball")] if "ball-2" in names else []
     record = decode_any(HubRecord, run.records[tick + 1])
     assert isinstance(record, TickRecord)
     epoch = encode([epoch for epoch in run.epochs if epoch.tick <= tick][-1])
