@@ -165,9 +165,9 @@ def refusals(captured: Captured, tmp_path: Path) -> Iterator[tuple[str, str, str
 
 def with_eye() -> Deployment:
     """The deployment with another name of its camera: its frames have as many numbers."""
-    text = TEXT.replace("  camera:\n    model: camera", "  eye:\n    model: camera")
+    text = TABLE.read_text().replace("  camera:\n    model: camera", "  eye:\n    model: camera")
     text = text.replace("      - camera\n", "      - eye\n")
-    return load_deployment(apply_sets(text, "other.yaml", ["players={}"]), "other.yaml")
+    return load_deployment(apply_sets(text, "other.yaml", ["players={}", SPARE]), "other.yaml")
 
 
 def test_what_does_not_fit_is_refused_by_name(captured: Captured, tmp_path: Path) -> None:

@@ -132,8 +132,8 @@ def test_a_missing_tick_is_named(captured: Captured) -> None:
 class OtherNode(NodeCore):
     """A node that says another digest of its engine's small run than it has."""
 
-    def engine_ready(self, layout: Layout, fingerprint: bytes) -> None:
-        super().engine_ready(layout, bytes(31) + b"?")
+    def engine_ready(self, fingerprint: bytes) -> None:
+        super().engine_ready(bytes(31) + b"?")
 
 
 def heavier(deployment: Deployment, layout: Layout) -> Engine:
