@@ -72,7 +72,8 @@ def test_recordings_follow_a_live_run_and_the_distance_is_told_as_it_goes(run: P
             near, far = theirs.of("compared")[-1], walked.of("compared")[-1]
             assert distances(near) == dict.fromkeys({*both} - {"ball-2"}, 0.0), "the spare ball is not there yet"
             assert (near["at"], near["covers"], near["series"]) == (40, (-10, TICKS - 10), [[40, 0.0]])
-            assert distances(far)["ball"] == pytest.approx(np.linalg.norm(poses(50)[0, :3] - poses(40)[0, :3]), abs=1e-5)
+            moved = np.linalg.norm(poses(50)[0, :3] - poses(40)[0, :3])
+            assert distances(far)["ball"] == pytest.approx(moved, abs=1e-5)
 
             leader.want(Wanted())
             show(60, of=50)

@@ -37,7 +37,8 @@ def test_a_part_has_all_that_was_recorded_of_its_ticks(run: Path, part: Path) ->
     assert capture.digests.tolist() == whole.digests[120:201].tolist()
     assert capture.about.deployment_text == whole.about.deployment_text and capture.about.files == whole.about.files
     assert capture.about.versions == whole.about.versions
-    assert capture.frames.ticks.tolist() == list(range(120, 201, 10)) and capture.frames.layout.digest == whole.frames.layout.digest
+    assert capture.frames.ticks.tolist() == list(range(120, 201, 10))
+    assert capture.frames.layout.digest == whole.frames.layout.digest
     assert capture.frames.frame(0).digest == whole.frames.frame(whole.frames.ticks.tolist().index(120)).digest
     assert list(capture.captured_ticks()) == list(whole.captured_ticks())[120:201]
     assert capture.clients == whole.clients and capture.epochs == whole.epochs, "who takes part is repeated"

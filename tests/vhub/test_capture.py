@@ -55,25 +55,18 @@ def test_ticks_with_their_inputs_come_back(capture: CaptureData, hub_run: HubRun
 
 
 def test_frames_come_back_at_their_ticks_with_the_first_and_the_last(capture: CaptureData, hub_run: HubRun) -> None:
-    blocks = capture.frame_blocks
-    assert [block.ticks.tolist() for block in blocks] == [[0, 10, 20], [30, 40], [50, 60, 64]]
-    for block in blocks:
-        assert block.values.shape == (len(block), block.layout.size)
-        for index, tick in enumerate(block.ticks):
-            kept = hub_run.closings[tick].frame
-            assert block.frame(index).digest == kept.digest
-            assert block.frame(index).outboxes == kept.outboxes
-        joint = block.column("red.goal", "joint_positions", 2)
-        assert joint[0].tolist() == block.frame(0).vector("red.goal", "joint_positions", 2)
-        assert block.column("red.attack", "down")[0] == block.frame(0).at("red.attack", "down")
-    for one in ("layout", "values"):
-        with pytest.raises(CaptureError, match=r"frames of 3 layouts \(from 0, 30, 50\): frame_blocks"):
-            getattr(capture.frames, one)
+    frames = capture.frames
+    assert frames.values.shape == (len(frames), frames.layout.size)
+    for index, tick in enumerate(frames.ticks):
+        kept = hub_run.closings[tick].frame
+        assert frames.frame(index).digest == kept.digest
+        assert frames.frame(index).outboxes == kept.outboxes
+        joint = frames.column("red.goal", "joint_positions", 2)
+        assert joint[index].tolist() == kept.vector("red.goal", "joint_positions", 2)
+        assert frames.column("red.attack", "down")[index] == kept.at("red.attack", "down")
 
 
-def test_a_column_goes_across_layouts_with_gaps_where_the_entity_was_not_there(
-    capture: CaptureData, hub_run: HubRun
-) -> None:
+def test_a_column_has_gaps_where_the_entity_was_absent(capture: CaptureData, hub_run: HubRun) -> None:
     frames = capture.frames
     assert frames.ticks.tolist() == [0, 10, 20, 30, 40, 50, 60, 64] and len(frames) == 8
     kept = [hub_run.closings[tick].frame for tick in frames.ticks]
@@ -86,10 +79,10 @@ def test_a_column_goes_across_layouts_with_gaps_where_the_entity_was_not_there(
     for index in (0, 3, 7, -1, -8):
         assert frames.frame(index).digest == kept[index].digest
     for index in (8, -9):
-        with pytest.raises(IndexError, match=f"frame {index} of 8"):
+        with pytest.raises(IndexError):
             frames.frame(index)
-    with pytest.raises(CaptureError, match=r"no frame has an entity 'bal2', nearest is ball-2"):
-        frames.column("bal2", "position", 3)
+    with pytest.raises(CaptureError, match=r"no frame has an entity 'ball2', nearest is ball-2"):
+        frames.column("ball2", "position", 3)
     with pytest.raises(CaptureError, match=r"ball has no field 'positions', nearest is position; it has .*velocity"):
         frames.column("ball", "positions", 3)
 
@@ -197,7 +190,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "/clients": 5,
         "/epochs": 2,
         "/frame": 8,
-        "/layout": 3,
+        "/layout": 1,
         "/log": 3,
         "/packets": account.offered,
         "/recoveries": 3,
@@ -286,6 +279,8 @@ def test_viewers_get_poses_of_all_links(path: Path, hub_run: HubRun) -> None:
         scene = build_scene(hub_run.deployment, frame.layout)
         expected = {}
         for name, body in scene.bodies.items():
+            if frame.layout[name].is_absent(frame.numbers):
+                continue
             for link, at, turned in forward_kinematics(body, frame.layout[name], frame.numbers):
                 expected[link] = (*at, *turned)
         got = {}
@@ -300,7 +295,7 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
     first, added, removed = decoded(path, "/scene")
     scene = build_scene(hub_run.deployment, hub_run.closings[0].frame.layout)
     links = {link.name: link for body in scene.bodies.values() for link in body.links}
-    assert {entity.id for entity in first.entities} == {"scenery", *links}
+    assert {entity.id for entity in first.entities} == {"scenery", *links} - {"ball-2"}
     for entity in first.entities:
         assert entity.frame_locked and entity.frame_id == ("world" if entity.id == "scenery" else entity.id)
         shapes = scene.scenery if entity.id == "scenery" else links[entity.id].shapes
@@ -308,8 +303,10 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
     ball = next(entity for entity in first.entities if entity.id == "ball").spheres[0]
     assert (ball.size.x, ball.color.r, ball.color.a) == (2 * table_of(hub_run.deployment).ball.radius, 1.0, 1.0)
     assert "ball-2" in {entity.id for entity in added.entities}
-    assert [deletion.id for deletion in removed.deletions] == ["ball-2"]
-    assert not first.deletions and not added.deletions
+    assert (
+        [deletion.id for deletion in removed.deletions] == [deletion.id for deletion in first.deletions] == ["ball-2"]
+    )
+    assert not added.deletions
 
 
 def test_viewers_get_the_log(path: Path) -> None:
