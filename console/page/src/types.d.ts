@@ -143,6 +143,7 @@ interface Stat {
   poses: number;
   links: number;
   bodies: number;
+  absent: number;
   drawn: number;
   role: string;
   paused: boolean;
