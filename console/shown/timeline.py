@@ -69,15 +69,16 @@ class WorldEvents:
     def _of_flags(before: Frame, frame: Frame) -> list[Mark]:
         marks = []
         for entity in frame.layout.entities:
-            if entity.is_absent(before.numbers) or entity.is_absent(frame.numbers):
-                continue
             for slot, (kind, text) in FLAGS.items():
-                if slot in entity.offsets:
-                    was, holds = before.at(entity.name, slot) != 0.0, frame.at(entity.name, slot) != 0.0
-                    if holds and not was:
-                        marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
-                    elif was and not holds and kind == DOWN:
-                        marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
+                at = entity.offsets.get(slot)
+                if at is None or (before.numbers[at] != 0.0) is (frame.numbers[at] != 0.0):
+                    continue
+                if entity.is_absent(before.numbers) or entity.is_absent(frame.numbers):
+                    continue
+                if frame.numbers[at] != 0.0:
+                    marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
+                elif kind == DOWN:
+                    marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
         return marks
 
 

@@ -165,12 +165,13 @@ def test_contacts_are_where_balls_touch_something() -> None:
 
 
 def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(1, "robots.rover01.heading=90 deg"), "hall")
+    sets = ("robots.rover01.heading=90 deg", "robots.rover02.spare=true")
+    deployment = load_deployment(fleet_text(2, *sets), "hall")
     frame = initial_frame(deployment)
     rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
     sensor = next(s for s in deployment.robots["rover01"].sensors.values() if isinstance(s, ProximitySettings))
     radius = hall_of(deployment).rover.radius
-    assert rays.shape == (sensor.rays, 6)
+    assert rays.shape == (sensor.rays, 6), "one that is absent sends none"
     rays[:, (0, 3)] -= frame.at("rover01", "position")
     rays[:, (1, 4)] -= frame.at("rover01", "position", 1)
     np.testing.assert_allclose(np.hypot(*rays[:, :2].T), radius, atol=1e-3)

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
@@ -140,3 +142,14 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
         ("queue_full", "sender", 1),
     }
     assert links.message({**status(100, row), "links_in_all": 300})["drops"] == [], "told already"
+
+
+def test_nothing_stands_between_the_ends_of_a_link_of_which_one_is_absent(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2, "robots.rover02.spare=true"), "hall")
+    drawing, frame = Drawing(deployment), initial_frame(deployment)
+    links = Links(deployment, drawing.entities)
+    links.move(frame)
+    row = ["pilot01", "pilot02", 10, 0, 10, 0, "fleet/wifi", 0, {"rx_down": 10}, []]
+    (line,) = links.message(status(100, row))["links"]
+    assert (line["radio"], line["walls"]) == (True, [])
+    assert np.isnan(drawing.moment(frame).poses[line["to_link"]]).all(), "its end is not drawn"
