@@ -438,7 +438,12 @@ def check_whole(about: About) -> None:
 def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
     layout = build_layout(deployment)
+    check_layout(path, layout, row)
+    return layout
+
+
+def check_layout(path: Path, layout: Layout, row: LayoutRow) -> None:
+    """Raise CaptureError where a row names another layout than this one of the capture's deployment."""
     if layout.digest.hex() != row.digest or layout.size != row.size:
         named = "`foosim capture info` names the version that captured it"
         raise CaptureError(f"{path}: its layout is not what this version builds: {named}")
-    return layout
