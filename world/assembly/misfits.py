@@ -159,7 +159,7 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
 def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
     """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
     try:
-        found = spares_of(spec, kit)
+        found: Any = spares_of(spec, kit)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit, too: a kit may do anything
@@ -309,13 +309,8 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
 
 def lasting_spares(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
-    sections = {"objects": spec.objects, "robots": spec.robots}
-    named: dict[str, Location] = {
-        name: (section, name, "spare")
-        for section, entities in sections.items()
-        for name, settings in entities.items()
-        if settings.spare
-    }
+    named: dict[str, Location] = {name: ("objects", name, "spare") for name, one in spec.objects.items() if one.spare}
+    named |= {name: ("robots", name, "spare") for name, one in spec.robots.items() if one.spare}
     named |= {name: (kit.name,) for kit in kits_named(spec) for name in spares_of(spec, kit)}
     layout = build_layout(spec) if named else None
     for name, location in named.items():
