@@ -433,8 +433,9 @@ def check_whole(about: About) -> None:
 
 
 def check_layout(path: Path, layout: Layout, row: LayoutRow) -> None:
-    """Raise CaptureError where a row names another layout than this one, which the deployment has here: what the numbers
-    of frames mean depends on it.
+    """Raise CaptureError where a row names another layout than the deployment has here.
+
+    What the numbers of frames mean depends on it.
     """
     if layout.digest.hex() != row.digest or layout.size != row.size:
         named = "`foosim capture info` names the version that captured it"
