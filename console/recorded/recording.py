@@ -21,7 +21,16 @@ from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.reader import DECODERS, CapturedTick, captured_tick, check_layout, deployment_of, read_about, row_of
+from foosim.capture.reader import (
+    DECODERS,
+    CapturedTick,
+    captured_tick,
+    check_frame,
+    check_layout,
+    deployment_of,
+    read_about,
+    row_of,
+)
 from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.shown.drawing import Drawing
@@ -131,10 +140,8 @@ class Recording:
         row: FrameRow = self.row(FRAME, number)
         if not self._is_checked:
             raise CaptureError(f"{self.path}: a frame without a layout before it")
-        layout = self.drawing.layout
-        if len(row.values) != 8 * layout.size or any(box.index >= len(layout.entities) for box in row.outboxes):
-            raise CaptureError(f"{self.path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
-        return frame_of(layout, row)
+        check_frame(self.path, self.drawing.layout, row)
+        return frame_of(self.drawing.layout, row)
 
     def frame_up_to(self, tick: int) -> Frame | None:
         """Return the newest captured frame at or before a tick. Raises CaptureError."""
