@@ -129,7 +129,7 @@ class Bypass:
     def _hand(self, name: str, message: Received, tick: int) -> None:
         """Let a packet reach a client that takes part and exists."""
         member = self.members.get(name)
-        if member is None or not member.exists:
+        if member is None or not member.has_existed_at(message.due_ns, self._tick_ns):
             return
         self._waiting.setdefault(name, []).append(message)
         calling = self._turns.get(name)

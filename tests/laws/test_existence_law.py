@@ -17,16 +17,18 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any
-from foosim.protocol.messages import Deliveries, Go
+from foosim.protocol.messages import Deliveries, Go, Received, Sent
 from foosim.rehearsal.journals import ENDINGS, Ending
 from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.simulation import Simulation
+from foosim.rehearsal.simulation import Resident, Simulation
+from foosim.rehearsal.stepping.carriers import Bypass, Carrier
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
+from foosim.vhub.state.existence import robots_it_lives_by
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.initial_state import initial_frame
@@ -35,7 +37,9 @@ from foosim.world.frame import Frame
 from foosim.world.setting.settable import add_edit
 from tests.kinematic_yard import yard_text
 
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 140
+TICK_NS: Final = 10_000_000
 PERIOD: Final = 2
 """Ticks of 10 ms: players act at 50 Hz."""
 ALWAYS: Final = "looker"
@@ -178,6 +182,7 @@ def test_it_is_called_while_a_robot_of_its_own_is_there_and_each_time_is_another
             assert go.since == first and go.absent == [cart for cart in carts if cart not in here]
             sent = [int(one.split("@")[1]) for one in heard.split(",") if one]
             assert all(first <= at <= tick for at in sent), "it has heard nothing of before"
+            assert all(first * TICK_NS <= packet.due_ns for packet in go.packets), "nor is told"
     assert any(said[2] for said in seen.said(player).values())
 
 
@@ -190,6 +195,20 @@ def test_who_acts_at_arrivals_is_neither_called_by_these_nor_by_time() -> None:
     assert len(ticks) > sum((last - first) // 20 for first, last in spans), "by packets, too"
     lost = [one for one in seen.fates() if one[1] == "waits" and one[5] == RECEIVER_DOWN]
     assert len(lost) > 20, "what others send to it meanwhile is lost"
+
+
+def test_a_player_is_made_at_its_start_and_when_it_exists_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    begin = Counting.__init__
+    monkeypatch.setattr(Counting, "__init__", lambda self, *given: made.append(begin(self, *given)))
+    systems: list[System] = []
+    assert_the_same(fly(1, systems.append))
+    spans = [spans_of(*carts) for carts in (*PLAYERS.values(), ("cart-4",))]
+    assert len(made) == sum(map(len, spans)) + 1, "the one that is there at its start is the first that exists"
+    state = systems[0].hub.state
+    assert state is not None
+    ages = [age for name in PLAYERS for one in state.ages.of(name, TICKS) for age in one.counts]
+    assert ages and max(ages) < 10, "what the player before had heard is no age of this one"
 
 
 def test_who_has_no_robot_always_exists() -> None:
@@ -290,26 +309,26 @@ def quiet(events: Sequence[Change]) -> str:
     players = {
         "pilot-1": {**about, "rate": "1 Hz", "robots": {"cart-1": []}},
         "pilot-2": {**about, "rate": "10 Hz", "robots": {"cart-2": []}},
-        "waits": {**about, "rate": "20 Hz", "robots": {"cart-2": []}, **calls},
+        "waits": {**about, "rate": "50 Hz", "robots": {"cart-2": []}, **calls},
     }
     told = [{"at": f"{10 * tick} ms", "entity": name, verb: True} for tick, verb, name in events]
     return yard_text({"cart": cart}, players=players, events=told)
 
 
-@pytest.mark.parametrize("nodes", [1, 2])
-def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(nodes: int) -> None:
+@pytest.mark.parametrize("tick", range(50, 60))
+def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(tick: int) -> None:
     """Deliveries are final ahead where nobody can send: not beyond a tick at which somebody may come and act."""
-    seen, final = Seen(), []
+    seen, records = Seen(), []
     settings = Settings(observer=seen.watch)
-    settings.on_journal = lambda name, record: final.append(record) if name == "vhub" else None
-    changed = [(53, "add", "cart-2"), (76, "remove", "cart-2"), (86, "add", "cart-2")]
-    rehearse(quiet(changed), "yard.yaml", TICKS, nodes, settings=settings)
-    closed = [record for raw in final if isinstance(record := decode_any(HubRecord, raw), TickRecord)]
+    settings.on_journal = lambda name, record: records.append(record) if name == "vhub" else None
+    run = rehearse(quiet([(tick, "add", "cart-2")]), "yard.yaml", 90, 2, settings=settings)
+    assert run.json["reason"] == "done"
+    closed = [record for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord)]
     ahead = [decode(Deliveries, record.deliveries).following for record in closed]
-    assert max(ahead[:50]) >= 3, "else this test shows nothing"
-    assert [*seen.gos["pilot-2"]] == [60, 70, 90, 100, 110, 120, 130]
-    assert [*seen.gos["waits"]][:3] == [59, 61, 66], "5 ticks after it exists, or at what it hears"
-    assert {go.since for go in seen.gos["waits"].values()} == {54, 87}
+    assert max(ahead[10:50]) == 2, "a tick at which nobody exists to whom something could happen"
+    assert [*seen.gos["pilot-2"]] == [60, 70, 80]
+    assert min(seen.gos["waits"]) == min(tick + 3, 61), "2 ticks after it exists, or at what it hears"
+    assert {go.since for its in seen.gos.values() for go in its.values()} == {0, tick + 1}
 
 
 def test_who_leaves_and_comes_back_exists_since_it_did_and_who_missed_an_add_is_another() -> None:
@@ -342,22 +361,55 @@ def test_a_simulation_over_the_network_has_the_digests_of_the_run() -> None:
     assert found == usual().run.digests
 
 
-def test_without_a_network_its_players_come_and_go_as_well() -> None:
+def test_without_a_network_its_players_come_and_go_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     """At each frame the newest command is that of the call at it: as many as since the player exists."""
-    with Simulation(load_deployment(text(()), "yard.yaml"), agents=["both"]) as simulation:
+    acted: dict[str, list[int]] = {}
+    act, take = Resident.act, Bypass.take
+
+    def noted(self: Resident, tick: int, now_ns: int, carrier: Carrier) -> list[Sent]:
+        acted.setdefault(self.acting.name, []).append(tick)
+        return act(self, tick, now_ns, carrier)
+
+    def taken(self: Bypass, client: str) -> list[Received]:
+        found = take(self, client)
+        assert all(packet.sent_ns >= self.members[client].since * TICK_NS for packet in found)
+        return found
+
+    monkeypatch.setattr(Resident, "act", noted)
+    monkeypatch.setattr(Bypass, "take", taken)
+    with Simulation(load_deployment(text(()), "yard.yaml"), agents=[]) as simulation:
         for tick in range(TICKS):
             for at, verb, name in changes():
                 if at == tick:
                     getattr(simulation, verb)(name)
-            agent, its = simulation.agents["both"], spans_of("cart-3", "cart-4")
-            assert agent.exists is any(first <= tick < last for first, last in its)
             simulation.step()
-            for player in ("pilot-1", "pilot-3"):
-                cart = player.replace("pilot", "cart")
-                spans = [first for first, last in HERE[cart] if first <= tick < last and tick + 1 < last]
-                if spans:
-                    calls = sum(at % PERIOD == 0 for at in range(spans[0], tick + 1))
-                    assert simulation.frame.vector(cart, "motion.set_point", 1) == [pytest.approx(calls / 1000.0)]
+            spans = [first for first, last in HERE["cart-1"] if first <= tick and tick + 1 < last]
+            if spans:
+                calls = sum(at % PERIOD == 0 for at in range(spans[-1], tick + 1))
+                assert simulation.frame.vector("cart-1", "motion.set_point", 1) == [pytest.approx(calls / 1000.0)]
+    for player in PLAYERS:
+        assert acted[player] == [*usual().gos[player]]
+    spans_of_waits = spans_of("cart-4")
+    assert all(any(first <= tick < last for first, last in spans_of_waits) for tick in acted["waits"])
+    assert len(acted["waits"]) > 20
+
+
+@pytest.mark.parametrize(
+    ("robots", "on", "lives_by"),
+    [
+        (["red.attack", "red.goal", "camera"], "camera", ("red.attack", "red.goal")),
+        (["camera"], "red.goal", ("red.goal",)),
+        (["camera"], None, ("camera",)),
+        ([], "red.goal", ("red.goal",)),
+        ([], None, ()),
+    ],
+)
+def test_a_player_lives_by_robots_that_it_commands_is_on_or_hears(
+    robots: list[str], on: str | None, lives_by: tuple[str, ...]
+) -> None:
+    deployment = load_deployment(TABLE.read_text(), TABLE.name)
+    player = deployment.players["player-red"].model_copy(update={"robots": {name: [] for name in robots}, "on": on})
+    assert robots_it_lives_by(deployment, player) == lives_by
 
 
 def test_an_agent_that_comes_back_has_heard_nothing_and_commands_nothing_that_is_absent() -> None:

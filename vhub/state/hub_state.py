@@ -437,9 +437,8 @@ class HubState:
     def _receiver(self, flight: Flight) -> Member | None:
         """Return the client that a packet is for, if it takes part and exists, and has since the packet was due."""
         member = self.members.get(flight.destination)
-        if member is None or not member.active or not 0 <= member.since * self.tick_ns <= flight.due_ns:
-            return None
-        return member
+        is_here = member is not None and member.active and member.has_existed_at(flight.due_ns, self.tick_ns)
+        return member if is_here else None
 
     def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
         deliveries: list[Delivered] = []

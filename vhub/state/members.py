@@ -59,10 +59,14 @@ class Member:
         """Whether it exists in the newest frame: one that does not takes part, and is neither called nor awaited."""
         return self.since >= 0
 
+    def has_existed_at(self, time_ns: int, tick_ns: int) -> bool:
+        """Whether it exists, and has since this time: what was due before has reached nobody, or another one."""
+        return 0 <= self.since * tick_ns <= time_ns
+
     def is_due(self, tick: int) -> bool:
         """Whether it is due at a tick. For a client that acts at arrival, the tick's packets must be there."""
         if self.arrivals:
-            return self.active and self.exists and tick == self.called_tick
+            return self.active and tick == self.called_tick
         return self.active and self.exists and self.period > 0 and tick % self.period == self.offset
 
     def may_be_due(self, tick: int, closed: int) -> bool:
