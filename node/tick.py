@@ -179,7 +179,7 @@ class Stepper:
             if packet.destination not in self.layout:
                 continue
             entity = self.layout[packet.destination]
-            if entity.index not in solved or not entity.is_robot:
+            if entity.index not in solved or not entity.is_robot or entity.is_absent(numbers):
                 continue
             if not self._take(packet, entity, view, outboxes):
                 numbers[entity.offsets["refused"]] += 1.0

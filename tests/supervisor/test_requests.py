@@ -39,12 +39,15 @@ SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms", "table.spare_ba
 class Run:
     """A rehearsal and what was seen of it: frames and when they were committed, what was said, what was closed."""
 
-    def __init__(self, nodes: int = 1, ticks: int = TICKS, pace: Pace = FAST, sets: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, nodes: int = 1, ticks: int = TICKS, pace: Pace = FAST, sets: tuple[str, ...] = (), world: str = ""
+    ) -> None:
+        """`world` is the text of another one than the table."""
         self.frames: list[Frame] = []
         self.times_ns: list[int] = []
         self.said: list[tuple[str, bytes]] = []
         self.closings: list[Closing] = []
-        text = with_nodes(TEXT, TABLE.name, nodes, (*SETS, *sets))
+        text = with_nodes(world or TEXT, TABLE.name, nodes, sets if world else (*SETS, *sets))
         settings = Settings(observer=self._observe, on_commit=self._commit, on_closing=self.closings.append)
         self.system = System(RunSettings("run", TABLE.name, text, pace, ticks), settings)
         self.asked: list[str] = []
@@ -143,7 +146,7 @@ def test_an_added_ball_is_in_the_frame_after_its_tick() -> None:
 def test_a_removed_ball_is_gone_from_the_frame_after_its_tick() -> None:
     run = Run().ask_at(20, "add", name="ball-2", at="0.3,0.2,0.05").ask_at(50, "remove", name="ball")
     added, other, removed = run.ask_at(60, "remove", name="ball-2").go().answers
-    assert other.text == "'ball' cannot be removed: it has no place of its own"
+    assert other.text == "ball is always in the world: what is fixed, or belongs to a kit, neither comes nor goes"
     assert removed.text == f"ball-2 removed at tick {removed.tick}"
     there = [frame.tick for frame in run.frames if "ball-2" in present(frame)]
     assert there == list(range(added.tick + 1, removed.tick + 1))
@@ -394,8 +397,8 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("add", {}, "name: a name is needed, not null"),
     ("add", {"name": "bal"}, "nothing to add (there are: ball, ball-2, ball-3, ball-4), 'bal', nearest is 'ball'"),
     ("add", {"name": "ball-5"}, "ball-4), 'ball-5', nearest is 'ball"),
-    ("add", {"name": "camera"}, "camera has no place of its own: it is always there"),
-    ("add", {"name": "world"}, "world has no place of its own: it is always there"),
+    ("add", {"name": "camera"}, "camera is always in the world: what is fixed, or belongs to a kit, neither"),
+    ("add", {"name": "world"}, "world is always in the world: "),
     ("add", {"name": "ball-2", "node": "n1"}, "ball-2 is no robot: it has no node"),
     ("add", {"name": "ball-2", "node": "n9"}, "no node 'n9'; there are n1, n2"),
     ("add", {"name": "ball", "at": "9,0,0.1"}, "at of ball-2: a place outside of the table: valid are x up to 0.6 m"),
@@ -406,12 +409,12 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("add", {"name": "ball", "at": {"x": "0 m", "yow": "1 rad"}}, "at of ball-2: "),
     ("add", {"name": "ball", "at": f"{GREAT},0"}, "at of ball-2: "),
     ("remove", {}, "name: a name is needed, not null"),
-    ("remove", {"name": "ball"}, "'ball' cannot be removed: it has no place of its own"),
-    ("remove", {"name": "ball-2"}, "'ball-2' is absent already"),
+    ("remove", {"name": "ball"}, "ball is always in the world: what is fixed, or belongs to a kit, neither comes"),
+    ("remove", {"name": "ball-2"}, "ball-2 is absent already"),
     ("remove", {"name": "boll-2"}, "nothing to remove (there are: none), 'boll-2'"),
     ("push", {"name": "ball-2", "impulse": [0, 0, 0]}, "no free body 'ball-2'; there are ball"),
     ("set", {"name": "ball-2", "field": "at", "value": "0,0"}, "ball-2 is absent: add it first"),
-    ("remove", {"name": "red.goal"}, "'red.goal' cannot be removed"),
+    ("remove", {"name": "red.goal"}, "red.goal is always in the world"),
 )
 
 
