@@ -77,9 +77,9 @@ def test_who_measures_is_worked_out_once_for_robots_that_stay(monkeypatch: pytes
     stepper, frame = Stepper(DEPLOYMENT, LAYOUT), in_play(tick=5)
     made: list[Sequence[Entity]] = []
 
-    def counted(robots: Sequence[Entity], sensors: Any) -> DueSensors:
+    def counted(robots: Sequence[Entity], sensors: Any, switches: Any) -> DueSensors:
         made.append(robots)
-        return DueSensors(robots, sensors)
+        return DueSensors(robots, sensors, switches)
 
     monkeypatch.setattr("foosim.node.tick.DueSensors", counted)
     first, _ = stepper.sense(frame, LAYOUT.robots)
@@ -141,7 +141,7 @@ def test_a_push_is_impulse_over_mass_and_adds_up() -> None:
 
 
 def test_edits_apply_in_their_order() -> None:
-    edits = [added_ball(WITH_SPARES, "ball-2", HERE), Push("ball-2", (MASS, 0.0, 0.0))]
+    edits: list[Edit] = [added_ball(WITH_SPARES, "ball-2", HERE), Push("ball-2", (MASS, 0.0, 0.0))]
     numbers, _ = SPARE.edited(in_play(SPARES, WITH_SPARES), edits, {})
     assert slots(numbers, WITH_SPARES, "ball-2", "linear_velocity", 3) == [1.0, 0.0, 0.0]
 

@@ -28,7 +28,7 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.settings import ComponentSettings, RobotSettings
+from foosim.world.forms.settings import ComponentSettings, EntitySettings, RobotSettings
 from foosim.world.layout import (
     Declaring,
     Layout,
@@ -159,7 +159,7 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
 def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
     """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
     try:
-        found = spares_of(spec, kit)
+        found: object = spares_of(spec, kit)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit, too: a kit may do anything
@@ -171,7 +171,7 @@ def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[s
     wrong = [name for name in found if not is_robot_name(name)]
     if wrong:
         return {}, [f"spares returns the entity {show(wrong[0])}: {NAME_RULE}"]
-    return found, []
+    return dict(found), []
 
 
 def kit_problems(
@@ -309,7 +309,7 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
 
 def lasting_spares(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
-    sections = {"objects": spec.objects, "robots": spec.robots}
+    sections: dict[str, Mapping[str, EntitySettings]] = {"objects": spec.objects, "robots": spec.robots}
     named: dict[str, Location] = {
         name: (section, name, "spare")
         for section, entities in sections.items()
