@@ -32,8 +32,8 @@ BACK_MS: Final = 2000.0
 JOIN_MS: Final = 1000.0
 BLINK_S: Final = 0.2
 CALM_S: Final = (0.2, 0.7)
-ADDED: Final = 15
-"""With eight rods and the ball there are 24 bodies."""
+ADDED: Final = 41
+"""With eight rods and the ball there are 50 bodies."""
 
 HANGING_NODE: Final = """
 import ctypes, signal
@@ -234,7 +234,7 @@ def _started_again(trial: Trial, process: str) -> Figures:
 
 
 def node_joins(trial: Trial) -> Figures:
-    """A node comes late to a world of 24 bodies: from its hello until it takes part."""
+    """A node comes late to a world of 50 bodies: from its hello until it takes part."""
     cluster, node = trial.cluster, trial.node()
     trial.calm()
     with Lost(cluster, node) as lost:
@@ -251,7 +251,7 @@ def node_joins(trial: Trial) -> Figures:
 def add_bodies(cluster: Cluster) -> None:
     """Fill the table: rows of balls that fall on it."""
     for number in range(ADDED):
-        x, y = -0.5 + 0.125 * (number % 9), -0.25 + 0.25 * (number // 9)
+        x, y = -0.5 + 0.125 * (number % 9), -0.25 + 0.125 * (number // 9)
         cluster.control.ask("add", name="ball", at=f"{x:g},{y:g},0.1")
 
 
@@ -306,7 +306,7 @@ KINDS: Final = (
     Kind("twin_refused", "a second node of the same name", twin_refused),
     Kind(
         "node_joins",
-        "a node comes to a world of 24 bodies",
+        "a node comes to a world of 50 bodies",
         node_joins,
         {"join": JOIN_MS},
         sets=("tick=10 ms", "substeps=20", f"table.spare_balls={ADDED}"),

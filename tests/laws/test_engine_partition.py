@@ -77,11 +77,11 @@ def launch_ball(layout: Layout, numbers: list[float], tick: int) -> None:
 
 
 def launch_piles(layout: Layout, numbers: list[float], tick: int) -> None:
-    """Pile balls up in three corners: four touch one another and the walls, the fifth drops on them."""
+    """Pile balls up in all corners: four touch one another and the walls, the fifth drops on them."""
     if tick % 300:
         return
     for index, ball in enumerate(layout.of("ball")):
-        pile, number = index % 3, index // 3
+        pile, number = index % 4, index // 4
         out, aside, up = (
             (0.0, 0.0, 0.0),
             (0.0355, 0.0, 0.0),
@@ -257,7 +257,7 @@ PILE = ("tick=0.5 ms", "substeps=1", "table.ball.speed_limit=5 m/s")
 def compare(factory: EngineFactory, ticks: int, sets: Sequence[str] = (), pile: bool = False, **how: Any) -> Outcome:
     """Run one comparison and free its engines."""
     sets = (*sets, *PILE) if pile else sets
-    comparison = Comparison(factory, sets, balls=15 if pile else 1)
+    comparison = Comparison(factory, sets, balls=20 if pile else 1)
     try:
         return comparison.run(ticks, launch_piles if pile else launch_ball, **how)
     finally:

@@ -170,9 +170,9 @@ def test_what_is_of_a_table_is_refused_in_a_hall(text: str) -> None:
     refused = [systems[0].answers[identity] for identity in asked]
     assert not any(answer.accepted for answer in refused)
     assert [answer.text for answer in refused] == [
-        "nothing to add",
+        f"nothing to add (there are: {', '.join(f'rover{number:02}' for number in range(1, ROVERS + 1))}), 'ball'",
         "nothing can be pushed: this world has no free bodies",
-        "'base' cannot be removed: it has no place of its own",
+        "base is always in the world: what is fixed, or belongs to a kit, neither comes nor goes",
     ]
 
 

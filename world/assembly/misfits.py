@@ -159,7 +159,7 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
 def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
     """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
     try:
-        found: Any = spares_of(spec, kit)
+        found: object = spares_of(spec, kit)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # SystemExit, too: a kit may do anything
