@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +14,7 @@ import pytest
 from foosim.capture.reader import open_capture
 from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue
+from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -290,6 +292,27 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
     assert_the_same(fly(2, prepare))
     assert times[109] - times[75] < 1_000_000, "nobody waits"
     assert (times[120] - times[75] > 1_000_000_000) is (back_ms > 1000)
+
+
+def test_in_realtime_a_run_that_goes_on_without_such_a_player_is_the_same() -> None:
+    """It leaves after `client_back`, and joins again before its robot is added: to nobody was it away."""
+    states: list[System] = []
+
+    def prepare(system: System) -> None:
+        states.append(system)
+
+        def kill() -> None:
+            system.kill("pilot-4")
+            system.later(200_000_000, partial(system.start, "pilot-4"))
+
+        system.at_tick(75, kill)
+
+    sets = ("deadlines.client_back=100 ms", "deadlines.tick_lost=5 s")
+    seen = fly(2, prepare, sets=sets, pace=Pace("realtime", Fraction(1)))
+    assert_the_same(seen)
+    state = states[0].hub.state
+    assert state is not None
+    assert 75 < state.members["pilot-4"].joined_tick < HERE["cart-4"][1][0]
 
 
 def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
