@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +14,7 @@ import pytest
 from foosim.capture.reader import open_capture
 from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.common.errors import BadValue
+from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
@@ -292,6 +294,27 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
     assert (times[120] - times[75] > 1_000_000_000) is (back_ms > 1000)
 
 
+def test_in_realtime_a_run_that_goes_on_without_such_a_player_is_the_same() -> None:
+    """It leaves after `client_back`, and joins again before its robot is added: to nobody was it away."""
+    states: list[System] = []
+
+    def prepare(system: System) -> None:
+        states.append(system)
+
+        def kill() -> None:
+            system.kill("pilot-4")
+            system.later(200_000_000, partial(system.start, "pilot-4"))
+
+        system.at_tick(75, kill)
+
+    sets = ("deadlines.client_back=100 ms", "deadlines.tick_lost=5 s")
+    seen = fly(2, prepare, sets=sets, pace=Pace("realtime", Fraction(1)))
+    assert_the_same(seen)
+    state = states[0].hub.state
+    assert state is not None
+    assert 75 < state.members["pilot-4"].joined_tick < HERE["cart-4"][1][0]
+
+
 def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
     """In the end, either: its process is gone, and the run is done."""
 
@@ -308,14 +331,14 @@ def quiet(events: Sequence[Change]) -> str:
     calls = {"act": "arrival", "arrivals": {"pilot-2": ["log"]}, "hears": {"pilot-2": ["log"]}}
     players = {
         "pilot-1": {**about, "rate": "1 Hz", "robots": {"cart-1": []}},
-        "pilot-2": {**about, "rate": "10 Hz", "robots": {"cart-2": []}},
+        "pilot-2": {**about, "rate": "10 Hz", "offset": "10 ms", "robots": {"cart-2": []}},
         "waits": {**about, "rate": "50 Hz", "robots": {"cart-2": []}, **calls},
     }
     told = [{"at": f"{10 * tick} ms", "entity": name, verb: True} for tick, verb, name in events]
     return yard_text({"cart": cart}, players=players, events=told)
 
 
-@pytest.mark.parametrize("tick", range(50, 60))
+@pytest.mark.parametrize("tick", range(50, 62))
 def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(tick: int) -> None:
     """Deliveries are final ahead where nobody can send: not beyond a tick at which somebody may come and act."""
     seen, records = Seen(), []
@@ -326,8 +349,9 @@ def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(tick: int) 
     closed = [record for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord)]
     ahead = [decode(Deliveries, record.deliveries).following for record in closed]
     assert max(ahead[10:50]) == 2, "a tick at which nobody exists to whom something could happen"
-    assert [*seen.gos["pilot-2"]] == [60, 70, 80]
-    assert min(seen.gos["waits"]) == min(tick + 3, 61), "2 ticks after it exists, or at what it hears"
+    first, *_ = acts = [at for at in range(tick + 1, 90) if at % 10 == 1]
+    assert [*seen.gos["pilot-2"]] == acts
+    assert min(seen.gos["waits"]) == min(tick + 3, first + 1), "2 ticks after it exists, or at what it hears"
     assert {go.since for its in seen.gos.values() for go in its.values()} == {0, tick + 1}
 
 
