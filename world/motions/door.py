@@ -8,7 +8,7 @@ from typing import Final
 from foosim.common.exact_math import cos, sin
 from foosim.world.clearance.leaf import InTheWay, Leaf
 from foosim.world.components.entities import MotionMounting, Motors
-from foosim.world.components.view import SolvingView
+from foosim.world.components.view import Slot, SolvingView
 from foosim.world.forms.registry import motion
 from foosim.world.layout import Entity
 from foosim.world.models.hazards.door import DoorObject
@@ -22,29 +22,33 @@ class Sliding:
     """The share `opened` comes nearer to `open` by speed x tick / travel, unless something is in the way."""
 
     def __init__(self, at: MotionMounting) -> None:
-        self._at, self._tick_s = at, at.spec.tick_ns / 1e9
+        self._tick_s = at.spec.tick_ns / 1e9
         self._in_the_way = InTheWay(at)
+        self._slots = {its.index: [at.slot(its, field) for field in (*STATE, "open")] for its in at.entities}
+        self._settings: dict[int, DoorObject] = {}
+        for entity in at.entities:
+            settings = at.spec.settings_of(entity.name)
+            assert isinstance(settings, DoorObject), "the motion door moves doors"
+            self._settings[entity.index] = settings
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these doors by a tick; they have no motors."""
         for entity in entities:
-            self._move(entity, view)
+            self._move(self._settings[entity.index], self._slots[entity.index], view)
 
-    def _move(self, entity: Entity, view: SolvingView) -> None:
-        its = self._at.spec.settings_of(entity.name)
-        assert isinstance(its, DoorObject), "the motion door moves doors"
-        slot = {field: self._at.slot(entity, field) for field in (*STATE, "open")}
-        (opened,), (target,) = view.read(slot["opened"]), view.read(slot["open"])
+    def _move(self, its: DoorObject, slots: Sequence[Slot], view: SolvingView) -> None:
+        here, velocity, (opened,), (was_blocked,), (target,) = map(view.read, slots)
+        if opened == target and not (any(velocity) or was_blocked):
+            return
         step = its.speed * self._tick_s / abs(its.travel)
         share = min(max(target, opened - step), opened + step)
-        here, there = view.read(slot["position"]), its.place_at(share)
+        there = its.place_at(share)
         is_blocked = share != opened and self._in_the_way.stops(_leaf(its, here), _leaf(its, there), view.start)
         if is_blocked:
             share, there = opened, its.place_at(opened)
-        view.write(slot["position"], *there)
-        view.write(slot["linear_velocity"], *[(new - old) / self._tick_s for new, old in zip(there, here, strict=True)])
-        view.write(slot["opened"], share)
-        view.write(slot["blocked"], float(is_blocked))
+        speeds = [(new - old) / self._tick_s for new, old in zip(there, here, strict=True)]
+        for slot, numbers in zip(slots, (there, speeds, (share,), (float(is_blocked),)), strict=False):
+            view.write(slot, *numbers)
 
 
 def _leaf(its: DoorObject, place: Sequence[float]) -> Leaf:
