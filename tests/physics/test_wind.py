@@ -23,7 +23,7 @@ def cube(side: float, mass: float, **more: Any) -> dict[str, Any]:
     return {"model": "box", "size": [f"{side} m"] * 3, "mass": f"{mass} kg", "speed_limit": "20 m/s", **more}
 
 
-def yard(wind: dict[str, Any] | None, events: list[dict[str, Any]] | None = None, **objects: Any) -> str:
+def yard(wind: dict[str, Any] | None, events: list[dict[str, Any]] | None = None, /, **objects: Any) -> str:
     """Cubes and a robot that moves by kinematics on a great floor."""
     return yard_text(
         {"k": {"model": "holonomic", "at": {"x": "-9 m"}}},
