@@ -41,6 +41,7 @@ from foosim.world.layout import (
     spares_of,
     world_rules,
 )
+from foosim.world.rules.wind import WindSettings
 from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
@@ -334,9 +335,15 @@ class _Rigid(NamedTuple):
 
 
 def engine_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Rigid bodies that the engine does not have, and those of which no engine has both."""
+    """Rigid bodies that the engine does not have, those of which no engine has both, and wind that it does not have."""
     engine = registry.find("engine", spec.engine)
     assert isinstance(engine, Engine), engine
+    winds = [name for name, settings in spec.rules.items() if isinstance(settings, WindSettings)]
+    if winds and not engine.islands:
+        what = f"the engine has no air, and the world has the rule {winds[0]}, which is wind"
+        yield Finding(("engine",), what, engine.name, "'mujoco'")
+    for name in winds[1:]:
+        yield Finding(("rules", name), f"a second wind beside {winds[0]}", name, at="key")
     body, rod = next(rigid_bodies(spec), None), next(_rods(spec), None)
     if body is not None and rod is not None:
         for one, other in ((body, rod), (rod, body)):
