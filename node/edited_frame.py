@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from foosim.world.assembly.grippers import grippers_of, release
 from foosim.world.assembly.world import body_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView, called
@@ -27,6 +28,8 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
         elif isinstance(change, Set):
             if change.field == DOWN and entity.is_robot:
                 _hold(WritableView(frame.tick, numbers), numbers, spec, layout, entity)
+            elif change.field == "position":
+                release(grippers_of(spec, layout), numbers, entity)
         else:
             moved.append(entity)
             for place in layout.references:
