@@ -36,7 +36,7 @@ CRANE: Final = """<robot name="crane">
   </joint>
   <joint name="boom" type="prismatic">
     <parent link="carriage"/><child link="hand"/><axis xyz="1 0 0"/>
-    <limit lower="0" upper="1.6" effort="300" velocity="1"/>
+    <limit lower="0" upper="1.2" effort="300" velocity="1"/>
   </joint>
   <joint name="front" type="fixed"><parent link="hand"/><child link="grip"/><origin xyz="0.23 0 0"/></joint>
 </robot>
@@ -99,7 +99,7 @@ def world(robots: Mapping[str, Any], objects: Mapping[str, Any], steps: Sequence
         "class": f"{Script.__module__}:Script",
         "rate": "100 Hz",
         "lockstep": True,
-        "robots": {name: [] for name, robot in robots.items() if robot.get("actuators")},
+        "robots": {name: list(robot.get("sensors", ())) for name, robot in robots.items() if robot.get("actuators")},
         "parameters": {"steps": [list(step) for step in steps]},
     }
     whole = {

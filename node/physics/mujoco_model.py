@@ -67,8 +67,8 @@ FRICTION_S_MAX: Final = 0.05
 hops, by 10 mm at 3 m/s with 8 substeps; with a longer one what is slow is braked by less than its friction."""
 SERVO: Final = (0.999, 0.999, 0.001, 0.5, 2.0)
 WELD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""`solimp` of grasps. Their direct `solref` takes away a slip within a substep: 3 kg at an arm that swings them at 2 m/s
-slip by 0.1 mm at substeps of 5 ms, and by 0.3 mm with a time constant of two substeps."""
+"""`solimp` of grasps. Their direct `solref` takes away a slip within a substep: 3 kg on an arm that swings them at
+2 m/s slip by 0.1 mm at substeps of 5 ms, and by 0.3 mm with a time constant of two substeps."""
 LIMIT: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 LEAST: Final = 1e-5
 """MuJoCo takes no smaller coefficient of friction."""
