@@ -270,8 +270,8 @@ class CompositionEngine:
         for placed, body in seats.fixed:
             if placed.stands is not body:
                 self._stand(placed, body)
-        for (number, at, turned), grasp in zip(self._welds, seats.grasps, strict=True):
-            self._weld(number, at, turned, numbers[grasp : grasp + 7])
+        for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
+            self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
             self._command(drives)
             qpos[self._clock_q], qvel[self._clock_v] = 0.0, 1.0
@@ -285,11 +285,12 @@ class CompositionEngine:
         placed.stands = body
         self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
 
-    def _weld(self, number: int, at: Vector, turned: Quaternion, grasp: Sequence[float]) -> None:
-        """Set how a body is held by a link whose frame has the pose (`at`, `turned`) in MuJoCo's body."""
+    def _weld(self, number: int, origin: Vector, axes: Quaternion, grasp: Sequence[float]) -> None:
+        """Set how a body is held by a link whose frame has the pose (`origin`, `axes`) in MuJoCo's body."""
         px, py, pz, qx, qy, qz, qw = grasp
-        x, y, z, w = multiply(turned, (qx, qy, qz, qw))
-        self.m.eq_data[number, :10] = *ORIGIN, *moved(at, rotate(turned, (px, py, pz)), 1.0), w, x, y, z
+        x, y, z, w = multiply(axes, (qx, qy, qz, qw))
+        place = moved(origin, rotate(axes, (px, py, pz)), 1.0)
+        self.m.eq_data[number, :10] = *ORIGIN, *place, w, x, y, z
 
     def _command(self, everybody: Sequence[Drives]) -> None:
         """Set the target speeds of motors, and the greatest forces with which they are reached."""
