@@ -17,7 +17,7 @@ from mypy_extensions import mypyc_attr
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.floors import Floors, as_plane
-from foosim.node.physics.interface import Island
+from foosim.node.physics.interface import Island, Weld
 from foosim.node.physics.mesh_pieces import MeshPieces
 from foosim.node.physics.mujoco_model import (
     SCENERY,
@@ -39,7 +39,18 @@ from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
 from foosim.world.rules.wind import air_of
-from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
+from foosim.world.scene import (
+    MOVING,
+    ORIGIN,
+    Body,
+    Quaternion,
+    Shape,
+    Vector,
+    load_of,
+    moved,
+    multiply,
+    rotate,
+)
 
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were built last."""
@@ -47,10 +58,13 @@ SEATED_MAX: Final = 1024
 """Islands whose entities' places in a model are kept: there are more of them than compositions."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
 
-Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
-"""The kinds of an island's bodies, in name order, those of movers in their way, the pieces of meshes in reach, and the
-floors that all bodies are above. `Key` has the entities themselves, and how many of them are no movers."""
-Key = tuple[tuple[int, ...], int, tuple[int, ...], tuple[int, ...]]
+Composition = tuple[
+    tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int, int], ...]
+]
+"""The kinds of an island's bodies, in name order, those of movers in their way, the pieces of meshes in reach, the
+floors that all bodies are above, and of each weld the place of the body that holds, its link, and the place of the body
+that is held. `Key` has the entities themselves, how many of them are no movers, and the welds."""
+Key = tuple[tuple[int, ...], int, tuple[int, ...], tuple[int, ...], tuple[Weld, ...]]
 
 
 class MujocoIslands:
@@ -89,7 +103,7 @@ class MujocoIslands:
         """Build each kind of body alone; raise AssetError for the first entity of a kind that MuJoCo refuses."""
         for kind, entity in first.items():
             try:
-                self._build(((kind,), (), (), ()) if entity.is_rigid else ((), (kind,), (), ()))
+                self._build(((kind,), (), (), (), ()) if entity.is_rigid else ((), (kind,), (), (), ()))
             except ValueError as error:
                 raise AssetError(f"{entity.name}: MuJoCo refuses its body: {error}") from error
 
@@ -100,7 +114,7 @@ class MujocoIslands:
         """
         indices = tuple([one.index for one in (*island.bodies, *island.movers)])
         floors = self._floors.below(island.bodies, numbers)
-        key = indices, len(island.bodies), self._pieces_near(island, numbers), floors
+        key = indices, len(island.bodies), self._pieces_near(island, numbers), floors, island.welds
         seated = self._seated.get(key)
         if seated is None:
             if len(self._seated) == SEATED_MAX:
@@ -113,9 +127,9 @@ class MujocoIslands:
 
     def _seat(self, key: Key, island: Island) -> tuple[CompositionEngine, Seats]:
         """Return a model of an island's composition and its entities' seats in that."""
-        indices, count, pieces, floors = key
+        indices, count, pieces, floors, welds = key
         kinds = tuple([self._kinds[index] for index in indices])
-        composition = kinds[:count], kinds[count:], pieces, floors
+        composition = kinds[:count], kinds[count:], pieces, floors, tuple([weld[:3] for weld in welds])
         engine = self._models.get(composition)
         if engine is None:
             if len(self._models) == MODELS_MAX:
@@ -135,7 +149,7 @@ class MujocoIslands:
         bodies, movers = ([self._unnamed[kind] for kind in kinds] for kinds in key[:2])
         fixed = [as_plane(shape) if place in key[3] else shape for place, shape in enumerate(self._scenery)]
         scenery = [*fixed, *chain.from_iterable([self._meshes.pieces[piece] for piece in key[2]])]
-        return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers)
+        return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers, key[4])
 
     def close(self) -> None:
         """Free all models."""
@@ -164,7 +178,7 @@ class _Seat:
 class Seats:
     """The entities of an island in a model, in the order of its bodies, movers last."""
 
-    __slots__ = ("bodies", "everybody", "fixed", "movers", "q", "turned", "v")
+    __slots__ = ("bodies", "everybody", "fixed", "grasps", "movers", "q", "turned", "v")
 
     def __init__(self, m: Any, places: Sequence[Placed], island: Island, bodies: Sequence[Body]) -> None:
         self.everybody = [_Seat(*its) for its in zip(places, (*island.bodies, *island.movers), strict=True)]
@@ -172,6 +186,8 @@ class Seats:
         everything = list(zip(self.everybody, (*island.bodies, *island.movers), bodies, strict=True))
         self.movers = [its for its in everything if its[0].placed.is_mover]
         self.fixed = [(seat.placed, body) for seat, _, body in everything if not body.is_free]
+        self.grasps = [one.grasp for one in island.welds]
+        """Of each weld the first place of its grasp in the frame."""
         self.turned: list[tuple[int, int]] = []
         """Of each free body the first places of its angular velocity in `qvel` and of its orientation in the frame."""
         self.q, self.v = [0] * m.nq, [0] * m.nv
@@ -215,9 +231,11 @@ class CompositionEngine:
         scenery: Sequence[Shape],
         bodies: Sequence[Body],
         movers: Sequence[Body],
+        welds: Sequence[tuple[int, int, int]] = (),
     ) -> None:
         self._dt, self._substeps, self._count = substep_s, substeps, len(bodies)
-        built = ModelBuilder(physics, substep_s, scenery, bodies, movers)
+        built = ModelBuilder(physics, substep_s, scenery, bodies, movers, welds)
+        self._welds = built.welds
         self.m, self._placed, self._owners = built.m, built.placed, built.owners
         self._motors, clock = built.motors, built.clock
         self.d = d = built.d
@@ -262,6 +280,8 @@ class CompositionEngine:
         for placed, body in seats.fixed:
             if placed.stands is not body:
                 self._stand(placed, body)
+        for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
+            self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
             self._command(drives)
             qpos[self._clock_q], qvel[self._clock_v] = 0.0, 1.0
@@ -274,6 +294,13 @@ class CompositionEngine:
         x, y, z, w = body.orientation
         placed.stands = body
         self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
+
+    def _weld(self, number: int, origin: Vector, axes: Quaternion, grasp: Sequence[float]) -> None:
+        """Set how a body is held by a link whose frame has the pose (`origin`, `axes`) in MuJoCo's body."""
+        px, py, pz, qx, qy, qz, qw = grasp
+        x, y, z, w = multiply(axes, (qx, qy, qz, qw))
+        place = moved(origin, rotate(axes, (px, py, pz)), 1.0)
+        self.m.eq_data[number, :10] = *ORIGIN, *place, w, x, y, z
 
     def _command(self, everybody: Sequence[Drives]) -> None:
         """Set the target speeds of motors, and the greatest forces with which they are reached."""

@@ -48,6 +48,13 @@ class Rest:
                 return False
         return not movers or not any(moves(mover, start) for mover in movers)
 
+    def wake(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
+        """Begin to count anew: what one of them holds, or is held by, is another."""
+        for entity in bodies:
+            at = self._slots.get(entity.index)
+            if at is not None:
+                numbers[at] = 0.0
+
     def keep(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
         """Leave bodies at rest as they are; what they touch they have touched before."""
         for entity in bodies:

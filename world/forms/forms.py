@@ -366,11 +366,13 @@ class Engine(Form):
     """What computes rigid bodies.
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table.
+    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table. `grasps` says that
+    it holds two bodies together as `Island.welds` say.
     """
 
     meshes: bool = False
     islands: bool = False
+    grasps: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

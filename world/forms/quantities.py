@@ -20,4 +20,5 @@ Watts: TypeAlias = Annotated[float, Meta(extra={"unit": "W"})]
 Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """Of a whole: 0 to 1."""
 Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+Kilograms: TypeAlias = Annotated[float, Meta(extra={"unit": "kg"})]
 QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
