@@ -131,7 +131,7 @@ def set_edits(
 def _number(quantity: Quantity, value: object) -> float:
     """Return the number of a value, of a share 1 for true and 0 for false. Raises BadValue."""
     if quantity.dimension is PROBABILITY and (isinstance(value, bool) or value in FLAGS):
-        return float(value)  # type: ignore[arg-type]
+        return float(value)
     try:
         return float(quantity.read(value))
     except PydanticCustomError as error:
