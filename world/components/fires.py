@@ -18,7 +18,7 @@ class Fires:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self._fires = [
-            (entity, entity.offsets["position"], entity.offsets["radius"])
+            (entity.offsets["position"], entity.offsets["radius"])
             for entity in Surroundings(spec, layout).tagged(FIRE)
             if "position" in entity.offsets and "radius" in entity.offsets
         ]
@@ -26,11 +26,11 @@ class Fires:
     def near(self, place: Sequence[float], start: Sequence[float]) -> Iterator[tuple[float, float]]:
         """Yield of each fire that burns its radius (m) and the square of its distance from a place (m2), in name order.
 
-        `start` are the numbers at the start of the tick. What is absent or out burns not.
+        `start` are the numbers at the start of the tick. What is out, or absent, has a radius of 0.
         """
         x, y, z = place
-        for entity, at, radius_at in self._fires:
+        for at, radius_at in self._fires:
             radius = start[radius_at]
-            if radius > 0.0 and not entity.is_absent(start):
+            if radius > 0.0:
                 dx, dy, dz = start[at] - x, start[at + 1] - y, start[at + 2] - z
                 yield radius, dx * dx + dy * dy + dz * dz

@@ -45,6 +45,8 @@ PLACED: Final = ("position", "orientation", "heading")
 STOPPED: Final = ("linear_velocity", "angular_velocity", "base_velocity", "wheel_speeds", "joint_velocities")
 """The fields of a state that are 0 in an entity that was put elsewhere."""
 QUARANTINED: Final = "quarantined"
+FLAGS: Final = ("0", "1")
+"""Shares that need no unit: nothing and all."""
 WITH_A_PLACE: Final = frozenset((*PLACED[1:], *STOPPED, QUARANTINED))
 """What is set with a position."""
 
@@ -145,7 +147,7 @@ def set_edits(
 
 def _number(quantity: Quantity, value: object) -> float:
     """Return the number of a value, of a share 1 for true and 0 for false. Raises BadValue."""
-    if isinstance(value, bool) and quantity.dimension is PROBABILITY:
+    if quantity.dimension is PROBABILITY and (isinstance(value, bool) or value in FLAGS):
         return float(value)
     try:
         return float(quantity.read(value))
