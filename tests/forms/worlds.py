@@ -219,6 +219,17 @@ def _pushed() -> World:
     return World(data | {"players": driver(flyers, "force", (20.0, 20.0, 20.0, 0.1, 0.1, 0.1), "50 Hz")})
 
 
+def _gripping() -> World:
+    """Robots on two wheels that take boxes and let them go."""
+    data = json.loads(json.dumps(_drives()))
+    gripper = {"kind": "gripper", "at": {"x": "20 cm", "z": "10 cm"}, "reach": "40 cm"}
+    for robot in data["robots"].values():
+        robot["actuators"] = {"drive": {"kind": "v_w"}, "gripper": gripper}
+    robots = tuple(data["robots"])
+    data["players"]["hands"] = driver(robots, "gripper", (1.0,), "10 Hz")["driver"]
+    return World(data, ("robots", "one", "actuators", "gripper"))
+
+
 def _jointed(kind: str, bounds: Sequence[float]) -> World:
     """The table with general actuators of joints on its rods."""
     data = json.loads(json.dumps(_table()))
@@ -293,6 +304,7 @@ EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude"
 YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
 DRIVES: Final = World(_drives())
+GRIPS: Final = _gripping()
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -344,6 +356,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "motor_current"): sensor(TABLE, RODS, "motor_current", slide="9 N/A", spin="0.2 N m/A"),
     ("sensor", "gps"): sensor(EARTH, ROVERS, "gps", at={"x": "10 cm", "z": "50 cm"}),
     ("sensor", "imu"): sensor(TABLE, RODS, "imu", at={"link": "spin", "x": "5 cm", "y": "20 cm"}),
+    ("sensor", "gripper"): sensor(GRIPS, ("one", "two"), "gripper"),
     ("sensor", "joint_state"): sensor(
         TABLE, RODS, "joint_state", modifiers=[{"kind": "gaussian_noise", "std": {"motion": 0.001, "efforts": 0.5}}]
     ),
@@ -358,6 +371,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "thermometer"): sensor(YARD, ["one", "base", "craft"], "thermometer", at={"z": "20 cm"}),
     ("sensor", "velocity"): sensor(YARD, ["one", "base", "craft"], "velocity", at={"x": "20 cm"}),
     ("actuator", "force"): _pushed(),
+    ("actuator", "gripper"): GRIPS,
     ("actuator", "joint_position"): _jointed("joint_position", (0.1, 2.0)),
     ("actuator", "joint_velocity"): _jointed("joint_velocity", (0.5, 20.0)),
     ("actuator", "rod_force"): _driven("rod_force", (40.0, 0.5)),
