@@ -61,6 +61,8 @@ def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Lay
         if not bits[one.channel] & those:
             continue
         called(f"actuator {one.channel}", robot.name, view.tick, one.actuator.hold, view)
+        if one.jobs is not None:
+            one.jobs.drop(view)
         for field, at in robot.offsets.items():
             if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
                 numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

@@ -94,7 +94,7 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
-        self._standing = Standing(layout, self.world.actuators, self.world.ruled)
+        self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
         """Bodies that are islands by themselves, of the islands that were solved last."""
         self._grippers: dict[int, list[Gripper]] = {}
@@ -214,7 +214,9 @@ class Stepper:
         for one in self.world.actuators.get(entity.index, ()):
             if one.channel == packet.channel:
                 off = int(view.numbers[entity.offsets[INACTIVE]])
-                return not off & self._switches[entity.name][one.channel] and one.accept(packet.payload, view)
+                return not off & self._switches[entity.name][one.channel] and one.accept(
+                    packet.payload, view, packet.source
+                )
         return False
 
     def solve(self, engine: AnyEngine, work: Work) -> None:
@@ -236,6 +238,7 @@ class Stepper:
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick, work.values if work.start else None)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
+        world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
             self._standing.note(bodies, numbers, before)
         if not isfinite(sum(numbers)) or any(self._problem(entity, before, work) for entity in changed):

@@ -35,6 +35,7 @@ from foosim.world.forms.forms import (
     References,
     WorldRule,
 )
+from foosim.world.forms.jobs import job_slots
 from foosim.world.forms.per_field import Numbers, numbers_of
 from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
 from foosim.world.spec import WorldSpec
@@ -403,6 +404,8 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
+        if component.jobs:
+            slots |= _behind(label, job_slots(spec.senders_to(name)))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
@@ -434,11 +437,11 @@ def _demanded(robot: RobotSettings) -> dict[str, int]:
     if not model.on_demand:
         return {}
     components = [
-        registry.find_component(form, its.kind)
+        (registry.find_component(form, its.kind), its)
         for form, having in (("sensor", robot.sensors), ("actuator", robot.actuators))
         for its in having.values()
     ]
-    needs = [need for one in components for need in (*one.needs, one.speaks)]
+    needs = [need for one, its in components for need in (*one.needs, one.speaks_by(its))]
     needs += [need for its in robot.rules.values() for need in find_entity_rule(its).needs]
     return model.demanded(needs)
 

@@ -52,6 +52,7 @@ class Driver(Player):
             limits = next((found for one in its if (found := one.actuator.limits())), {})
             most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
             self._bounds[robot] = list(map(min, bounds, most))
+        self._has_jobs = kind.jobs
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
@@ -63,6 +64,8 @@ class Driver(Player):
         more = draw_words(draw_key(4, "driver", robot), tick)
         shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
         numbers = [bound * share for bound, share in zip(self._bounds[robot], shares, strict=False)]
+        if self._has_jobs:
+            numbers.append(0.0 if tick % 3 == 2 else tick + 1.0)
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 
 
@@ -247,6 +250,16 @@ def _driven(kind: str, bounds: Sequence[float]) -> World:
     return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")}, place)
 
 
+def _going() -> dict[str, Any]:
+    """The yard with robots that are sent to places, and tell how that goes."""
+    data: dict[str, Any] = json.loads(json.dumps(_yard()))
+    for name in ("one", "two", "base"):
+        data["robots"][name]["actuators"] = {"go": {"kind": "go_to", "feelers": "60 cm", "patience": "0.3 s"}}
+        data["robots"][name]["sensors"] = {"sensed": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
+    flight = {"flight": data["players"]["flight"]}
+    return data | {"players": driver(("one", "two", "base"), "go_to", (2.0, 2.0), "5 Hz") | flight}
+
+
 def changed_slots(first: Frame, last: Frame) -> set[str]:
     """Return the slots that differ between two frames, each after its entity."""
     return {
@@ -305,6 +318,7 @@ YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
 DRIVES: Final = World(_drives())
 GRIPS: Final = _gripping()
+JOBS: Final = World(_going(), ("robots", "one", "actuators", "go"))
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -385,6 +399,8 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "hull"): SOLIDS,
     ("model", "quadrotor"): SOLIDS,
     ("model", "sphere"): SOLIDS,
+    ("actuator", "go_to"): JOBS,
+    ("sensor", "job"): World(JOBS.data, ("robots", "one", "sensors", "sensed")),
     ("actuator", "v_w"): YARD,
     ("actuator", "waypoint"): YARD,
     ("actuator", "x_y_w"): YARD,

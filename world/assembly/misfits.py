@@ -103,13 +103,15 @@ def component_problems(form: Form, model: Model, having: Mapping[str, int] | Non
     has = model.declared if having is None else having
     word = word_of(form.form)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and _speaks_by_model(form) and form.speaks not in needs:
-        needs = (*needs, form.speaks)
+    if isinstance(form, Component) and (field := _speaks_by_model(form)) and field not in needs:
+        needs = (*needs, field)
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
         yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
+    if isinstance(form, Component) and form.jobs and not model.is_solved:
+        yield f"{word} whose jobs would never end: {with_article(model.name)} is neither rigid nor has a motion"
     if not isinstance(form, EntityRule):
         return
     written = [] if has is None else [field for field in form.writes if field not in has]
@@ -130,10 +132,13 @@ def _having(fields: Collection[str]) -> Iterator[str]:
                 yield f"{model.name} with dynamics: {dynamics}"
 
 
-def _speaks_by_model(sensor: Component) -> bool:
-    """Whether a sensor speaks by a field of the model, and not by a slot of its own or of a rule (`unheard`)."""
-    is_own = callable(sensor.slots) or sensor.speaks in sensor.slots
-    return bool(sensor.speaks) and not is_own and "." not in sensor.speaks
+def _speaks_by_model(sensor: Component) -> str:
+    """Return the field of the model by which a sensor speaks; empty of one that speaks by a slot of its own, or of a
+    rule or an actuator (`unheard`)."""
+    speaks = sensor.speaks
+    if callable(speaks) or callable(sensor.slots) or speaks in sensor.slots or "." in speaks:
+        return ""
+    return speaks
 
 
 def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
@@ -264,9 +269,10 @@ def unheard(spec: WorldSpec) -> Iterator[Finding]:
     layout: Layout | None = None
     for name, robot in spec.robots.items():
         for channel, settings in robot.sensors.items():
-            speaks = registry.find_component("sensor", settings.kind).speaks
-            if not speaks:
-                continue
+            sensor = registry.find_component("sensor", settings.kind)
+            speaks = sensor.speaks_by(settings)
+            if not speaks or (callable(sensor.speaks) and hasattr(sensor.made, "check")):
+                continue  # its own check names the setting
             layout = layout or build_layout(spec)
             if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
                 valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"

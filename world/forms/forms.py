@@ -156,6 +156,8 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     return found  # type: ignore[no-any-return]
 
 
+SpeaksOf: TypeAlias = Callable[[Any], str]
+"""What makes a sensor measure besides its rate, by its settings."""
 SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 """How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
 
@@ -199,9 +201,9 @@ class Component(Form):
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
     `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
     joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
-    motor is commanded by two actuators.
+    motor is commanded by two actuators. `jobs` says that its commands may be jobs (`forms.jobs`).
     `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
-    tick at whose start its first number is not 0.
+    tick at whose start its first number is not 0; or a function that says it, which may name a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
@@ -211,10 +213,11 @@ class Component(Form):
     slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     several: str | SeveralOf = ""
-    speaks: str = ""
+    speaks: str | SpeaksOf = ""
     shown_as: str = ""
     moves: bool = False
     joints: str = ""
+    jobs: bool = False
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
@@ -223,6 +226,10 @@ class Component(Form):
         if not callable(self.slots):
             return self.slots
         return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
+
+    def speaks_by(self, settings: Any) -> str:
+        """Return what makes a sensor with these settings measure besides its rate; empty for nothing."""
+        return self.speaks(settings) if callable(self.speaks) else self.speaks
 
     def joints_named(self, settings: Any) -> Sequence[str] | None:
         """Return the joints that an actuator with these settings commands; None for all. Raises BadValue."""

@@ -21,4 +21,6 @@ Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """Of a whole: 0 to 1."""
 Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 Kilograms: TypeAlias = Annotated[float, Meta(extra={"unit": "kg"})]
+JobNumber: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+"""The last field of a command that may be a job (`forms.jobs`)."""
 QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
