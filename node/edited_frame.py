@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from foosim.world.assembly.grippers import grippers_of, release
 from foosim.world.assembly.world import body_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView, called
@@ -29,6 +30,8 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
             if entity.is_robot and change.field in (DOWN, INACTIVE):
                 those = -1 if change.field == DOWN else switched ^ int(change.numbers[0])
                 _hold(WritableView(frame.tick, numbers), numbers, spec, layout, entity, those)
+            elif change.field == "position":
+                release(grippers_of(spec, layout), numbers, entity)
         else:
             moved.append(entity)
             for place in layout.references:

@@ -14,11 +14,9 @@ def edit_text(edit: EditRow) -> str:
     """Return a description of a requested edit; empty for other edits."""
     if edit.kind == "push":
         return f"push {edit.name} by {_vector(edit.impulse)} N s"
-    if edit.kind == "add":
-        return f"add {edit.name}"
     if edit.kind == "set":
         return _set_text(edit)
-    return f"remove {edit.name}" if edit.kind == "remove" else ""
+    return {"add": f"{edit.name} was added", "remove": f"{edit.name} was removed"}.get(edit.kind, "")
 
 
 def _set_text(edit: EditRow) -> str:

@@ -28,7 +28,7 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.settings import ComponentSettings, EntitySettings, RobotSettings
+from foosim.world.forms.settings import ComponentSettings, RobotSettings
 from foosim.world.layout import (
     Declaring,
     Layout,
@@ -41,6 +41,7 @@ from foosim.world.layout import (
     spares_of,
     world_rules,
 )
+from foosim.world.rules.wind import WindSettings
 from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
@@ -171,7 +172,7 @@ def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[s
     wrong = [name for name in found if not is_robot_name(name)]
     if wrong:
         return {}, [f"spares returns the entity {show(wrong[0])}: {NAME_RULE}"]
-    return dict(found), []
+    return found, []
 
 
 def kit_problems(
@@ -309,13 +310,8 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
 
 def lasting_spares(spec: WorldSpec) -> Iterator[Finding]:
     """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
-    sections: dict[str, Mapping[str, EntitySettings]] = {"objects": spec.objects, "robots": spec.robots}
-    named: dict[str, Location] = {
-        name: (section, name, "spare")
-        for section, entities in sections.items()
-        for name, settings in entities.items()
-        if settings.spare
-    }
+    named: dict[str, Location] = {name: ("objects", name, "spare") for name, one in spec.objects.items() if one.spare}
+    named |= {name: ("robots", name, "spare") for name, one in spec.robots.items() if one.spare}
     named |= {name: (kit.name,) for kit in kits_named(spec) for name in spares_of(spec, kit)}
     layout = build_layout(spec) if named else None
     for name, location in named.items():
@@ -339,9 +335,15 @@ class _Rigid(NamedTuple):
 
 
 def engine_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Rigid bodies that the engine does not have, and those of which no engine has both."""
+    """Rigid bodies that the engine does not have, those of which no engine has both, and wind that it does not have."""
     engine = registry.find("engine", spec.engine)
     assert isinstance(engine, Engine), engine
+    winds = [name for name, settings in spec.rules.items() if isinstance(settings, WindSettings)]
+    if winds and not engine.islands:
+        what = f"the engine has no air, and the world has the rule {winds[0]}, which is wind"
+        yield Finding(("engine",), what, engine.name, "'mujoco'")
+    for name in winds[1:]:
+        yield Finding(("rules", name), f"a second wind beside {winds[0]}", name, at="key")
     body, rod = next(rigid_bodies(spec), None), next(_rods(spec), None)
     if body is not None and rod is not None:
         for one, other in ((body, rod), (rod, body)):

@@ -15,7 +15,7 @@ from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, Model, slots_problem, with_article, word_of
+from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, SET_BY_FOOSIM, Model, slots_problem, with_article, word_of
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
 from foosim.world.forms.shown import MESSAGES
@@ -124,7 +124,9 @@ def _settable(found: Any, key: str) -> Iterator[str]:
             yield f"settable: {show(name)}: {NAME_RULE}"
         elif not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif not hasattr(found.made, "set") and found.slots.get(name) != 1:
+        elif isinstance(found, Model) and name in SET_BY_FOOSIM:
+            yield f"settable: {name} is set by foosim itself"
+        elif not hasattr(found.made, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"
 
 
