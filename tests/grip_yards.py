@@ -41,6 +41,35 @@ CRANE: Final = """<robot name="crane">
   <joint name="front" type="fixed"><parent link="hand"/><child link="grip"/><origin xyz="0.23 0 0"/></joint>
 </robot>
 """
+WHEELS: Final = ("front-left", "front-right", "rear-left", "rear-right")
+_WHEEL: Final = """
+  <link name="{name}">
+    <inertial><mass value="1"/><inertia ixx="0.002" iyy="0.0032" izz="0.002"/></inertial>
+    <collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.08" length="0.03"/></geometry></collision>
+  </link>
+  <joint name="axle-{name}" type="continuous">
+    <parent link="hull"/><child link="{name}"/><origin xyz="{x} {y} -0.07"/><axis xyz="0 1 0"/>
+    <limit effort="10" velocity="20"/>
+  </joint>"""
+PORTER: Final = f"""<robot name="porter">
+  <link name="hull">
+    <inertial><mass value="30"/><inertia ixx="0.3" iyy="0.5" izz="0.7"/></inertial>
+    <collision><geometry><box size="0.5 0.3 0.1"/></geometry></collision>
+  </link>
+  {"".join([_WHEEL.format(name=name, x=x, y=y) for name, x, y in zip(
+      WHEELS, (0.2, 0.2, -0.2, -0.2), (0.18, -0.18, 0.18, -0.18), strict=True)])}
+  <link name="fork">
+    <inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
+    <collision><geometry><box size="0.04 0.1 0.1"/></geometry></collision>
+  </link>
+  <joint name="lift" type="prismatic">
+    <parent link="hull"/><child link="fork"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.5" effort="200" velocity="0.5"/>
+  </joint>
+</robot>
+"""  # fmt: skip
+HULL_M: Final = 0.15
+"""The height of the middle of its hull."""
 Step = tuple[int, str, str, Sequence[float]]
 """From which tick on, whom, which actuator, and what it is told."""
 
@@ -62,10 +91,11 @@ class Script(Player):
 
 @cache
 def folder() -> Path:
-    """Return a folder with the URDF file of a crane in its folder `models`."""
+    """Return a folder with the URDF files of a crane and a porter in its folder `models`."""
     made = Path(mkdtemp())
     (made / "models").mkdir()
     (made / "models" / "crane.urdf").write_text(CRANE)
+    (made / "models" / "porter.urdf").write_text(PORTER)
     return made
 
 
@@ -84,6 +114,24 @@ def crane(x: float, *, y: float = 0.0, yaw_deg: float = 0.0, **gripper: Any) -> 
             "grip": {"kind": "gripper", "rate": "50 Hz"},
             "state": {"kind": "joint_state", "rate": "50 Hz"},
         },
+    }
+
+
+def porter(x: float, **more: Any) -> dict[str, Any]:
+    """Return a robot on four wheels whose fork, 32 cm ahead of its middle, lifts what its gripper holds."""
+    return {
+        "model": "urdf",
+        "file": "porter.urdf",
+        "fixed": False,
+        "speed_limit": "4 m/s",
+        "at": {"x": f"{x} m", "z": f"{HULL_M} m"},
+        "actuators": {
+            "gripper": {"kind": "gripper", "at": {"link": "fork", "x": "2 cm"}, "reach": "3 cm"},
+            "lift": {"kind": "joint_position", "joints": ["fork"], "gain": "5 Hz"},
+            "wheels": {"kind": "joint_velocity", "joints": list(WHEELS)},
+        },
+        "sensors": {"grip": {"kind": "gripper", "rate": "50 Hz"}},
+        **more,
     }
 
 

@@ -23,7 +23,7 @@ from foosim.replay.verify import verify_capture
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.frame import Frame
 from tests.frames import Frames
-from tests.grip_yards import NAME, SIDE_M, Step, crane, crate, folder, world
+from tests.grip_yards import NAME, SIDE_M, Step, crane, crate, folder, porter, world
 
 HIGH_M: Final = 0.4
 STEPS: Final[tuple[Step, ...]] = (
@@ -167,6 +167,33 @@ def test_cranes_obey_the_laws() -> None:
     assert holders(on_one()[1][CHECKED]) == "a"
     check = ComponentCheck(text, NAME, CHECKED, files=files, run=partial(rehearse, folder=folder()))
     assert list(check.broken()) == []
+
+
+SPEED: Final = 0.5 / 0.08
+FETCHING: Final[tuple[Step, ...]] = (
+    (10, "p", "wheels", (SPEED,) * 4),
+    (220, "p", "wheels", (0.0,) * 4),
+    (270, "p", "gripper", (1.0,)),
+    (275, "p", "lift", (0.3,)),
+    (380, "p", "wheels", (-SPEED,) * 4),
+    (580, "p", "wheels", (0.0,) * 4),
+    (620, "p", "lift", (0.0,)),
+    (720, "p", "gripper", (0.0,)),
+)
+"""A porter drives to a crate, lifts it, brings it back by a metre and puts it down."""
+
+
+def test_a_crate_is_fetched_on_any_number_of_nodes() -> None:
+    """It comes from beside a crane of another node."""
+    robots = {"c": crane(1.5, y=0.8, yaw_deg=-90.0), "p": porter(0.0), "q": crane(0.0, y=4.0)}
+    text = world(robots, {"crate": crate(1.48, mass=6.0)}, FETCHING)
+    frames = Frames()
+    one = run(1, text=text, on_commit=frames)
+    place = frames.frames[-1].vector("crate", "position", 3)
+    assert place == pytest.approx([0.48, 0.0, SIDE_M / 2], abs=0.1)
+    assert max(frame.vector("crate", "position", 3)[2] for frame in frames.frames) > 0.39
+    for nodes in (2, 3):
+        assert run(nodes, partial(shuffle, seed=nodes, ticks=TICKS), text=text).digests == one.digests
 
 
 # --- mutations -------------------------------------------------------------------------------------------------------

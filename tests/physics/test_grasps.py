@@ -17,7 +17,7 @@ from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
 from foosim.world.sensors.gripper import GripperState
 from tests.forms.worlds import DEPLOY
-from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, folder, world
+from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, folder, porter, world
 
 GRAVITY: Final = 9.80665
 LEFT_M: Final = 1.0 - SIDE_M / 2
@@ -337,6 +337,34 @@ def test_a_quadrotor_carries_by_its_only_link() -> None:
             1e-3
         )
         assert abs(turned[3]) < cos(0.3), "it has turned"
+
+
+def loaded() -> Simulation:
+    """A porter that has lifted a crate."""
+    made = simulation({"a": porter(0.0, spare=False)}, {"crate": crate(0.43, mass=6.0)})
+    made.step({"a": {"gripper": (1.0,)}})
+    made.step({"a": {"lift": (0.3,)}}, ticks=200)
+    assert vector(made, "crate", "position")[2] == pytest.approx(SIDE_M / 2 + 0.3, abs=0.01)
+    return made
+
+
+def test_a_holder_that_is_put_elsewhere_lets_go() -> None:
+    with loaded() as made:
+        made.set("a", "at", "3,3")
+        made.step({}, ticks=100)
+        assert held(made) == ""
+        assert vector(made, "crate", "position")[0] == pytest.approx(0.43, abs=0.01)
+        assert vector(made, "crate", "position")[2] == pytest.approx(SIDE_M / 2, abs=0.002)
+
+
+def test_a_holder_that_leaves_the_world_lets_go() -> None:
+    with loaded() as made:
+        made.remove("a")
+        made.step({}, ticks=100)
+        assert vector(made, "crate", "position")[2] == pytest.approx(SIDE_M / 2, abs=0.002)
+        made.add("a", "-2,0")
+        made.step({}, ticks=10)
+        assert held(made) == ""
 
 
 # --- refusals --------------------------------------------------------------------------------------------------------
