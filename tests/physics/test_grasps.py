@@ -387,7 +387,11 @@ BASE: Final = {"model": "holonomic", "actuators": {"grip": {"kind": "gripper"}}}
             {"engine": "pure"},
             ["robots.b.actuators.grip.kind", "the engine pure has no grasps: valid is mujoco"],
         ),
-        ({"b": BASE}, {}, ["robots.b.actuators.grip.kind", "goes on by a motion", "that the engine solves"]),
+        (
+            {"b": BASE},
+            {},
+            ["robots.b.actuators.grip.kind", "b is no rigid body", "valid on robots that the engine solves"],
+        ),
         ({"a": crane(0.0, at={"link": "gripp"})}, {}, ["robots.a.actuators.gripper.at.link", "no such link", "grip"]),
         (
             {"a": crane(0.0) | {"sensors": {"g": {"kind": "gripper", "rate": "1 Hz", "gripper": "griper"}}}},
