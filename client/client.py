@@ -28,7 +28,15 @@ from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
 
 from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
-from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded
+from foosim.client.errors import (
+    ConnectionFailed,
+    ConnectionRefused,
+    JobUnfinished,
+    NotJoined,
+    PacketError,
+    RunEnded,
+)
+from foosim.client.jobs import Job, Jobs
 from foosim.client.packets import check_packet, check_subscription
 from foosim.client.player import Commands, Packet, Sample
 from foosim.client.playing import NS_PER_S, Newest
@@ -42,6 +50,7 @@ from foosim.protocol.channels import VHUB, Plane
 from foosim.protocol.messages import Received
 from foosim.runtime.process import new_boot
 from foosim.runtime.transport.inbox import Inbox
+from foosim.world.forms.jobs import JobState
 from foosim.world.forms.payloads import Field, Value
 
 if TYPE_CHECKING:
@@ -53,6 +62,9 @@ RUN: Final = "run:"
 NEWEST: Final = "newest"
 _LOG: Final = logging.getLogger("foosim.client")
 _LOG.addHandler(logging.NullHandler())
+
+AGAIN_S: Final = 0.05
+"""Wall time after which a client that waits for a job looks whether a command is to be sent again."""
 
 T = TypeVar("T")
 Turns = tuple[int, int, tuple[tuple[str, str], ...]]
@@ -97,6 +109,37 @@ class Named(Generic[T]):
         return len(self._names)
 
 
+class CalledJob:
+    """A job of this client, which waits for it."""
+
+    def __init__(self, client: Client, job: Job) -> None:
+        self._client, self._job = client, job
+
+    @property
+    def number(self) -> int | None:
+        """Its number; None before it is sent, which waits for the first reading of the job sensor."""
+        return self._job.number
+
+    @property
+    def state(self) -> JobState:
+        """How it stands by the newest reading; NONE before it is known to be taken."""
+        return self._job.state
+
+    def cancel(self) -> None:
+        """Call it off. Raises NotJoined, RunEnded."""
+        self._job.cancel()
+        self._client._send_jobs()
+
+    def result(self, timeout_s: float | None = None) -> None:
+        """Wait until it is done.
+
+        After `listen` the time is wall time, and packets are taken as by `receive`; in lockstep it is simulated time,
+        and the client goes from tick to tick as its loop would. Raises JobFailed, JobPreempted, JobCancelled,
+        JobUnfinished when the time is over, RunEnded, NotJoined and ConnectionFailed.
+        """
+        self._client._wait_for(self._job, timeout_s)
+
+
 class Actuator:
     """An actuator of a robot."""
 
@@ -108,7 +151,7 @@ class Actuator:
     @property
     def fields(self) -> tuple[Field, ...]:
         """The numbers of its commands, in their order, with their units."""
-        return self._client._encoder.actuator(self._robot, self._channel).codec.fields
+        return tuple(self._client._encoder.actuator(self._robot, self._channel).fields)
 
     def set(self, *numbers: float, **named: float) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
@@ -121,6 +164,30 @@ class Actuator:
         if numbers and named:
             raise taker.wrong("numbers are given by name or in their order, not both")
         self._client._command(self._robot, self._channel, taker.pack(named or numbers))
+
+    def call(self, *numbers: float, **named: float) -> CalledJob:
+        """Give the actuator a job, by the numbers of a command as for `set`: `call(x=3.0, y=1.0).result(60.0)`.
+
+        The command is sent again until the job sensor of the robot, to which the client has subscribed, tells that it
+        was taken: in `receive` and `result`, or when a tick ends. It preempts the job that runs, whoever's that is.
+        Raises BadValue for an actuator without jobs or a sensor that tells of them, and as `set` does; UnknownName
+        without the subscription, NotJoined and RunEnded.
+        """
+        self._client._check_sending()
+        jobs = self._client._jobs_of(self._robot, self._channel)
+        job = jobs.call(*numbers, **named)
+        self._client._commands.pop((self._robot, self._channel), None)
+        self._client._send_jobs()
+        return CalledJob(self._client, job)
+
+    @property
+    def job(self) -> CalledJob | None:
+        """This client's last job: the one that it called, else, after a restart, the one of which the sensor tells.
+
+        Raises as `call`.
+        """
+        job = self._client._jobs_of(self._robot, self._channel).job
+        return None if job is None else CalledJob(self._client, job)
 
 
 class Robot:
@@ -233,6 +300,8 @@ class Client:
         """By robot and channel."""
         self._encoder = CommandEncoder(deployment)
         self._outgoing: deque[Packet] = deque()
+        self._jobs: dict[tuple[str, str], Jobs] = {}
+        """By robot and channel of the actuator."""
 
     # --- what it is --------------------------------------------------------------------------------------------------
 
@@ -333,6 +402,7 @@ class Client:
         if self._period != 0:
             raise NotJoined("receive() after listen(); in lockstep the packets are in client.packets")
         core = self._core
+        self._send_jobs()
         self._link.wait(lambda: bool(core.arrivals) or core.ended, timeout_s)
         if core.ended and not core.arrivals:
             raise RunEnded("the run is over")
@@ -390,13 +460,57 @@ class Client:
 
     def _answer(self) -> None:
         """Send what was set in the loop's body, commands last and in their robots' name order."""
-        packets = [*self._outgoing, *(command for _, command in sorted(self._commands.items()))]
+        packets = [*self._outgoing, *self._due_jobs(), *(command for _, command in sorted(self._commands.items()))]
         self._outgoing.clear()
         self._commands.clear()
         if self._core.go is None:  # the run has ended since
             return
         self._core.done(packets)
         self._link.perform()
+
+    def _jobs_of(self, robot: str, channel: str) -> Jobs:
+        """Return this client's jobs of an actuator, as far as they are known."""
+        found = self._jobs.get((robot, channel))
+        if found is None:
+            found = Jobs(self.deployment, self.name, robot, channel)
+            self._sample(*found.heard)  # raises without the subscription
+            found.hear(self._newest.samples)
+            self._jobs[robot, channel] = found
+        return found
+
+    def _due_jobs(self) -> list[Packet]:
+        tick = max(self.tick, 0)
+        due = [(jobs.robot, jobs.actuator, jobs.payload(tick)) for _, jobs in sorted(self._jobs.items())]
+        return [Packet(robot, channel, payload) for robot, channel, payload in due if payload is not None]
+
+    def _send_jobs(self) -> None:
+        """After `listen`: send what is due of jobs; in lockstep that is sent with the tick."""
+        if self._period == 0 and not self._core.ended:
+            for packet in self._due_jobs():
+                self.send(*packet)
+
+    def _wait_for(self, job: Job, timeout_s: float | None) -> None:
+        tick, begun_s = self.tick, time.monotonic()
+        while not job.check():
+            passed_s = (self.tick - tick) * self.deployment.tick_ns / NS_PER_S
+            if not self._period:
+                passed_s = time.monotonic() - begun_s
+            if timeout_s is not None and passed_s >= timeout_s:
+                raise JobUnfinished(f"{job.what}: job {job.number} has not ended within {timeout_s:g} s")
+            if self._period:
+                self._go_on()
+            else:
+                self.receive(AGAIN_S)
+
+    def _go_on(self) -> None:
+        """In the body of a loop in lockstep: answer its tick, and come to the next one."""
+        core = self._core
+        self._check_sending()
+        self._answer()
+        self._link.wait(lambda: core.go is not None or core.ended, None)
+        if core.go is None:
+            raise RunEnded("the run is over")
+        self._take(core.go.packets)
 
     def _join(self, turns: Turns) -> None:
         period, offset, arrivals = turns
@@ -431,6 +545,8 @@ class Client:
     def _take(self, received: Iterable[Received]) -> None:
         received = list(received)
         self._newest.take(received)
+        for jobs in self._jobs.values():
+            jobs.hear(self._newest.samples)
         self.packets = [self._packet(packet) for packet in received]
 
     def _packet(self, packet: Received) -> Arrived:

@@ -14,7 +14,7 @@ from foosim.client.player import Command
 from foosim.common.errors import ABSENT, BadValue, UnknownName
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.forms.payloads import Field, PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
 
@@ -29,10 +29,15 @@ class Taker(NamedTuple):
     joints: Sequence[str]
 
     @property
+    def fields(self) -> Sequence[Field]:
+        """The fields of a plain command: without the number of a job, which is not the caller's to choose."""
+        return self.codec.fields[:-1] if self.codec.has_job else self.codec.fields
+
+    @property
     def takes(self) -> str:
         """What it takes, in words: its fields with their units."""
         whose = f" of {', '.join(self.joints)}" if self.joints else ""
-        fields = [f"{field.name}{f' ({field.unit})' if field.unit else ''}{whose}" for field in self.codec.fields]
+        fields = [f"{field.name}{f' ({field.unit})' if field.unit else ''}{whose}" for field in self.fields]
         return f"{self.robot}/{self.channel} takes {', '.join(fields)}"
 
     def wrong(self, what: str, value: object = ABSENT, nearest: str | None = None) -> BadValue:
@@ -40,7 +45,11 @@ class Taker(NamedTuple):
         return BadValue(f"{self.takes}: {what}", value, None if nearest is None else repr(nearest))
 
     def pack(self, command: object) -> bytes:
-        """Return the payload of a command. Raises BadValue for one that is none of this actuator."""
+        """Return the payload of a plain command. Raises BadValue for one that is none of this actuator."""
+        return self.encode(self.value(command))
+
+    def value(self, command: object) -> Any:
+        """Return a plain command as a value of the actuator's type, with unchecked numbers; raises as `pack`."""
         codec = self.codec
         if not isinstance(command, codec.kind):
             if isinstance(command, Struct):
@@ -49,6 +58,11 @@ class Taker(NamedTuple):
             command = codec.kind(**values)
         if self.joints:
             self._check_length(getattr(command, codec.fields[0].name))
+        return command
+
+    def encode(self, command: Any) -> bytes:
+        """Return the payload of a value of the actuator's type. Raises BadValue."""
+        codec = self.codec
         try:
             return codec.encode_checked(command)
         except BadValue as error:
@@ -57,7 +71,7 @@ class Taker(NamedTuple):
 
     def _named(self, command: Mapping[Any, Any]) -> dict[str, Any]:
         """Return the values of fields, or of joints, by their names."""
-        fields = [field.name for field in self.codec.fields]
+        fields = [field.name for field in self.fields]
         if self.joints and not any(name in fields for name in command):
             self._check_names(command, self.joints, self.joints)
             return {fields[0]: tuple(command[joint] for joint in self.joints)}
@@ -78,7 +92,7 @@ class Taker(NamedTuple):
         if not _is_sequence(command):
             raise self.wrong("not numbers by name or in their order", command)
         values: list[Any] = [*command]  # type: ignore[misc]
-        fields = self.codec.fields
+        fields = self.fields
         if _is_several(self.codec) and not (len(values) == 1 and _is_sequence(values[0])):
             return {fields[0].name: tuple(values)}
         if len(values) != len(fields):

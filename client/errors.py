@@ -33,3 +33,28 @@ class NotJoined(Refused):
 
 class RunEnded(Refused):
     """The run is over: nothing can be sent or received."""
+
+
+class JobError(Refused):
+    """A job that has ended otherwise than done: its number, None of one that was not sent, and who commanded the robot
+    instead, where that is known."""
+
+    def __init__(self, what: str, number: int | None, by: str = "") -> None:
+        super().__init__(what)
+        self.number, self.by = number, by
+
+
+class JobFailed(JobError):
+    """The actuator could not do it, refused it, or its robot went out of service."""
+
+
+class JobPreempted(JobError):
+    """A later command took its place."""
+
+
+class JobCancelled(JobError):
+    """Its sender has called it off."""
+
+
+class JobUnfinished(Refused):
+    """A job that has not ended in the time that one wanted to wait."""

@@ -56,9 +56,10 @@ class _Part(NamedTuple):
 
 
 def numbers_in(one: FittedSensor | FittedActuator) -> int:
-    """Return how many numbers a reading or command has; 0 of one that is not numbers, or not always as many."""
+    """Return how many numbers a reading or plain command has; 0 of one that is not numbers, or not always as many."""
     made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
-    return len(made.bounds()) if not one.size and hasattr(made, "bounds") else one.size
+    size = len(made.bounds()) if not one.size and hasattr(made, "bounds") else one.size
+    return size - one.codec.has_job if size else 0
 
 
 class _Table:

@@ -202,6 +202,11 @@ class Deployment(WorldSpec):
         """The names that packets go from and to, sorted: robots, players and clients."""
         return sorted([*self.robots, *self.players, *self.clients])
 
+    def senders_to(self, robot: str) -> tuple[str, ...]:
+        """The endpoints that may command a robot, in name order: players that name it, and all clients."""
+        players = [name for name, player in self.players.items() if robot in player.robots]
+        return tuple(sorted([*players, *self.clients]))
+
     def carriers(self) -> dict[str, str]:
         """The robot on whose board each player and client is that is on one."""
         on_board = [(name, player.on) for name, player in self.players.items()]

@@ -15,17 +15,21 @@ if TYPE_CHECKING:
     from foosim._capture import Capture, open_capture
     from foosim._rehearse import load_deployment, rehearse
     from foosim.client.client import Client, connect
+    from foosim.client.jobs import Jobs
     from foosim.client.player import Commands, Packet, Player, Sample, Samples, Turn
     from foosim.client.replay_listener import hear_replay
     from foosim.deployment.schema import Deployment
     from foosim.protocol.replay_messages import PlayedPacket, PlayedPoses
     from foosim.rehearsal.simulation import Simulation
+    from foosim.world.forms.jobs import JobState
 
 __all__ = [
     "Capture",
     "Client",
     "Commands",
     "Deployment",
+    "JobState",
+    "Jobs",
     "Packet",
     "PlayedPacket",
     "PlayedPoses",
@@ -46,11 +50,13 @@ _MODULES = {
     "foosim._capture": ("Capture", "open_capture"),
     "foosim._rehearse": ("load_deployment", "rehearse"),
     "foosim.client.client": ("Client", "connect"),
+    "foosim.client.jobs": ("Jobs",),
     "foosim.client.player": ("Commands", "Packet", "Player", "Sample", "Samples", "Turn"),
     "foosim.client.replay_listener": ("hear_replay",),
     "foosim.deployment.schema": ("Deployment",),
     "foosim.protocol.replay_messages": ("PlayedPacket", "PlayedPoses"),
     "foosim.rehearsal.simulation": ("Simulation",),
+    "foosim.world.forms.jobs": ("JobState",),
 }
 
 

@@ -16,9 +16,11 @@ from foosim.world.components.mounted import Mounted
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Misfit, ModifierMounting, Mounting, SolvingView, View, WritableView
 from foosim.world.forms.forms import ROBOTS, Carrier
+from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.quantities import Amperes as A
 from foosim.world.forms.quantities import Degrees as deg
+from foosim.world.forms.quantities import JobNumber
 from foosim.world.forms.quantities import Metres as m
 from foosim.world.forms.quantities import MetresPerSecond as m_s
 from foosim.world.forms.quantities import MetresPerSecondSquared as m_s2
@@ -71,6 +73,8 @@ __all__ = [
     "Finding",
     "Force",
     "Frame",
+    "JobNumber",
+    "JobState",
     "Judged",
     "Length",
     "Link",

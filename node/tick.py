@@ -31,8 +31,9 @@ from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
+from foosim.world.forms.forms import INACTIVE
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
 from foosim.world.setting.scheduled import Schedule
@@ -93,7 +94,7 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
-        self._standing = Standing(layout, self.world.actuators, self.world.ruled)
+        self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
         """Bodies that are islands by themselves, of the islands that were solved last."""
         self._grippers: dict[int, list[Gripper]] = {}
@@ -109,7 +110,8 @@ class Stepper:
         """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
-        self._due = DueSensors((), self._sensors)
+        self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
+        self._due = DueSensors((), self._sensors, self._switches)
         self._sensing = Sensing()
         self._waiting = [
             (layout.entities[index], one)
@@ -131,7 +133,7 @@ class Stepper:
         """
         tick, numbers = frame.tick, frame.numbers
         if self._due.robots is not robots and self._due.robots != robots:
-            self._due = DueSensors(robots, self._sensors)
+            self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view)
@@ -189,7 +191,7 @@ class Stepper:
             if packet.destination not in self.layout:
                 continue
             entity = self.layout[packet.destination]
-            if entity.index not in solved or not entity.is_robot:
+            if entity.index not in solved or not entity.is_robot or entity.is_absent(numbers):
                 continue
             if not self._take(packet, entity, view, outboxes):
                 numbers[entity.offsets["refused"]] += 1.0
@@ -211,7 +213,10 @@ class Stepper:
             return True
         for one in self.world.actuators.get(entity.index, ()):
             if one.channel == packet.channel:
-                return one.accept(packet.payload, view)
+                off = int(view.numbers[entity.offsets[INACTIVE]])
+                return not off & self._switches[entity.name][one.channel] and one.accept(
+                    packet.payload, view, packet.source
+                )
         return False
 
     def solve(self, engine: AnyEngine, work: Work) -> None:
@@ -233,6 +238,7 @@ class Stepper:
         if len(rigid) < len(bodies):
             world.move(bodies, start, numbers, work.tick, work.values if work.start else None)
         world.apply_entity_rules(bodies, start, numbers, work.tick)
+        world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
             self._standing.note(bodies, numbers, before)
         if not isfinite(sum(numbers)) or any(self._problem(entity, before, work) for entity in changed):

@@ -13,6 +13,7 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
 from foosim.world.forms.forms import ABSENT, DOWN, NO_ENTITY, SAMPLES, SLOTS_MAX
+from foosim.world.forms.jobs import NUMBERS, STATES, JobState
 from foosim.world.layout import Entity, Layout
 
 FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX
@@ -108,10 +109,23 @@ def write(layout: Layout, numbers: list[float], edit: Edit) -> None:
         at = entity.offsets[edit.field]
         numbers[at : at + len(edit.numbers)] = edit.numbers
         return
-    counted = [(at, numbers[at]) for at in counters(entity)]
+    counted = [(at, numbers[at]) for at in counters(entity)] + _jobs_known(entity, numbers)
     numbers[entity.start : entity.stop] = parked(layout, entity) if isinstance(edit, Remove) else edit.numbers
     for at, number in counted:
         numbers[at] = number
+
+
+def _jobs_known(entity: Entity, numbers: Sequence[float]) -> list[tuple[int, float]]:
+    """Return places and numbers of the jobs that a robot has known which comes or leaves: none of them begins again,
+    and one that runs has failed."""
+    found: list[tuple[int, float]] = []
+    for field, at in entity.offsets.items():
+        if at < entity.split and field.endswith((f".{NUMBERS}", f".{STATES}")):
+            known = numbers[at : at + entity.counts[field]]
+            if field.endswith(STATES):
+                known = [float(JobState.FAILED) if state == JobState.RUNNING else state for state in known]
+            found += enumerate(known, at)
+    return found
 
 
 def counters(entity: Entity) -> list[int]:

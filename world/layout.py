@@ -19,6 +19,7 @@ from foosim.common.finding import Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     ABSENT,
+    INACTIVE,
     LINEAR_VELOCITY,
     POSE,
     ROBOTS,
@@ -34,6 +35,7 @@ from foosim.world.forms.forms import (
     References,
     WorldRule,
 )
+from foosim.world.forms.jobs import job_slots
 from foosim.world.forms.per_field import Numbers, numbers_of
 from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
 from foosim.world.spec import WorldSpec
@@ -117,7 +119,8 @@ class Declared:
     """What a layout has of the deployment.
 
     `carried` is what entities carry, by name; `memory` what the rules of the world remember of each entity of a model;
-    `spares` the entities that are absent at the start, `lasting` those that never leave; `fields` those of the state of
+    `spares` the entities that are absent at the start, `lasting` those that never leave; `switched` the robots with
+    components, which can be switched off; `fields` those of the state of
     entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose settings ask for a
     variant of their model; `demanded` the fields on demand that entities have, by name.
     """
@@ -126,6 +129,7 @@ class Declared:
     memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     spares: frozenset[str] = frozenset()
     lasting: frozenset[str] = frozenset()
+    switched: frozenset[str] = frozenset()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
     demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
@@ -162,6 +166,8 @@ class Layout:
             counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
             if "position" in fields and kind.is_solved and name not in declared.lasting:
                 counts[ABSENT] = 1
+            if name in declared.switched:
+                counts[INACTIVE] = 1
             if STILL_TICKS in fields:
                 counts[STILL_POSE] = sum([fields.get(field, 0) for field in POSE])
             for slot, count in counts.items():
@@ -281,7 +287,14 @@ def build_layout(spec: WorldSpec) -> Layout:
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
-    return Layout(models, Declared(carried, memory, frozenset(spares), frozenset(lasting), fields, variants, demanded))
+    switched = frozenset([name for name, robot in spec.robots.items() if switches_of(robot)])
+    coming = frozenset(spares), frozenset(lasting), switched
+    return Layout(models, Declared(carried, memory, *coming, fields, variants, demanded))
+
+
+def switches_of(robot: RobotSettings) -> dict[str, int]:
+    """Return the bit of each sensor and actuator of a robot in its slot `inactive`, by name."""
+    return {name: 1 << place for place, name in enumerate(sorted({*robot.sensors, *robot.actuators}))}
 
 
 def spares_of(spec: WorldSpec, kit: Kit) -> Mapping[str, str]:
@@ -391,6 +404,8 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
+        if component.jobs:
+            slots |= _behind(label, job_slots(spec.senders_to(name)))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
@@ -422,11 +437,11 @@ def _demanded(robot: RobotSettings) -> dict[str, int]:
     if not model.on_demand:
         return {}
     components = [
-        registry.find_component(form, its.kind)
+        (registry.find_component(form, its.kind), its)
         for form, having in (("sensor", robot.sensors), ("actuator", robot.actuators))
         for its in having.values()
     ]
-    needs = [need for one in components for need in (*one.needs, one.speaks)]
+    needs = [need for one, its in components for need in (*one.needs, one.speaks_by(its))]
     needs += [need for its in robot.rules.values() for need in find_entity_rule(its).needs]
     return model.demanded(needs)
 

@@ -30,7 +30,7 @@ class Sampling:
                 (name, channel, speaks)
                 for name, robot in spec.robots.items()
                 for channel, sensor in robot.sensors.items()
-                if (speaks := registry.find_component("sensor", sensor.kind).speaks)
+                if (speaks := registry.find_component("sensor", sensor.kind).speaks_by(sensor))
             }
         )
         """Robots with a sensor that speaks, its channel, and the field that makes it measure."""

@@ -126,6 +126,10 @@ class WorldSpec(SpecBase):
         assert isinstance(found, kind), found
         return found
 
+    def senders_to(self, robot: str) -> tuple[str, ...]:
+        """The endpoints that may command a robot, in name order: in a world by itself there are none."""
+        return ()
+
     def settings_of(self, name: str) -> EntitySettings | None:
         """Return the settings of a robot or an object; None of an entity that a kit brings."""
         return self.robots.get(name) or self.objects.get(name)

@@ -1,13 +1,14 @@
 """Rigid bodies of any kind in MuJoCo: one island at a time, in a model of its composition (`mujoco_model`).
 
 The state of a model is `qpos` and `qvel`. All else that a step reads is set at each load: the warm start and the time
-are 0, motors and applied forces those of the tick. So a tick is a function of the frame, whichever model computes it
-and whatever that has computed before.
+are 0, motors, applied forces and the wind those of the tick. So a tick is a function of the frame, whichever model
+computes it and whatever that has computed before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from math import inf
 from typing import Any, Final
@@ -37,6 +38,7 @@ from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
+from foosim.world.rules.wind import air_of
 from foosim.world.scene import (
     MOVING,
     ORIGIN,
@@ -72,7 +74,9 @@ class MujocoIslands:
     """Another one may compute other bits, in worlds that the small run of the fingerprint has not."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
-        self._physics = physics_of(deployment)
+        self._physics, self._air = physics_of(deployment), air_of(deployment, layout)
+        if self._air is not None:
+            self._physics = replace(self._physics, density=self._air.density, viscosity=self._air.viscosity)
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
         scene = build_scene(deployment, layout)
@@ -117,6 +121,8 @@ class MujocoIslands:
                 self._seated.clear()
             seated = self._seated[key] = self._seat(key, island)
         engine, seats = seated
+        if self._air is not None:
+            engine.blow([numbers[at] for at in self._air.velocity])
         engine.solve(seats, island.drives, numbers, start)
 
     def _seat(self, key: Key, island: Island) -> tuple[CompositionEngine, Seats]:
@@ -234,7 +240,7 @@ class CompositionEngine:
         self._motors, clock = built.motors, built.clock
         self.d = d = built.d
         self._qpos, self._qvel, self._warm, self._applied = d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied
-        self._contact = d.contact
+        self._contact, self._wind = d.contact, self.m.opt.wind
         self._touches: dict[tuple[int, int], _Touch] = {}
         self._forces: list[float] = []
         self._governed: list[tuple[Placed, int, Motor, float]] = []
@@ -247,6 +253,10 @@ class CompositionEngine:
     def seats_of(self, island: Island, bodies: Sequence[Body]) -> Seats:
         """Return which of an island's entities, movers last, with their bodies, is which body of the model."""
         return Seats(self.m, self._placed, island, bodies)
+
+    def blow(self, velocity: Sequence[float]) -> None:
+        """Set how fast the air goes (m/s), until it is set anew."""
+        self._wind[:] = velocity
 
     def solve(self, seats: Seats, drives: Sequence[Drives], numbers: list[float], start: Sequence[float]) -> None:
         """Write the next state of the bodies into the numbers, as `MujocoIslands.solve` does."""

@@ -178,6 +178,7 @@ class ModelBuilder:
     def _set_options(self) -> None:
         option, disable = self._spec.option, mujoco.mjtDisableBit
         option.timestep, option.gravity = self._dt, (0.0, 0.0, -self._physics.gravity)
+        option.density, option.viscosity = self._physics.density, self._physics.viscosity
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
         option.iterations, option.tolerance = self._physics.solver_iterations, TOLERANCE

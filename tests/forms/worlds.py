@@ -52,6 +52,7 @@ class Driver(Player):
             limits = next((found for one in its if (found := one.actuator.limits())), {})
             most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
             self._bounds[robot] = list(map(min, bounds, most))
+        self._has_jobs = kind.jobs
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
@@ -63,6 +64,8 @@ class Driver(Player):
         more = draw_words(draw_key(4, "driver", robot), tick)
         shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
         numbers = [bound * share for bound, share in zip(self._bounds[robot], shares, strict=False)]
+        if self._has_jobs:
+            numbers.append(0.0 if tick % 3 == 2 else tick + 1.0)
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
 
 
@@ -133,6 +136,11 @@ def _yard() -> dict[str, Any]:
         "pace": "fast",
         "scene": {"kind": "boxes", "boxes": {"box": box}},
         "rules": {"corner": {"kind": "zone", "length": "2 m", "width": "2 m", "tag": "vehicle"}},
+        "objects": {
+            "fire": {"model": "fire", "at": {"x": "-1 m", "y": "-2 m"}, "radius": "10 cm", "growth": "1 m/s"},
+            "gate": {"model": "door", "closed": {"x": "3 m", "yaw": "90 deg"}, "travel": "-2 m"},
+        },
+        "events": [{"at": "0.1 s", "entity": "gate", "set": {"open": "70 %"}}],
         "robots": {name: {**robot, "sensors": {}} for name, robot in robots.items()},
         "players": players,
         "nodes": {"n": {"robots": ["*"]}},
@@ -169,6 +177,7 @@ def _solids() -> dict[str, Any]:
         "engine": "mujoco",
         "pace": "fast",
         "scene": {"kind": "empty"},
+        "rules": {"wind": {"kind": "wind", "x": "5 m/s", "z": "-1 m/s"}},
         "objects": objects,
         "robots": robots,
         "players": driver(flyers, "rotor_speeds", (900.0,) * 4, "50 Hz"),
@@ -241,6 +250,16 @@ def _driven(kind: str, bounds: Sequence[float]) -> World:
     return World(data | {"players": driver(RODS, kind, bounds, "50 Hz")}, place)
 
 
+def _going() -> dict[str, Any]:
+    """The yard with robots that are sent to places, and tell how that goes."""
+    data: dict[str, Any] = json.loads(json.dumps(_yard()))
+    for name in ("one", "two", "base"):
+        data["robots"][name]["actuators"] = {"go": {"kind": "go_to", "feelers": "60 cm", "patience": "0.3 s"}}
+        data["robots"][name]["sensors"] = {"sensed": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
+    flight = {"flight": data["players"]["flight"]}
+    return data | {"players": driver(("one", "two", "base"), "go_to", (2.0, 2.0), "5 Hz") | flight}
+
+
 def changed_slots(first: Frame, last: Frame) -> set[str]:
     """Return the slots that differ between two frames, each after its entity."""
     return {
@@ -299,6 +318,7 @@ YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
 DRIVES: Final = World(_drives())
 GRIPS: Final = _gripping()
+JOBS: Final = World(_going(), ("robots", "one", "actuators", "go"))
 
 
 def sensor(world: World, robots: Sequence[str], kind: str, **settings: Any) -> World:
@@ -334,6 +354,10 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "mover"): World(YARD.data, ("robots", "door")),
     ("model", "rotorcraft"): World(YARD.data, ("robots", "craft")),
     ("motion", "differential_drive"): HALL,
+    ("model", "door"): World(YARD.data, ("objects", "gate")),
+    ("model", "fire"): World(YARD.data, ("objects", "fire")),
+    ("motion", "door"): YARD,
+    ("motion", "fire"): YARD,
     ("motion", "holonomic"): YARD,
     ("motion", "rotorcraft"): YARD,
     ("motion", "track"): YARD,
@@ -358,6 +382,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
     ("sensor", "range"): sensor(HALL, ROVERS, "range", range="3 m", cone="30 deg", at={"z": "20 cm"}),
+    ("sensor", "thermometer"): sensor(YARD, ["one", "base", "craft"], "thermometer", at={"z": "20 cm"}),
     ("sensor", "velocity"): sensor(YARD, ["one", "base", "craft"], "velocity", at={"x": "20 cm"}),
     ("actuator", "force"): _pushed(),
     ("actuator", "gripper"): GRIPS,
@@ -374,6 +399,8 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "hull"): SOLIDS,
     ("model", "quadrotor"): SOLIDS,
     ("model", "sphere"): SOLIDS,
+    ("actuator", "go_to"): JOBS,
+    ("sensor", "job"): World(JOBS.data, ("robots", "one", "sensors", "sensed")),
     ("actuator", "v_w"): YARD,
     ("actuator", "waypoint"): YARD,
     ("actuator", "x_y_w"): YARD,
@@ -386,7 +413,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("modifier", "gaussian_noise"): modifier("gaussian_noise", {"std": {"heading": "1 deg"}}, {"std": "10 mm/s"}),
     ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
     ("rule", "football"): TABLE,
+    ("rule", "wind"): World(SOLIDS.data, ("rules", "wind")),
     ("rule", "zone"): World(YARD.data, ("rules", "corner")),
+    ("entity_rule", "burns"): YARD.with_(
+        ("robots", "base", "rules"), {"own": {"kind": "burns", "after": "50 ms"}}, ("robots", "base", "rules", "own")
+    ),
     ("entity_rule", "battery"): YARD.with_(
         ("robots", "base", "rules"),
         {"own": {"kind": "battery", "capacity": "5 J", "idle": "1 W", "drag": "5 N", "chargers": [CHARGER]}},

@@ -20,6 +20,7 @@ from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.force import Push
+from foosim.world.actuators.go_to import Place
 from foosim.world.actuators.joint_position import JointPositions
 from foosim.world.actuators.joint_torque import JointEfforts
 from foosim.world.actuators.joint_velocity import JointVelocities
@@ -41,6 +42,7 @@ from foosim.world.sensors.contact import Touches
 from foosim.world.sensors.encoder import RodPosition
 from foosim.world.sensors.gps import GlobalPosition
 from foosim.world.sensors.imu import Inertial
+from foosim.world.sensors.job import Jobs
 from foosim.world.sensors.joint_state import JointState
 from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.sensors.odometry import WheelTravel
@@ -83,7 +85,9 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "proximity": (Ranges((4.0, 0.0, 1 / 3)), [4.0, 0.0, 1 / 3], ["m"]),
     "v_w": (Motion(0.5, -1.2), [0.5, -1.2], ["m/s", "rad/s"]),
     "x_y_w": (Base(0.5, -1.2, 0.1), [0.5, -1.2, 0.1], ["m/s", "m/s", "rad/s"]),
-    "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3), [0.5, -1.2, 9.0, 1 / 3], ["m", "m", "m", "rad"]),
+    "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3, 7.0), [0.5, -1.2, 9.0, 1 / 3, 7.0], ["m", "m", "m", "rad", ""]),
+    "go_to": (Place(0.5, -1.2, -7.0), [0.5, -1.2, -7.0], ["m", "m", ""]),
+    "job": (Jobs(1.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 3.0, 0.0, 2.0, 0.0], [""] * 3),
     "velocity": (
         Velocity(0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0),
         [0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0],
@@ -107,10 +111,11 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 SIZES |= {"rod_force": 16, "rod_velocity": 16, "rod_voltage": 16, "ball_state": 72, "motor_current": 16}
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
-SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "velocity": 48}
+SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "go_to": 16, "velocity": 48}
 """In bytes, of the kinds that have as many numbers always."""
 SEVERAL = {
     "figure_contact",
+    "job",
     "joint_position",
     "joint_state",
     "joint_torque",
@@ -119,7 +124,7 @@ SEVERAL = {
     "proximity",
     "rotor_speeds",
 }
-SINGLE = {"figure_contact": 1}
+SINGLE = {"figure_contact": 1, "job": 1}
 """Fields of one number before those of several."""
 
 
@@ -158,11 +163,23 @@ def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
 
 @given(st.sampled_from(sorted(SIZES)), st.binary(max_size=64))
 def test_random_bytes_are_a_value_or_malformed(kind: str, payload: bytes) -> None:
-    if len(payload) == SIZES[kind] and np.isfinite(np.frombuffer(payload, "<f8")).all():
+    plain = codec(kind).has_job and payload[SIZES[kind] :] == bytes(8)
+    if (
+        len(payload) in (SIZES[kind], SIZES[kind] + 8 * codec(kind).has_job)
+        and not plain
+        and np.isfinite(np.frombuffer(payload, "<f8")).all()
+    ):
         assert codec(kind).encode(codec(kind).decode(payload)) == payload
     else:
         with pytest.raises(Malformed):
             codec(kind).decode(payload)
+
+
+def test_a_plain_command_has_no_number_of_a_job() -> None:
+    """It has the bytes that it had before there were jobs; with the number 0 it is read as well."""
+    assert codec("go_to").encode(Place(0.5, -1.2)) == np.array([0.5, -1.2]).tobytes()
+    assert codec("go_to").decode(np.array([0.5, -1.2]).tobytes()) == Place(0.5, -1.2)
+    assert codec("go_to").decode(np.array([0.5, -1.2, 0.0]).tobytes()) == Place(0.5, -1.2)
 
 
 @pytest.mark.parametrize("payload", [b"", bytes(12), bytes(8 * 129), np.array([1.0, nan]).tobytes()])

@@ -1,18 +1,23 @@
-"""A rotorcraft by the place and the heading that it is to come to."""
+"""A rotorcraft by the place and the heading that it is to come to. A job is done when it hovers there."""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Final
 
 from msgspec import Struct
 
 from foosim.common.exact_math import PI
+from foosim.common.spec_base import default
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import Metres, Radians
+from foosim.world.forms.jobs import JobState
+from foosim.world.forms.quantities import JobNumber, Metres, Radians
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.models.rotorcraft import RotorcraftRobot
+from foosim.world.moving.progress import SLOTS, Patience, Progress
+from foosim.world.moving.steering import shorter
 
 FAR_M: Final = 100_000.0
 """How far from the origin a waypoint is at most, in x and in y; as far as anything is put in a deployment."""
@@ -20,7 +25,12 @@ YAW_RAD_MAX: Final = 2.0 * PI
 
 
 class WaypointSettings(ActuatorSettings):
-    """Sends a rotorcraft to waypoints; its speeds and its ceiling are those of its model."""
+    """Sends a rotorcraft to waypoints; its speeds and its ceiling are those of its model.
+
+    A job of one that has come no nearer for `patience` has failed: it hovers where it is.
+    """
+
+    patience_ns: Patience = default("10 s", "patience")
 
 
 class Waypoint(Struct, frozen=True):
@@ -30,9 +40,12 @@ class Waypoint(Struct, frozen=True):
     y: Metres
     z: Metres
     yaw: Radians
+    job: JobNumber = 0.0
 
 
-@actuator("waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4}, needs=("arrived",))
+@actuator(
+    "waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4, **SLOTS}, needs=("arrived",), jobs=True
+)
 class WaypointActuator:
     """Keeps the last waypoint that it was told; without any the rotorcraft brakes, and hovers where it is."""
 
@@ -42,6 +55,7 @@ class WaypointActuator:
         self._robot = robot
         self._given, self._target = at.slot("given"), at.slot("target")
         self._position, self._heading = at.slot("position"), at.slot("heading")
+        self._arrived, self._progress = at.slot("arrived"), Progress(at, settings.patience_ns)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m) and of the yaw (rad)."""
@@ -56,6 +70,7 @@ class WaypointActuator:
     def _set(self, view: WritableView, x: float, y: float, z: float, yaw: float) -> None:
         view.write(self._given, 1.0)
         view.write(self._target, x, y, z, yaw)
+        self._progress.begin(view)
 
     def hold(self, view: WritableView) -> None:
         """Make the present place the waypoint."""
@@ -66,6 +81,17 @@ class WaypointActuator:
         """Fly askew and up, for the small run that tells engines apart."""
         x, y, z = view.read(self._position)
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
+
+    def progress(self, view: WritableView) -> JobState:
+        """Return whether it hovers at its waypoint; what is left is m and rad together, for it may only turn."""
+        left = [there - now for there, now in zip(view.read(self._target), self._pose(view), strict=True)]
+        x, y, z, yaw = left
+        way = sqrt(x * x + y * y + z * z) + abs(shorter(yaw))
+        return self._progress.judge(view, way, is_there=view.numbers[self._arrived.at] != 0.0)
+
+    def _pose(self, view: View) -> list[float]:
+        """Return place (m) and heading (rad)."""
+        return [*view.read(self._position), *view.read(self._heading)]
 
     def unpowered(self) -> Motors:
         """Return that there is no waypoint."""

@@ -257,6 +257,10 @@ class World:
         self._entity_rules = {index: its for index, its in rules.items() if its}
         self.ruled = frozenset(self._entity_rules)
         """Entities that have rules of their own, by their indices."""
+        self.having_jobs = frozenset(
+            [index for index, its in self.actuators.items() if any(one.jobs is not None for one in its)]
+        )
+        """Entities whose actuators may have jobs, by their indices."""
         self._powers: dict[int, list[tuple[str, Any]]] = {}
         """The rules that say whether an entity's drives have power, by its index."""
         for index, its in self._entity_rules.items():
@@ -455,6 +459,17 @@ class World:
                     rule.apply(view)
                 except BaseException as error:
                     raise component_error(f"rule {label}", entity.name, tick, error) from error
+
+    def judge_jobs(self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int) -> None:
+        """Let jobs of these entities end, which now may be done, after their rules."""
+        if not self.having_jobs:
+            return
+        view = WritableView(tick, numbers, start)
+        for entity in entities:
+            if entity.index in self.having_jobs:
+                for one in self.actuators[entity.index]:
+                    if one.jobs is not None and not one.jobs.is_idle(view):
+                        one.judge_job(view, has_power=self._has_power(entity, view))
 
     def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float], tick: int) -> str:
         """Return in words why the new, finite state of an entity cannot be; empty where it can."""

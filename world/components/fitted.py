@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
+from foosim.world.components.job_book import JobBook
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import (
     Actuator,
@@ -135,18 +136,24 @@ class FittedActuator:
     """Whether it commands the motors of its robot."""
     joints: tuple[int, ...] | None = None
     """The numbers of the joints whose motors it commands; None for all of them."""
+    jobs: JobBook | None = None
+    """What it remembers of its jobs; None of one whose commands are none."""
 
     @property
     def has_waiting(self) -> bool:
         """Whether commands may have to wait for their tick."""
         return any(one.due is not None for one in self.modifiers)
 
-    def accept(self, payload: bytes, view: WritableView) -> bool:
-        """Take a command, clamped to its limits; False when it is refused. Raises ComponentError."""
+    def accept(self, payload: bytes, view: WritableView, source: str = "") -> bool:
+        """Take a command of an endpoint, clamped to its limits; False when it is refused. Raises ComponentError."""
         try:
             command = self.codec.decode_finite(payload)
         except Malformed:
             return False
+        if self.jobs is not None:
+            command = self.jobs.addressed(command, source)
+            if command is None:
+                return False
         view.count_command(self)
         if not self.modifiers:
             return self._take(command, view)
@@ -186,6 +193,14 @@ class FittedActuator:
         return self._take(self.codec.from_numbers(left), view)
 
     def _take(self, command: Any, view: WritableView) -> bool:
+        if self.jobs is None:
+            return self._carry_out(command, view)
+        try:
+            return self.jobs.take(command, view, self.actuator, lambda its: self._carry_out(its, view))
+        except BaseException as error:
+            raise self.failed(view.tick, error) from error
+
+    def _carry_out(self, command: Any, view: WritableView) -> bool:
         try:
             found = self.bounds.clamp(command)
             if found is None:
@@ -197,6 +212,14 @@ class FittedActuator:
                     view.written_to[self.clamped_at] += 1.0
                 return is_taken
             raise WrongResult(self.actuator.accept, "True or False", is_taken)
+        except BaseException as error:
+            raise self.failed(view.tick, error) from error
+
+    def judge_job(self, view: WritableView, *, has_power: bool) -> None:
+        """After the robot was solved: let the job that runs end, if it does. Raises ComponentError."""
+        assert self.jobs is not None
+        try:
+            self.jobs.judge(view, self.actuator, has_power=has_power)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -218,7 +241,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         sensor = _made(component, settings, mounting)
         of_values = _spacing(spec, component, settings)
         modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
-        numbers = numbers_of(component, settings, robot.counts)
+        numbers, speaks = numbers_of(component, settings, robot.counts), component.speaks_by(settings)
         fitted.append(
             FittedSensor(
                 robot.name,
@@ -229,7 +252,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(settings.kind, "sensor"),
                 modifiers,
                 0 if numbers is None else numbers.size,
-                robot.offsets[slot_that_speaks(robot, channel, component.speaks)] if component.speaks else -1,
+                robot.offsets[slot_that_speaks(robot, channel, speaks)] if speaks else -1,
             )
         )
     return tuple(fitted)
@@ -250,7 +273,19 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         counter = robot.offsets["clamped"]
         joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
         fitted.append(
-            FittedActuator(robot.name, channel, made, codec, modifiers, size, bounds, counter, component.moves, joints)
+            FittedActuator(
+                robot.name,
+                channel,
+                made,
+                codec,
+                modifiers,
+                size,
+                bounds,
+                counter,
+                component.moves,
+                joints,
+                JobBook(mounting) if component.jobs else None,
+            )
         )
     return tuple(fitted)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from foosim.common.errors import BadValue, Failed
 from foosim.common.finding import Location
 from foosim.world.forms.failures import failure_of
+from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
@@ -356,3 +357,14 @@ class Actuator(Protocol):
 
         For motors of rigid bodies a third number may follow, `drives.Motor.slope`.
         """
+
+
+class JobActuator(Actuator, Protocol):
+    """An actuator whose commands may be jobs: registered with `jobs=True`, its command has a last field `job`.
+
+    `accept` gets the command of a job as any other one, without its number. `hold` is called besides when a job is
+    cancelled or fails.
+    """
+
+    def progress(self, view: WritableView) -> JobState:
+        """Return, after the robot was solved and while a job runs, whether it runs on, is done or has failed."""

@@ -123,9 +123,14 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
 
 ABSENT: Final = "absent"
 """The slot of each entity that has a place: 1 of one that is not in the world, 0 of one that is."""
+INACTIVE: Final = "inactive"
+"""The slot of each robot with components that says which are switched off: a bit for each of its sensors and actuators,
+the lowest for the first by name."""
 DOWN: Final = "down"
 OF_ROBOTS: Final = (DOWN, "refused", "clamped")
 """Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
+SET_BY_FOOSIM: Final = ("at", DOWN)
+"""What can be set of entities without a word of their model."""
 OF_SOLVED: Final = ("quarantined",)
 """Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
 
@@ -151,6 +156,8 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     return found  # type: ignore[no-any-return]
 
 
+SpeaksOf: TypeAlias = Callable[[Any], str]
+"""What makes a sensor measure besides its rate, by its settings."""
 SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 """How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
 
@@ -194,9 +201,9 @@ class Component(Form):
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
     `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
     joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
-    motor is commanded by two actuators.
+    motor is commanded by two actuators. `jobs` says that its commands may be jobs (`forms.jobs`).
     `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
-    tick at whose start its first number is not 0.
+    tick at whose start its first number is not 0; or a function that says it, which may name a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
@@ -206,10 +213,11 @@ class Component(Form):
     slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     several: str | SeveralOf = ""
-    speaks: str = ""
+    speaks: str | SpeaksOf = ""
     shown_as: str = ""
     moves: bool = False
     joints: str = ""
+    jobs: bool = False
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
@@ -218,6 +226,10 @@ class Component(Form):
         if not callable(self.slots):
             return self.slots
         return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
+
+    def speaks_by(self, settings: Any) -> str:
+        """Return what makes a sensor with these settings measure besides its rate; empty for nothing."""
+        return self.speaks(settings) if callable(self.speaks) else self.speaks
 
     def joints_named(self, settings: Any) -> Sequence[str] | None:
         """Return the joints that an actuator with these settings commands; None for all. Raises BadValue."""
@@ -237,7 +249,7 @@ class Model(Form):
     sends and receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a
     deployment. `units` are those of its fields' numbers, the last one standing for all behind it; fields that every
     model calls the same need none. `variants` are what it is instead where its setting `dynamics` has one of these
-    values.
+    values. `settable` is what can be set of it, as of a rule of entities (`EntityRule`): fields of its state.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -254,6 +266,7 @@ class Model(Form):
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
 
     def variant(self, dynamics: object) -> Model:
@@ -320,12 +333,13 @@ class WorldRule(Form):
 
     `slots` are what it remembers, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world;
     `each` are what it remembers of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the
-    models whose state it may change.
+    models whose state it may change. `settable` is what can be set of it, as of a rule of entities (`EntityRule`).
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
     each: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     writes: tuple[str, ...] = ()
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

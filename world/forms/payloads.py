@@ -2,8 +2,8 @@
 
 A reading or command is a msgspec struct that its component brings. One of numbers is packed: each a little-endian
 float64 in SI units, a tuple of numbers at the end as many of them as there are; several tuples at the end are of one
-length. Any other is MessagePack, a map of its fields. `echo`, and what players and clients send each other, is any
-bytes.
+length. The number of a job is left out where it is 0, that of a plain command. Any other is MessagePack, a map of its
+fields. `echo`, and what players and clients send each other, is any bytes.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ import msgspec
 from msgspec import Struct, inspect
 
 from foosim.common.errors import BadValue, Malformed, NotFinite
+from foosim.world.forms.jobs import JOB
 
 FLOAT: Final = frozenset((float,))
+PLAIN: Final = bytes(8)
+"""The number of a job in a command that is none."""
 MANY_MAX: Final = 1 << 16
 """Numbers in a tuple whose type has no bound of its own."""
 
@@ -45,6 +48,8 @@ class PayloadCodec:
         self.name: Final = name
         self.fields: Final = tuple(_field(field) for field in _info(kind).fields)
         self._many = many_of(self.fields)
+        self.has_job: Final = self.fields[-1].name == JOB and self.fields[-1].is_number
+        """Whether its last number is that of a job."""
         count = len(self.fields) - self._many
         self.is_packed: Final = all(field.is_number for field in self.fields[:count])
         self._packed = struct.Struct(f"<{count}d")
@@ -60,10 +65,10 @@ class PayloadCodec:
 
     @property
     def size(self) -> int | None:
-        """How many bytes each payload has; None where they may differ."""
+        """How many bytes each payload has, that of a plain command; None where they may differ."""
         if not self.is_packed or self._least != self._most:
             return None
-        return self._packed.size + 8 * self._many * self._most
+        return self._packed.size + 8 * self._many * self._most - 8 * self.has_job
 
     @property
     def unit(self) -> str:
@@ -78,6 +83,8 @@ class PayloadCodec:
             except msgspec.DecodeError as error:
                 raise Malformed(f"{self.name}: {error}") from None
         size, least = len(payload), self._packed.size
+        if self.has_job and size == least - 8:
+            payload, size = payload + PLAIN, least
         if size == least and not self._many:
             numbers = self._packed.unpack(payload)
             if not all(map(isfinite, numbers)):
@@ -115,14 +122,16 @@ class PayloadCodec:
                 raise BadValue(f"{self.name}: {error}", value) from None
         numbers = self.numbers(value)
         if not self._many and FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers)):
-            return self._packed.pack(*numbers)
+            payload = self._packed.pack(*numbers)
+            return payload[:-8] if self.has_job and numbers[-1] == 0.0 else payload
         more = (len(numbers) - len(self.fields) + self._many) // self._many if self._many else 0
         if self._many and not self._least <= more <= self._most:
             last = self.fields[-1].name
             raise BadValue(f"{self.name}.{last} is not {self._least} to {self._most} numbers", more)
         for place, number in enumerate(numbers):
             self._check(field_at(self.fields, len(numbers), place).name, number)
-        return struct.pack(f"<{len(numbers)}d", *numbers)
+        payload = struct.pack(f"<{len(numbers)}d", *numbers)
+        return payload[:-8] if self.has_job and payload[-8:] == PLAIN else payload
 
     def encode_checked(self, value: Any) -> bytes:
         """Return the payload of a value that may hold anything.

@@ -15,7 +15,8 @@ from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, Model, slots_problem, with_article, word_of
+from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, SET_BY_FOOSIM, Model, slots_problem, with_article, word_of
+from foosim.world.forms.jobs import JOB
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
 from foosim.world.forms.shown import MESSAGES
@@ -56,7 +57,7 @@ def _problems(found: Any) -> Iterator[str]:
         if key in NAMES and not (isinstance(value, tuple) and all(isinstance(name, str) for name in value)):
             hint = f": a tuple of one is ({show(value)},)" if isinstance(value, str) else ""
             yield f"{key} is a tuple of names, not {_shown(value)}{hint}"
-        if key in TEXTS and not (isinstance(value, str) or (key == "several" and callable(value))):
+        if key in TEXTS and not (isinstance(value, str) or (key in ("several", "speaks") and callable(value))):
             yield f"{key} is a name, not {show(value)}"
         if key in MAPPINGS and not isinstance(value, Mapping):
             yield f"{key} is a mapping of {MAPPINGS[key]}, not {_shown(value)}"
@@ -88,6 +89,18 @@ def _setting(found: Any, key: str) -> Iterator[str]:
     name = getattr(found, key)
     if isinstance(name, str) and name and name not in found.settings.model_fields:
         yield f"{key} names no setting, {show(name)}"
+
+
+def _jobs(found: Any, key: str) -> Iterator[str]:
+    """Yield what is wrong with the commands of an actuator that are jobs, and with its own slots."""
+    if not found.jobs:
+        return
+    fields = PayloadCodec(found.value, found.name).fields
+    value = found.value.__name__
+    if not (fields[-1].name == JOB and fields[-1].is_number and found.value.__struct_defaults__[-1:] == (0.0,)):
+        yield f"its command {value} may be a job, and its last field is not `{JOB}: JobNumber = 0.0`"
+    if not hasattr(found.made, "progress"):
+        yield f"its commands may be jobs, and {found.made.__name__} has no method progress"
 
 
 def _shown_as(found: Any, key: str) -> Iterator[str]:
@@ -124,7 +137,9 @@ def _settable(found: Any, key: str) -> Iterator[str]:
             yield f"settable: {show(name)}: {NAME_RULE}"
         elif not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif not hasattr(found.made, "set") and found.slots.get(name) != 1:
+        elif isinstance(found, Model) and name in SET_BY_FOOSIM:
+            yield f"settable: {name} is set by foosim itself"
+        elif not hasattr(found.made, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"
 
 
@@ -157,6 +172,11 @@ def _entities(found: Any, key: str) -> Iterator[str]:
             yield f"the model of the entity {name} is a name, not {show(model)}"
 
 
+def _spares(found: Any, key: str) -> Iterator[str]:
+    if found.spares is not None and not callable(found.spares):
+        yield f"spares is a function of the section, not {_shown(found.spares)}"
+
+
 def _kinds(found: Any, key: str) -> Iterator[str]:
     """Yield what is wrong with settings by name, each with its kind."""
     for name, its in getattr(found, key).items():
@@ -176,12 +196,14 @@ OF_FIELD: Final[Mapping[str, Callable[[Any, str], Iterator[str]]]] = {
     "on_demand": _slots,
     "several": _setting,
     "joints": _setting,
+    "jobs": _jobs,
     "shown_as": _shown_as,
     "per_field": _per_field,
     "settable": _settable,
     "variants": _variants,
     "each": _each,
     "entities": _entities,
+    "spares": _spares,
     "actuators": _kinds,
     "rules": _kinds,
 }

@@ -33,6 +33,7 @@ from foosim.world.forms.forms import (
     Scene,
     SeveralOf,
     SlotsOf,
+    SpeaksOf,
     WorldRule,
     with_article,
     word_of,
@@ -82,7 +83,7 @@ def sensor(  # noqa: PLR0913  # what a sensor is, by keyword
     needs: tuple[str, ...] = (),
     kit: str = "",
     several: str | SeveralOf = "",
-    speaks: str = "",
+    speaks: str | SpeaksOf = "",
     shown_as: str = "",
 ) -> Callable[[Made], Made]:
     """Register a sensor: a class with the methods of `components.view.Sensor`.
@@ -108,7 +109,7 @@ def sensor(  # noqa: PLR0913  # what a sensor is, by keyword
     return _registering(describe)
 
 
-def actuator(
+def actuator(  # noqa: PLR0913  # what an actuator is, by keyword
     name: str,
     settings: type[ComponentSettings],
     command: type[Struct],
@@ -118,8 +119,9 @@ def actuator(
     kit: str = "",
     moves: bool = True,
     joints: str = "",
+    jobs: bool = False,
 ) -> Callable[[Made], Made]:
-    """Register an actuator: a class with the methods of `components.view.Actuator`."""
+    """Register an actuator: a class with the methods of `components.view.Actuator`; with `jobs`, of `JobActuator`."""
 
     def describe(made: Callable[..., Any]) -> Component:
         return Component(
@@ -133,6 +135,7 @@ def actuator(
             kit=kit,
             moves=moves,
             joints=joints,
+            jobs=jobs,
         )
 
     return _registering(describe)

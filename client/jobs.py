@@ -1,0 +1,206 @@
+"""Jobs of an actuator, as who commands it sees them: commands with numbers, and how they stand by the job sensor.
+
+It sends and receives nothing itself: players, simulations and the client library hand it samples, and send the commands
+that are due. A player:
+
+    self.jobs = Jobs(deployment, "dispatcher", "scout", "drive")    # in __init__
+    self.jobs.hear(samples)                                         # in act
+    if self.job is None:
+        self.job = self.jobs.call(x=3.0, y=1.0)
+    return self.jobs.commands(tick)
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from foosim.client.commands import CommandEncoder, Taker
+from foosim.client.errors import JobCancelled, JobError, JobFailed, JobPreempted
+from foosim.client.player import Commands, Samples
+from foosim.common.errors import BadValue, UnknownName
+from foosim.deployment.schema import Deployment
+from foosim.world.forms.jobs import JOB, JobState
+from foosim.world.forms.registry import find_component
+from foosim.world.sensors.job import Jobs as Reading
+from foosim.world.sensors.job import JobSettings
+
+REPEAT_NS: Final = 100_000_000
+"""Simulated time after which a command is sent again that is not known to have been taken."""
+ENDS: Final[dict[JobState, type[JobError]]] = {
+    JobState.FAILED: JobFailed,
+    JobState.PREEMPTED: JobPreempted,
+    JobState.CANCELLED: JobCancelled,
+}
+
+
+class Job:
+    """One job: `number` is None as long as it has not been sent, `state` NONE as long as it is not known to be taken.
+
+    `by` is who commanded the robot after it, where that is known of a job that was preempted.
+    """
+
+    def __init__(self, what: str, number: int | None, command: Any) -> None:
+        """`what` names robot and actuator, for messages; `command` is what it asks for."""
+        self.what: Final = what
+        self.number = number
+        self.state = JobState.NONE
+        self.by = ""
+        self.is_cancelled = False
+        """Whether it was called off; it may have ended otherwise before that arrives."""
+        self.command: Final = command
+
+    def cancel(self) -> None:
+        """Call it off, from the next command on that is due; one that has ended stays as it is."""
+        self.is_cancelled = True
+        if self.number is None:
+            self.state = JobState.CANCELLED
+
+    def check(self) -> bool:
+        """Return whether it is done. Raises JobFailed, JobPreempted or JobCancelled for one that ended otherwise."""
+        error = ENDS.get(self.state)
+        if error is None:
+            return self.state == JobState.DONE
+        by = f" by {self.by}" if self.by else ""
+        raise error(
+            f"{self.what}: job {self.number or 'that was not sent'} has {_ENDED[self.state]}{by}", self.number, self.by
+        )
+
+
+_ENDED: Final = {
+    JobState.FAILED: "failed",
+    JobState.PREEMPTED: "been preempted",
+    JobState.CANCELLED: "been cancelled",
+}
+
+
+class Jobs:
+    """The jobs that one sender gives to one actuator of a robot. A new one preempts the one before."""
+
+    def __init__(self, deployment: Deployment, sender: str, robot: str, actuator: str) -> None:
+        """Raises UnknownName for a robot, actuator or sender, BadValue for an actuator without jobs, or one of whose
+        jobs no sensor tells."""
+        self._taker: Taker = CommandEncoder(deployment).actuator(robot, actuator)
+        its = deployment.robots[robot]
+        self.what: Final = f"{robot}/{actuator}"
+        if not find_component("actuator", its.actuators[actuator].kind).jobs:
+            raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
+        self.senders: Final = deployment.senders_to(robot)
+        if sender not in self.senders:
+            raise UnknownName(f"{self.what} takes no jobs of it", sender, self.senders)
+        telling = [
+            channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
+        ]
+        if not telling:
+            raise BadValue(f"{robot} has no sensor of the kind job that tells of its actuator", actuator)
+        self.heard: Final = (robot, min(telling))
+        """The (robot, channel) that tells how they stand."""
+        self.sender, self.robot, self.actuator = sender, robot, actuator
+        self._row = self.senders.index(sender)
+        self._repeat_ticks = max(1, REPEAT_NS // deployment.tick_ns)
+        self._reading: Reading | None = None
+        self._open: list[Job] = []
+        self._current: Job | None = None
+        self._last = 0
+        self._sent = self._due_tick = 0
+        """The number that was sent last, and when it is sent again."""
+
+    # --- what one asks for -------------------------------------------------------------------------------------------
+
+    def call(self, *numbers: float, **named: Any) -> Job:
+        """Begin a job, by the numbers of a command in their order or by name; it is sent by `commands`.
+
+        Raises BadValue for names and numbers that are none of a command.
+        """
+        if numbers and named:
+            raise self._taker.wrong("numbers are given by name or in their order, not both")
+        command = self._taker.value(named or numbers)
+        self._taker.encode(command)
+        if self._current is not None and self._current.number is None:  # nobody will ever hear of it
+            self._current.state = JobState.PREEMPTED
+            self._current.by = self.sender
+        self._current = Job(self.what, None, command)
+        self._open.append(self._current)
+        return self._current
+
+    @property
+    def job(self) -> Job | None:
+        """The last job: the one that was called, else, after a restart, the sender's last one by the reading."""
+        if self._current is None and self._reading is not None and self._reading.numbers[self._row] > 0.0:
+            number = int(self._reading.numbers[self._row])
+            self._current = Job(self.what, number, None)
+            self._open.append(self._current)
+            self._read(self._reading)
+        return self._current
+
+    @property
+    def running(self) -> str:
+        """Whose job the actuator does, by the newest reading; empty for nobody's."""
+        at = 0 if self._reading is None else int(self._reading.running)
+        return self.senders[at - 1] if at else ""
+
+    # --- what is heard and sent --------------------------------------------------------------------------------------
+
+    def hear(self, samples: Samples) -> None:
+        """Take what the newest sample of the job sensor tells."""
+        sample = samples.get(self.heard)
+        reading = None if sample is None else sample.value
+        if isinstance(reading, Reading) and reading is not self._reading and self._is_sound(reading):
+            self._reading = reading
+            self._read(reading)
+
+    def _is_sound(self, reading: Reading) -> bool:
+        """Whether a reading, which a network may have changed, can be one."""
+        count, states = max(len(self.senders), 1), frozenset(JobState)
+        return (
+            len(reading.numbers) == len(reading.states) == count
+            and reading.running in range(count + 1)
+            and states.issuperset(reading.states)
+        )
+
+    def _read(self, reading: Reading) -> None:
+        last, state = int(reading.numbers[self._row]), JobState(int(reading.states[self._row]))
+        self._last = max(self._last, last)
+        for job in self._open:
+            if job.number is None or last < job.number:
+                continue
+            job.state = state if last == job.number else JobState.PREEMPTED
+            if job.state == JobState.PREEMPTED:
+                job.by = self.running
+        self._open = [job for job in self._open if not job.state.has_ended]
+
+    def due(self, tick: int) -> Any | None:
+        """Return the command that is to be sent at a tick, with its job's number; None where there is nothing to send.
+
+        It is sent again until a reading tells that it was taken. The first one waits for a reading, which tells the
+        number of the last job before a restart; and a number is above that of the tick, so that none is used twice.
+        """
+        job = self._current
+        if job is None or job.state.has_ended or not (job.is_cancelled or job.state == JobState.NONE):
+            return None
+        if job.number is None:
+            if self._reading is None:
+                return None
+            self._last = job.number = max(self._last, tick) + 1
+        number = -job.number if job.is_cancelled else job.number
+        if number == self._sent and tick < self._due_tick:
+            return None
+        self._sent, self._due_tick = number, tick + self._repeat_ticks
+        command = self._nothing() if job.command is None else job.command
+        return msgspec.structs.replace(command, **{JOB: float(number)})
+
+    def _nothing(self) -> Any:
+        """Return a command to cancel a job with of which nobody knows what it asks for."""
+        codec = self._taker.codec
+        return codec.from_numbers([0.0] * len(codec.fields))
+
+    def commands(self, tick: int) -> Commands:
+        """Return what is `due` as a player returns it, and `Simulation.step` takes it."""
+        command = self.due(tick)
+        return {} if command is None else {self.robot: {self.actuator: command}}
+
+    def payload(self, tick: int) -> bytes | None:
+        """Return what is `due` as the payload of a packet to the actuator's channel."""
+        command = self.due(tick)
+        return None if command is None else self._taker.encode(command)

@@ -1,0 +1,53 @@
+"""How the jobs of an actuator stand."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from foosim.common.names import nearest_quoted
+from foosim.common.spec_base import Name
+from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.forms.jobs import CHANGED, NUMBERS, RUNNING, STATES
+from foosim.world.forms.quantities import Count
+from foosim.world.forms.registry import sensor
+from foosim.world.forms.settings import SensorSettings
+
+
+class JobSettings(SensorSettings):
+    """Tells how the jobs of the `actuator` of its robot stand: at its rate, and besides when that changes."""
+
+    actuator: Name
+
+
+class Jobs(Struct, frozen=True):
+    """The jobs of an actuator. Senders are the players and clients that may command the robot, in name order.
+
+    `running` is the one whose job runs, counted from 1, 0 for none. Of each there are the number of its last job, 0
+    before the first one, and its state: 1 running, 2 done, 3 failed, 4 preempted, 5 cancelled.
+    """
+
+    running: Count
+    numbers: tuple[Count, ...]
+    states: tuple[Count, ...]
+
+
+@sensor("job", JobSettings, Jobs, speaks=lambda settings: f"{settings.actuator}.{CHANGED}")
+class JobSensor:
+    """Whose job an actuator does, and the last job of each sender, with how it stands."""
+
+    def __init__(self, settings: JobSettings, at: Mounting) -> None:
+        self._running, self._numbers, self._states = (
+            at.slot(f"{settings.actuator}.{slot}") for slot in (RUNNING, NUMBERS, STATES)
+        )
+
+    @staticmethod
+    def check(settings: JobSettings, at: Mounting) -> None:
+        """Raise Misfit for an actuator that the robot does not have, or that does no jobs."""
+        name, offsets = settings.actuator, at.robot.offsets
+        having = [one for one in at.spec.robots[at.robot.name].actuators if f"{one}.{CHANGED}" in offsets]
+        if name not in having:
+            what = f"{at.robot.name} has no such actuator with jobs; there are {', '.join(having) or 'none'}"
+            raise Misfit(("actuator",), what, name, nearest_quoted(name, having))
+
+    def sample(self, view: View) -> Jobs:
+        return Jobs(view.numbers[self._running.at], tuple(view.read(self._numbers)), tuple(view.read(self._states)))
