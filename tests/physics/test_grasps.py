@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
+from itertools import product
 from math import cos, dist, sin
 from typing import Any, Final
 
@@ -11,6 +12,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.rehearsal.simulation import Simulation
+from foosim.world.assembly.volumes import Volumes
 from foosim.world.components.grasping import grasp_of
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
@@ -54,12 +56,19 @@ def held(made: Simulation, robot: str = "a") -> str:
 
 
 def slip(made: Simulation, robot: str, name: str, link: str) -> float:
-    """How far what is held is from where it was in the grip (m)."""
+    """How far the farthest corner of a held box is from where it was in the grip (m)."""
     frame, body = made.frame, made.scene.bodies[robot]
     index = [one.name for one in body.links].index(f"{robot}/{link}")
     _, position, orientation = forward_kinematics(body, frame.layout[robot], frame.numbers)[index]
-    place, _ = grasp_of(frame.layout[name], frame.numbers, position, orientation)
-    return dist(place, frame.vector(robot, "gripper.grasp", 3))
+    place, axes = grasp_of(frame.layout[name], frame.numbers, position, orientation)
+    x, y, z, a, b, c, d = frame.vector(robot, "gripper.grasp", 7)
+    (corners,) = [shape.geometry.half for shape in made.scene.bodies[name].links[0].shapes]  # type: ignore[union-attr]
+    ways = []
+    for signs in product((-1.0, 1.0), repeat=3):
+        u, v, w = (sign * half for sign, half in zip(signs, corners, strict=True))
+        now, before = rotate(axes, (u, v, w)), rotate((a, b, c, d), (u, v, w))
+        ways.append(dist(moved(place, now, 1.0), moved((x, y, z), before, 1.0)))
+    return max(ways)
 
 
 # --- what is held ----------------------------------------------------------------------------------------------------
@@ -291,6 +300,22 @@ def test_the_nearest_is_taken_and_of_equals_the_first_by_name() -> None:
         assert held(made) == "y"
 
 
+@pytest.mark.parametrize(("reach", "is_together"), [("5 cm", False), ("45 cm", True)])
+def test_what_is_in_reach_is_in_the_island_of_the_crane_before_it_is_taken(reach: str, is_together: bool) -> None:
+    """So one solver writes both in the tick of the grasp: the hand is at its end, and the crate stands beyond."""
+    with simulation({"a": crane(0.0, reach=reach)}, {"crate": crate(1.9)}) as made:
+        made.step({"a": {"joints": (0.0, 1.2)}}, ticks=300)
+        layout = made.frame.layout
+        pair = layout["a"].index, layout["crate"].index
+        islands = [one.entities for one in Volumes(made.deployment, layout).islands(made.frame.numbers)]
+        assert (pair in islands) == is_together
+        x, _, _ = vector(made, "crate", "position")
+        made.step({"a": {"gripper": (1.0,)}})
+        assert (held(made) == "crate") == is_together
+        made.step({"a": {"joints": (0.0, 0.9)}}, ticks=200)
+        assert vector(made, "crate", "position")[0] == pytest.approx(x - 0.3 * is_together, abs=0.005)
+
+
 def test_it_takes_nothing_by_itself_and_keeps_what_it_has() -> None:
     """What comes near a closed gripper is not taken; a second command to close changes no grasp."""
     with at_crate({"crate": crate(1.0), "other": crate(1.0, y=1.0)}) as made:
@@ -387,7 +412,11 @@ BASE: Final = {"model": "holonomic", "actuators": {"grip": {"kind": "gripper"}}}
             {"engine": "pure"},
             ["robots.b.actuators.grip.kind", "the engine pure has no grasps: valid is mujoco"],
         ),
-        ({"b": BASE}, {}, ["robots.b.actuators.grip.kind", "goes on by a motion", "that the engine solves"]),
+        (
+            {"b": BASE},
+            {},
+            ["robots.b.actuators.grip.kind", "b is no rigid body", "valid on robots that the engine solves"],
+        ),
         ({"a": crane(0.0, at={"link": "gripp"})}, {}, ["robots.a.actuators.gripper.at.link", "no such link", "grip"]),
         (
             {"a": crane(0.0) | {"sensors": {"g": {"kind": "gripper", "rate": "1 Hz", "gripper": "griper"}}}},

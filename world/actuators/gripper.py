@@ -29,6 +29,7 @@ from foosim.world.scene import moved, rotate
 Reach = Annotated[float, Quantity(units.LENGTH, "1 mm", "2 m")]
 Opening = Annotated[float, Quantity(units.LENGTH, "1 mm", "10 m")]
 Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
+VALID: Final = "valid on robots that the engine solves, as urdf, quadrotor, differential_drive with dynamics: rigid"
 HALF: Final = 0.5
 """A command from here on means closed."""
 
@@ -81,7 +82,7 @@ class Gripper:
             what = f"the engine {at.spec.engine} has no grasps: valid is {' or '.join(having)}"
             raise Misfit(("kind",), what, settings.kind)
         if not (at.robot.is_rigid and at.robot.kind.couples):
-            what = f"{at.robot.name} goes on by a motion, which no load moves: valid on robots that the engine solves"
+            what = f"{at.robot.name} is no rigid body, so that no load would move it: {VALID}"
             raise Misfit(("kind",), what, settings.kind)
         link_index(body_at(at), settings.at.link)
 
