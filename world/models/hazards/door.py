@@ -76,8 +76,11 @@ class DoorObject(EntitySettings):
     settable={"open": OPEN},
 )
 class Door:
-    """A door; `open` is the share by which it is to be open, `opened` by which it is, `blocked` that something is in
-    its way."""
+    """A door that slides open and shut, as far as it is told.
+
+    `open` is the share of its way by which it is to be open, `opened` by which it is, `blocked` that something is in
+    its way.
+    """
 
     is_upright: Final = False
     """To others it is what its shape is, and no cylinder."""
