@@ -1,7 +1,7 @@
 """The messages of a capture for viewers: scene, poses and log lines, as Foxglove's Protobuf.
 
 Poses are every link's in the frame `world`, by the one forward kinematics. The scene hangs its shapes on the links
-(`frame_locked`), so it is said once and when the layout changes. Foxglove, Lichtblick and (but for the scene) rerun
+(`frame_locked`), so it is said once and when others are present. Foxglove, Lichtblick and (but for the scene) rerun
 decode them.
 """
 

@@ -14,7 +14,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.parts import files_from
 from foosim.capture.reader import DECODERS, TICK_MARKS, FrameReader, Scan, TickMark, chain_at_start, deployment_of
-from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, RECOVERIES, TICK, Fate
+from foosim.capture.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
 from foosim.common import struct_types
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import count_commands
@@ -135,7 +135,7 @@ class _Counts:
         self.arithmetic: set[str] = set()
         self.clients: set[str] = set()
         self._last: dict[str, Message] = {}
-        """The last layout, then the last frame."""
+        """The layout, then the last frame."""
         self._scan = scan
 
     def take(self, message: Message) -> None:
@@ -149,8 +149,6 @@ class _Counts:
             if packet.cause:
                 self.causes[packet.cause] += 1
         elif topic in FrameReader.TOPICS:
-            if topic == LAYOUT:
-                self._last.clear()  # the frames before it have another layout
             self._last[topic] = message
         elif topic == TICK:
             self._take_tick(decode(TICK_MARKS, message))

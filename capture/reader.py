@@ -257,8 +257,7 @@ class CaptureData:
         scan = Scan(self.path)
         reader = FrameReader(scan, self.deployment)
         rows = [row for message in scan.messages(FrameReader.TOPICS) if (row := reader.row(message)) is not None]
-        layout = reader.layout or build_layout(self.deployment)
-        return frames_of(str(self.path), layout, build_scene(self.deployment, layout).bodies, rows)
+        return frames_of(str(self.path), reader.layout, build_scene(self.deployment, reader.layout).bodies, rows)
 
     def each_frame(self) -> Iterator[Frame]:
         """Yield the captured frames one by one."""
@@ -366,33 +365,31 @@ def open_capture(path: Path | str) -> CaptureData:
 
 
 class FrameReader:
-    """Reads the frames of a pass over a file, each checked against the layout before it."""
+    """Reads the frames of a pass over a file, checked against the deployment's layout, which the file names first."""
 
     TOPICS: Final = frozenset({LAYOUT, FRAME})
 
     def __init__(self, scan: Scan, deployment: Deployment) -> None:
         self._scan = scan
-        self._deployment = deployment
-        self.layout: Layout | None = None
-        """The layout, once a message has brought it."""
+        self.layout = build_layout(deployment)
+        self._is_named = False
 
     def frame(self, message: Message) -> Frame | None:
         """Return the frame that a message of `TOPICS` brings; None where that is the layout. Raises CaptureError."""
         row = self.row(message)
-        return None if row is None or self.layout is None else frame_of(self.layout, row)
+        return None if row is None else frame_of(self.layout, row)
 
     def row(self, message: Message) -> FrameRow | None:
         """Return the row of a frame that a message brings; None where that is the layout. Raises CaptureError."""
         row: LayoutRow | FrameRow = self._scan.decode(DECODERS[message.topic], message)
         path = self._scan.about.path
         if isinstance(row, LayoutRow):
-            self.layout = layout_of(path, self._deployment, row)
+            check_layout(path, self.layout, row)
+            self._is_named = True
             return None
-        layout = self.layout
-        if layout is None:
+        if not self._is_named:
             raise CaptureError(f"{path}: a frame without a layout before it")
-        if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
-            raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
+        check_frame(path, self.layout, row)
         return row
 
 
@@ -435,10 +432,17 @@ def check_whole(about: About) -> None:
         )
 
 
-def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
-    """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
-    layout = build_layout(deployment)
+def check_layout(path: Path, layout: Layout, row: LayoutRow) -> None:
+    """Raise CaptureError where a row names another layout than the deployment has here.
+
+    What the numbers of frames mean depends on it.
+    """
     if layout.digest.hex() != row.digest or layout.size != row.size:
         named = "`foosim capture info` names the version that captured it"
         raise CaptureError(f"{path}: its layout is not what this version builds: {named}")
-    return layout
+
+
+def check_frame(path: Path, layout: Layout, row: FrameRow) -> None:
+    """Raise CaptureError for a row of a frame that is not of a layout."""
+    if len(row.values) != 8 * layout.size or any(box.index >= len(layout.entities) for box in row.outboxes):
+        raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")

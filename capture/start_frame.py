@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.reader import Scan, chain_at_start, deployment_of, layout_of
+from foosim.capture.reader import Scan, chain_at_start, check_layout, deployment_of
 from foosim.capture.rows import FRAME, LAYOUT, TICK, FrameRow, LayoutRow, TickRow
 from foosim.common.errors import BadValue, Malformed, Refused
 from foosim.common.new_run import new_run_text
@@ -80,7 +80,8 @@ def read_branch(text: str, deployment: Deployment) -> Branch:
 
 def _frame_of(path: Path, found: _Found) -> tuple[Layout, Frame]:
     row = found.frame
-    layout = layout_of(path, found.deployment, found.layout)
+    layout = build_layout(found.deployment)
+    check_layout(path, layout, found.layout)
     outboxes = [Outbox(outbox.index, outbox.packets) for outbox in row.outboxes]
     try:
         frame = frame_from_bytes(row.tick, layout, row.values, outboxes)

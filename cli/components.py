@@ -13,6 +13,7 @@ from foosim.world.forms.registration import VALUES
 from foosim.world.forms.registry import FORMS
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
 from foosim.world.placing import is_placed
+from foosim.world.setting.settable import valid
 
 OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
@@ -81,8 +82,10 @@ def _settable(component: Form) -> dict[str, str]:
     """Return what can be set of one while a run goes on, and what is valid."""
     if isinstance(component, Model):
         placed = {"at": "a pose"} if is_placed(component.settings) else {}
-        return {**placed, **({"down": "true or false"} if component.is_robot else {})}
-    return {name: f"{one.low} to {one.high}" for name, one in getattr(component, "settable", {}).items()}
+        its = placed | ({"down": "true or false"} if component.is_robot else {})
+    else:
+        its = {}
+    return its | {name: valid(one) for name, one in getattr(component, "settable", {}).items()}
 
 
 def _moved(model: Model) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def rate(
 Numbers = tuple[float, float, float]
 
 
-@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+@app.command()
 def add(
     name: Annotated[
         str, typer.Argument(metavar="ENTITY", help="A spare, or a fleet: then its first spare.", show_default=False)

@@ -61,10 +61,17 @@ class Turn:
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Player:
     """A controller: derive from it and override what is needed. It sees packets only: samples are as old as the network
-    made them, and some never come."""
+    made them, and some never come.
+
+    It exists while one of its robots is in the world. When the last one is removed it is not called any more; when one
+    is added, another player is made, which has heard nothing.
+    """
+
+    robots: tuple[str, ...] = ()
+    """The names of its robots that are present, in order: set before each call of `act`."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
-        """Called once, with the checked deployment and the player's `parameters` in it."""
+        """Called with the checked deployment and the player's `parameters` in it."""
 
     def act(self, tick: int, samples: Samples) -> Commands | Turn:
         """Return commands at `tick`, or a Turn that has packets, too.

@@ -5,7 +5,7 @@ The process `foosim role player` and the rehearsal run this same loop.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from traceback import format_exception
 from typing import Any, Final
 
@@ -73,13 +73,27 @@ class Acting:
         self.hears = deployment.heard_by(name)
         """The (endpoint, channel) that it subscribes to."""
         self._deployment = deployment
-        self.player = self._make(load, tick)
+        self._load = load
+        self._since: int | None = None
+        """The tick since which the player exists, once it has acted."""
+        self.player = self._make(tick)
         self._encoder = CommandEncoder(deployment)
         self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in self.hears})
 
-    def _make(self, load: Callable[[str], PlayerFactory], tick: int) -> Player:
+    def exist(self, since: int, absent: Collection[str], tick: int) -> None:
+        """Be the player that exists since a tick, before it acts at another one; these of its robots are `absent`.
+
+        It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
+        """
+        if self._since not in (None, since):
+            self.player = self._make(tick)
+            self.newest.samples = {}
+        self._since = since
+        self.player.robots = tuple([name for name in sorted(self.declared.robots) if name not in absent])
+
+    def _make(self, tick: int) -> Player:
         """Make the player that is declared."""
-        factory = load(self.declared.class_)
+        factory = self._load(self.declared.class_)
         try:
             return factory(self._deployment, self.declared.parameters)
         except Refused as error:
@@ -169,6 +183,8 @@ class PlayerLoop:
         if self._acting is None:
             self._begin(core.deployment, now_ns)
         if core.go is not None:
+            assert self._acting is not None
+            self._acting.exist(core.go.since, core.go.absent, core.go.tick)
             self.newest.take(core.go.packets)
             self._say(core.go.tick, now_ns)
         elif self._period_ns:
@@ -194,6 +210,7 @@ class PlayerLoop:
             period, offset = deployment.turns(declared)
             self.core.join(period, acting.hears, offset, deployment.arrivals_of(acting.name))
         else:
+            acting.exist(0, (), self.core.tick)
             self.core.join(0, acting.hears)
             self._period_ns = int(NS_PER_S / declared.rate_hz)
             self._beat_ns = now_ns + self._period_ns

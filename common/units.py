@@ -77,7 +77,9 @@ RATE: Final = Dimension("rate", _sizes(Hz="1", kHz="1e3", mHz="1e-3"), "fraction
 LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6", km="1e3"))
 MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))
 ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE}, usual="deg")
-SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
+SPEED: Final = Dimension(
+    "speed", {"m/s": Fraction(1), "cm/s": Fraction(1, 100), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)}
+)
 SPIN: Final = Dimension("rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30})
 ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": Fraction(1, 1000)})
 ANGULAR_ACCELERATION: Final = Dimension("angular acceleration", {"rad/s2": Fraction(1), "deg/s2": _DEGREE})
@@ -89,6 +91,9 @@ ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e
 POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
 VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
 CURRENT: Final = Dimension("current", _sizes(A="1", mA="1e-3"))
+TEMPERATURE: Final = Dimension("temperature", _sizes(degC="1"))
+DENSITY: Final = Dimension("density", {"kg/m3": Fraction(1), "g/cm3": Fraction(1000)})
+VISCOSITY: Final = Dimension("viscosity", {"Pa s": Fraction(1), "mPa s": Fraction(1, 1000)})
 RESISTANCE: Final = Dimension("resistance", _sizes(Ohm="1", mOhm="1e-3"))
 INERTIA: Final = Dimension("moment of inertia", {"kg m2": Fraction(1), "g cm2": Fraction(1, 10**7)})
 FORCE_CONSTANT: Final = Dimension("force constant", {"N/A": Fraction(1)})

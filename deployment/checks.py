@@ -19,11 +19,11 @@ from foosim.common.names import nearest_quoted
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.text.selection import TooManyComparisons
-from foosim.world.assembly.misfits import find_kit_model, kit_problems, needs_kit, rule_problems
+from foosim.world.assembly.misfits import checked_spares, find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
-from foosim.world.layout import WORLD, spares_of
+from foosim.world.layout import WORLD
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scenery import SceneryMesh
 from foosim.world.spec import KITS
@@ -82,6 +82,8 @@ def _kit_forms(deployment: Deployment) -> dict[str, Kit]:
 def _kits(deployment: Deployment) -> Iterator[Finding]:
     """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
     kits = _kit_forms(deployment)
+    spares = {key: checked_spares(deployment, kit) for key, kit in kits.items()}
+    entities = {key: {**kit.entities, **spares[key][0]} for key, kit in kits.items()}
     for key, kit in kits.items():
         check = getattr(kit.made, "check", None)
         try:
@@ -92,8 +94,8 @@ def _kits(deployment: Deployment) -> Iterator[Finding]:
             if kit.is_own:
                 raise
             yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", at="key")
-        entities = {**kit.entities, **spares_of(deployment, kit)}
-        for problem in (*kit_problems(key, entities, kits, (WORLD,)), *_rules_of_kit(key, kit, kits)):
+        of_entities = kit_problems(key, entities, kits, (WORLD,))
+        for problem in (*spares[key][1], *of_entities, *_rules_of_kit(key, kit, kits)):
             yield Finding((key,), f"kit {key}: {problem}", at="key")
     for label in deployment.rules:
         others = [key for key, kit in kits.items() if label in kit.rules]
@@ -127,7 +129,7 @@ def _names(deployment: Deployment) -> Iterator[Finding]:
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
     kits = _kit_forms(deployment).values()
-    reserved = (WORLD, *(name for kit in kits for name in (*kit.entities, *spares_of(deployment, kit))))
+    reserved = (WORLD, *(name for kit in kits for name in (*kit.entities, *checked_spares(deployment, kit)[0])))
     for section, scopes, refused in (
         ("robots", (entities, endpoints), reserved),
         ("objects", (entities,), reserved),
@@ -298,7 +300,7 @@ def _models(deployment: Deployment) -> Iterator[Model]:
     """Yield the models of robots and objects, and of what kits put into the world."""
     yield from map(registry.model_of, (*deployment.robots.values(), *deployment.objects.values()))
     for kit in _kit_forms(deployment).values():
-        names = (*kit.entities.values(), *spares_of(deployment, kit).values())
+        names = (*kit.entities.values(), *checked_spares(deployment, kit)[0].values())
         yield from (model for name in names if (model := find_kit_model(name)))
 
 

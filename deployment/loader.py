@@ -51,7 +51,14 @@ from foosim.deployment.text.yaml import (
     write_yaml,
 )
 from foosim.deployment.timing_checks import check_timing
-from foosim.world.assembly.misfits import doubled_slots, engine_findings, field_findings, unfit_components, unheard
+from foosim.world.assembly.misfits import (
+    doubled_slots,
+    engine_findings,
+    field_findings,
+    lasting_spares,
+    unfit_components,
+    unheard,
+)
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.forms import registry
@@ -300,6 +307,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
 def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:
     """What is wrong with the state of a world, whose robots' files must be there; each part rests on those before."""
     yield doubled_slots(deployment)
+    yield lasting_spares(deployment)
     yield unheard(deployment)
     yield _trial_findings(deployment)
     yield chain(_start_findings(deployment), unfit_components(deployment))

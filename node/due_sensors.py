@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from foosim.world.components.fitted import FittedSensor
+from foosim.world.forms.forms import DOWN, INACTIVE
 from foosim.world.layout import Entity
 
 TURNS_MAX: Final = 64
@@ -27,27 +28,36 @@ class DueSensors:
     """The sensors of some robots of one layout.
 
     Sensors that are due at one tick are due together again: what follows from who they are is kept while the same
-    robots are in service.
+    robots are in service, and the same components active.
     """
 
-    def __init__(self, robots: Sequence[Entity], sensors: Mapping[str, Sequence[FittedSensor]]) -> None:
+    def __init__(
+        self,
+        robots: Sequence[Entity],
+        sensors: Mapping[str, Sequence[FittedSensor]],
+        switches: Mapping[str, Mapping[str, int]],
+    ) -> None:
+        """`sensors` and the bits of their switches are by robot."""
         self.robots = robots
         self._sensors = [tuple(sensors[robot.name]) for robot in robots]
-        self._down = [robot.offsets["down"] for robot in robots]
+        self._bits = [tuple([switches[one.robot][one.channel] for one in its]) for its in self._sensors]
+        self._down = [robot.offsets[DOWN] for robot in robots]
+        self._inactive = [robot.offsets.get(INACTIVE, robot.offsets[DOWN]) for robot in robots]
+        """Of one without components its `down`, which is 0 when it is looked at."""
         everyone = [one for its in self._sensors for one in its]
         self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._turns: dict[tuple[bool, ...], Turn] = {}
         """Of those who are in service now."""
-        self._out = [0.0] * len(robots)
-        """Who was out of service when they were made."""
+        self._out = [0.0] * (2 * len(robots))
+        """Who was out of service, and what was switched off, when they were made."""
 
     def at(self, tick: int, numbers: Sequence[float]) -> Turn:
         """Return who measures at a tick, at whose start the numbers of the frame are these."""
         value = numbers.__getitem__
         if any(map(value, self._speaks)):
             return self._turn(tick, numbers)
-        out = [*map(value, self._down)]
+        out = [*map(value, self._down), *map(value, self._inactive)]
         if out != self._out:
             self._turns, self._out = {}, out
         due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])
@@ -65,6 +75,10 @@ class DueSensors:
         return Turn(robots, sensors, heads, tuple([one.samples_at for one in sensors]))
 
     def _due(self, tick: int, numbers: Sequence[float]) -> Iterator[tuple[Entity, tuple[FittedSensor, ...]]]:
-        for robot, down, sensors in zip(self.robots, self._down, self._sensors, strict=True):
+        for robot, down, inactive, sensors, bits in zip(
+            self.robots, self._down, self._inactive, self._sensors, self._bits, strict=True
+        ):
             if numbers[down] == 0.0:
-                yield robot, tuple([one for one in sensors if one.is_due(tick, numbers)])
+                off = int(numbers[inactive])
+                its = zip(sensors, bits, strict=True)
+                yield robot, tuple([one for one, bit in its if not bit & off and one.is_due(tick, numbers)])

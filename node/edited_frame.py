@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from foosim.world.assembly.grippers import grippers_of, release
 from foosim.world.assembly.world import body_of
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Edit, Push, Remove, Set, counters, fitting_edits, write
-from foosim.world.forms.forms import DOWN, NO_ENTITY
+from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.spec import WorldSpec
 
 
@@ -21,12 +22,16 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
     for change in fitting_edits(layout, numbers, edits):
         assert isinstance(change, Add | Remove | Push | Set), "the network is the vHub's"
         entity = layout[change.name]
+        switched = 0 if INACTIVE not in entity.offsets else int(numbers[entity.offsets[INACTIVE]])
         write(layout, numbers, change)
         if isinstance(change, Push):
             _push(numbers, layout, change, spec)
         elif isinstance(change, Set):
-            if change.field == DOWN and entity.is_robot:
-                _hold(WritableView(frame.tick, numbers), numbers, spec, layout, entity)
+            if entity.is_robot and change.field in (DOWN, INACTIVE):
+                those = -1 if change.field == DOWN else switched ^ int(change.numbers[0])
+                _hold(WritableView(frame.tick, numbers), numbers, spec, layout, entity, those)
+            elif change.field == "position":
+                release(grippers_of(spec, layout), numbers, entity)
         else:
             moved.append(entity)
             for place in layout.references:
@@ -49,9 +54,12 @@ def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> 
         numbers[start + axis] += impulse / mass
 
 
-def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, robot: Entity) -> None:
-    """Have the actuators of a robot that goes out of service, or comes back, hold it where it is."""
+def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, robot: Entity, those: int) -> None:
+    """Have actuators that go out of service, or come back, hold a robot where it is: `those` are their bits."""
+    bits = switches_of(spec.robots[robot.name])
     for one in actuators_of(spec, layout, robot):
+        if not bits[one.channel] & those:
+            continue
         called(f"actuator {one.channel}", robot.name, view.tick, one.actuator.hold, view)
         if one.jobs is not None:
             one.jobs.drop(view)

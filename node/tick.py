@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 import msgspec
 import numpy as np
@@ -19,9 +19,10 @@ from foosim.common import limits
 from foosim.deployment.schema import Deployment
 from foosim.node.due_sensors import DueSensors, Turn
 from foosim.node.edited_frame import edit, kept
-from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine
+from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine, Weld
 from foosim.node.physics.touch_log import clear_touches
 from foosim.world.assembly.body_limits import BodyLimits
+from foosim.world.assembly.grippers import Gripper, grippers_of, release
 from foosim.world.assembly.rest import Rest, stop, wake_edited
 from foosim.world.assembly.standing import Standing
 from foosim.world.assembly.world import World
@@ -30,8 +31,9 @@ from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
+from foosim.world.forms.forms import INACTIVE
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.world.sampling import Sampling
 from foosim.world.setting.scheduled import Schedule
@@ -69,6 +71,15 @@ class Work:
     values: NDArray[np.float64] | None = None
 
 
+class _RigidIsland(NamedTuple):
+    """The rigid bodies of an island, the movers in its way, whether a body has actuators, and the grippers of all."""
+
+    bodies: tuple[Entity, ...]
+    movers: tuple[Entity, ...]
+    is_driven: bool
+    grippers: tuple[Gripper, ...]
+
+
 class Stepper:
     """The pure step of one deployment and layout: everything a tick needs but the engine."""
 
@@ -86,9 +97,11 @@ class Stepper:
         self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
         """Bodies that are islands by themselves, of the islands that were solved last."""
-        self._divided: tuple[
-            tuple[tuple[Entity, ...], ...], list[tuple[tuple[Entity, ...], tuple[Entity, ...], bool]]
-        ] = (), []
+        self._grippers: dict[int, list[Gripper]] = {}
+        """By the indices of their robots."""
+        for one in grippers_of(deployment, layout):
+            self._grippers.setdefault(one.robot, []).append(one)
+        self._divided: tuple[tuple[tuple[Entity, ...], ...], list[_RigidIsland]] = (), []
         """The islands of the last tick, and what is solved of them."""
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._islands: tuple[tuple[Entity, ...], ...] | None = None
@@ -97,7 +110,8 @@ class Stepper:
         """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
-        self._due = DueSensors((), self._sensors)
+        self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
+        self._due = DueSensors((), self._sensors, self._switches)
         self._sensing = Sensing()
         self._waiting = [
             (layout.entities[index], one)
@@ -119,7 +133,7 @@ class Stepper:
         """
         tick, numbers = frame.tick, frame.numbers
         if self._due.robots is not robots and self._due.robots != robots:
-            self._due = DueSensors(robots, self._sensors)
+            self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view)
@@ -177,7 +191,7 @@ class Stepper:
             if packet.destination not in self.layout:
                 continue
             entity = self.layout[packet.destination]
-            if entity.index not in solved or not entity.is_robot:
+            if entity.index not in solved or not entity.is_robot or entity.is_absent(numbers):
                 continue
             if not self._take(packet, entity, view, outboxes):
                 numbers[entity.offsets["refused"]] += 1.0
@@ -199,7 +213,10 @@ class Stepper:
             return True
         for one in self.world.actuators.get(entity.index, ()):
             if one.channel == packet.channel:
-                return one.accept(packet.payload, view, packet.source)
+                off = int(view.numbers[entity.offsets[INACTIVE]])
+                return not off & self._switches[entity.name][one.channel] and one.accept(
+                    packet.payload, view, packet.source
+                )
         return False
 
     def solve(self, engine: AnyEngine, work: Work) -> None:
@@ -274,30 +291,35 @@ class Stepper:
         solved: list[Entity] = []
         if self._divided[0] is not work.islands:
             self._divided = work.islands, self._rigid_islands(work)
-        for members, in_the_way, is_driven in self._divided[1]:
+        for members, in_the_way, is_driven, grippers in self._divided[1]:
             bodies = members
             if is_partial and any(numbers[entity.offsets["quarantined"]] > 0.0 for entity in members):
                 bodies = tuple([entity for entity in members if numbers[entity.offsets["quarantined"]] <= 0.0])
                 if not bodies:
                     continue
+            if grippers and any(numbers[one.held] != start[one.held] for one in grippers):
+                rest.wake(bodies, numbers)
             may_rest = rest.may_rest(bodies, in_the_way, numbers, start)
             drives = world.drives(bodies, view) if is_driven or not may_rest else ()
             if may_rest and not any(asked.is_moving for asked in drives):
                 rest.keep(bodies, numbers)
                 continue
-            engine.solve(Island(bodies, in_the_way, drives), numbers, start)
+            welds = _welds(grippers, bodies, numbers) if grippers else ()
+            engine.solve(Island(bodies, in_the_way, drives, welds), numbers, start)
             rest.count(bodies, drives, numbers)
             solved += bodies
         return solved
 
-    def _rigid_islands(self, work: Work) -> list[tuple[tuple[Entity, ...], tuple[Entity, ...], bool]]:
-        """Return the rigid bodies of each island that has any, the movers in its way, and whether one has actuators."""
+    def _rigid_islands(self, work: Work) -> list[_RigidIsland]:
+        """Return the islands that have rigid bodies, with these alone."""
         found = []
         movers = work.movers or ((),) * len(work.islands)
         for members, in_the_way in zip(work.islands, movers, strict=True):
             bodies = tuple([entity for entity in members if entity.index in self._rigid])
             if bodies:
-                found.append((bodies, in_the_way, any(entity.index in self.world.actuators for entity in bodies)))
+                is_driven = any(entity.index in self.world.actuators for entity in bodies)
+                grippers = tuple([one for entity in bodies for one in self._grippers.get(entity.index, ())])
+                found.append(_RigidIsland(bodies, in_the_way, is_driven, grippers))
         return found
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
@@ -318,7 +340,10 @@ class Stepper:
             for entity in island:
                 numbers[entity.start : entity.split] = before[entity.start : entity.split]
                 _clear_results(entity, numbers)
+            grippers = [one for entity in island for one in self._grippers.get(entity.index, ())]
             for entity, why in bad:
+                for index in release(grippers, numbers, entity):
+                    self.rest.wake([work.layout.entities[index]], numbers)
                 until = self._hold(entity, numbers)
                 self.quarantined.append(f"tick {work.tick}: {entity.name} is in quarantine {until}: {why}")
 
@@ -345,6 +370,21 @@ class Stepper:
     def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
         """Return in words why an entity's new state cannot be; empty where it can."""
         return _not_finite(entity, work.numbers) or self._problem(entity, before, work)
+
+
+def _welds(grippers: Sequence[Gripper], bodies: Sequence[Entity], numbers: Sequence[float]) -> tuple[Weld, ...]:
+    """Return which of these bodies hold which."""
+    holding = [one for one in grippers if numbers[one.held] >= 0.0]
+    if not holding:
+        return ()
+    places = {entity.index: place for place, entity in enumerate(bodies)}
+    return tuple(
+        [
+            Weld(places[one.robot], one.link, places[held], one.grasp)
+            for one in holding
+            if (held := int(numbers[one.held])) in places and one.robot in places
+        ]
+    )
 
 
 def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:

@@ -230,7 +230,7 @@ class Member:
 
     def begin_anew(self) -> None:
         """Begin the handshake again, because the run continues without this process. What was built stays."""
-        self.build = self.layout = self._coming = None
+        self.build = self._coming = None
         self.is_ready = self._entered = False
         self._recalled_by = ""
         self.deadline_ns = 0

@@ -407,12 +407,18 @@ class Received(Item, frozen=True):
 
 
 class Go(Message, frozen=True):
-    """Downlink `number` to a lockstep client: it is due at `tick`; these packets have reached it since its last."""
+    """Downlink `number` to a lockstep client: it is due at `tick`; these packets have reached it since its last.
+
+    The client exists since the frame of tick `since`, as another one than before it. `absent` are those of its robots
+    that are.
+    """
 
     number: Counter
     tick: Counter
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+    since: Counter = 0
+    absent: Names = field(default_factory=list)
 
 
 class Down(Message, frozen=True):

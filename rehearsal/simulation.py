@@ -80,6 +80,8 @@ class Agent:
         else:
             raise UnknownName("no player that could be an agent", name, deployment.players)
         self.sequence = 0
+        self.since = 0
+        """The tick since which it exists; -1 while all its robots are absent."""
         self.malformed = 0
         """Readings since the last `reset` that do not fit their channel: the network has changed them."""
         self.codecs = {pair: channel_codec(deployment, *pair) for pair in self.hears}
@@ -88,8 +90,19 @@ class Agent:
 
     def begin(self) -> None:
         """Forget what was heard and sent."""
-        self.sequence = self.malformed = 0
+        self.sequence = self.malformed = self.since = 0
         self.newest = {}
+
+    @property
+    def exists(self) -> bool:
+        """Whether it exists in the present frame."""
+        return self.since >= 0
+
+    def exist(self, since: int) -> None:
+        """Be the agent that exists since a tick: another one than before has heard nothing."""
+        if self.since != since >= 0:
+            self.newest = {}
+        self.since = since
 
     def take(self, packets: Sequence[Received], is_checked: bool) -> None:
         """Keep the newest packet of each channel by the number of its sender: they may arrive out of order.
@@ -128,9 +141,11 @@ class Resident:
         self.acting = Acting(deployment, name)
         self._sequence = 0
 
-    def act(self, tick: int, now_ns: int, packets: Sequence[Received]) -> list[Sent]:
-        """Let it act at a tick. Raises PlayerError."""
-        self.acting.newest.take(packets)
+    def act(self, tick: int, now_ns: int, carrier: Carrier) -> list[Sent]:
+        """Let it act at a tick on what has reached it. Raises PlayerError."""
+        name = self.acting.name
+        self.acting.exist(carrier.members[name].since, carrier.existence.absent.get(name, ()), tick)
+        self.acting.newest.take(carrier.take(name))
         sent = []
         for one in self.acting.act(tick):
             self._sequence += 1
@@ -295,8 +310,8 @@ class Simulation:
         """Send commands, by robot, at the present frame, and compute some ticks; return the readings then.
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
-        takes no such command, BadValue for names and numbers that are none of a command, ComponentError and
-        PlayerError for a form and a player that fail.
+        takes no such command, BadValue for a robot that is absent and for names and numbers that are none of a command,
+        ComponentError and PlayerError for a form and a player that fail.
         """
         by_agent: dict[str, list[Packet]] = {name: [] for name in self.agents}
         if self._encoder is None:
@@ -306,6 +321,8 @@ class Simulation:
             if owner is None:
                 theirs = [robot for agent in self.agents.values() for robot in agent.robots]
                 raise UnknownName("no robot of an agent", robot, theirs)
+            if self.frame.layout[robot].is_absent(self.frame.numbers):
+                raise BadValue(f"{robot} is absent: add it first")
             by_agent[owner] += [Packet(robot, *one) for one in self._encoder.encode(robot, command)]
         self.advance(by_agent, ticks)
         return self.readings
@@ -377,6 +394,7 @@ class Simulation:
         self._due = self._carrier.open(world.frame, world.sense(), self._events)
         self._events = []
         for name, agent in self.agents.items():
+            agent.exist(self._carrier.members[name].since)
             arrived = self._carrier.take(name)
             if arrived:
                 agent.take(arrived, self._has_network)
@@ -390,7 +408,7 @@ class Simulation:
                 resident = self._residents.get(name)
                 if resident is not None:
                     now_ns = frame.tick * self.deployment.tick_ns
-                    sent[name] = resident.act(frame.tick, now_ns, self._carrier.take(name))
+                    sent[name] = resident.act(frame.tick, now_ns, self._carrier)
         world.step(self._carrier.close(frame, sent), self._edits)
         self._edits = []
 

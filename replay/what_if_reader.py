@@ -28,6 +28,8 @@ from foosim.world.robot_packets import RobotPacket
 Frames = Literal["first", "captured", "computed"]
 """Source of frames: the first one is used for all, each is in the capture, or they are simulated again."""
 _INDEX: Final = (1 << OUTBOX_SHIFT) - 1
+_WHO_HEARS: Final = frozenset({"add", "remove", "set"})
+"""Edits that may change which robots and players hear and speak."""
 
 
 @dataclass(slots=True)
@@ -51,8 +53,9 @@ class Offered:
 
 
 def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
-    """Return which frames are needed: where no fate depends on places and nobody is taken out of service, only one."""
-    if not on_radio and "set" not in capture.edit_kinds and not capture.deployment.events:
+    """Return which frames are needed: only one where no fate depends on places and nobody comes, goes or goes out of
+    service."""
+    if not on_radio and capture.edit_kinds.isdisjoint(_WHO_HEARS) and not capture.deployment.events:
         return "first"
     return "captured" if set(judged_ticks(capture)) <= set(capture.frame_ticks.tolist()) else "computed"
 

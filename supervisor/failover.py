@@ -177,3 +177,7 @@ class Failover:
         self._publish_commit(now_ns)
         state.grant(standing)
         state.log("info", f"goes on from tick {state.frame.tick} with {', '.join(here) or 'no node yet'}")
+        for process in [*state.roster.by_name.values()]:
+            is_new = process.role == "node" and process.name not in (*state.members, *state.roster.stopped)
+            if is_new and process.ready and not process.lost:  # it was before its time
+                self._node_loss.join(process, now_ns)

@@ -7,11 +7,15 @@ adopt the robots of the lost node and give them back when it returns. Without an
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Final
 
 from foosim.supervisor.roster import IN_FLIGHT_NS, Process, refuse
 from foosim.supervisor.state import RunState
 from foosim.world.edits import Edit, Set
 from foosim.world.forms.forms import DOWN
+
+FROZEN: Final = 2.0
+"""What `down` holds of a robot that the loss of its node took out of service; 1 where an operator or an event did."""
 
 
 class NodeLoss:
@@ -45,7 +49,7 @@ class NodeLoss:
         members = [member for member in state.members if member != name]
         state.note_recovery("node", name, reason)
         if members:
-            self._freeze(name)
+            self._freeze_of(name)
             self.open(self.adopted([name], members), members, now_ns)
             state.log("warning", f"lost node {name}: {reason}; goes on from tick {state.frame.tick} without it")
         else:
@@ -61,7 +65,7 @@ class NodeLoss:
                 self._finish(f"lost {name}: {reason}")
                 return
             state.note_recovery("node", name, reason)
-            self._freeze(name)
+            self._freeze_of(name)
         if here:
             self.open(self.adopted({*state.owners.values()} - {*here}, here), here, now_ns)
         else:
@@ -89,10 +93,9 @@ class NodeLoss:
         away = {robot: node for robot, node in state.returns.items() if node != name}
         state.note_recovery("join", name, "back" if self._was_lost(name) else "started")
         if self._freezes:
-            frozen: list[Edit] = [Set(robot, DOWN, [1.0]) for robot in sorted(away)]
-            state.order(state.frame.tick, [] if state.members else frozen)
-            back = [robot for robot in sorted(owners) if owners[robot] == name and robot not in away]
-            state.order(state.released, [Set(robot, DOWN, [0.0]) for robot in back])
+            if not state.members:
+                self._freeze(away)
+            self._thaw(robot for robot in sorted(owners) if owners[robot] == name and robot not in away)
         self.open(owners, [*state.members, name], now_ns)
         state.returns = away
         state.journal(state.control())
@@ -115,7 +118,7 @@ class NodeLoss:
         """An operator chose the owner of a robot: it does not go back to another node, and runs."""
         state = self._state
         if state.returns.pop(robot, None) is not None and self._freezes:
-            state.order(state.released, [Set(robot, DOWN, [0.0])])
+            self._thaw([robot])
 
     def open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
         """Open an epoch.
@@ -150,12 +153,27 @@ class NodeLoss:
     def _was_lost(self, name: str) -> bool:
         return any(entry.what == "node" and entry.name == name for entry in self._state.recovered)
 
-    def _freeze(self, lost: str) -> None:
-        """Where configured, take the robots of a lost node out of service from the last commit on."""
-        state = self._state
+    def _freeze_of(self, lost: str) -> None:
+        """Where configured, take the robots of a lost node out of service."""
         if self._freezes:
-            its = [robot for robot, owner in sorted(state.owners.items()) if owner == lost]
-            state.order(state.frame.tick, [Set(robot, DOWN, [1.0]) for robot in its])
+            self._freeze(robot for robot, owner in self._state.owners.items() if owner == lost)
+
+    def _freeze(self, robots: Iterable[str]) -> None:
+        """Take robots out of service from the last commit on, but those that are so already."""
+        down = self._down()
+        edits: list[Edit] = [Set(robot, DOWN, [FROZEN]) for robot in sorted(robots) if down[robot] == 0.0]
+        self._state.order(self._state.frame.tick, edits)
+
+    def _thaw(self, robots: Iterable[str]) -> None:
+        """Put robots back into service that the loss of a node had taken out of it."""
+        down = self._down()
+        edits: list[Edit] = [Set(robot, DOWN, [0.0]) for robot in sorted(robots) if down[robot] == FROZEN]
+        self._state.order(self._state.released, edits)
+
+    def _down(self) -> dict[str, float]:
+        """Return what each robot's slot `down` will hold after all edits that are ordered."""
+        numbers = self._state.coming_numbers()
+        return {robot.name: numbers[robot.offsets[DOWN]] for robot in self._state.frame.layout.robots}
 
 
 def fewest(owners: Mapping[str, str], members: Collection[str]) -> str:

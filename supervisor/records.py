@@ -242,9 +242,14 @@ Solved = tuple[list[str], dict[str, str]]
 
 def solved_by(barrier: Barrier, frame: Frame) -> Solved:
     """Return the nodes that solved a body on the way to a frame, and who solved each free body."""
-    entities = frame.layout.entities
-    names = [name for name, part in barrier.parts.items() if any(entities[index].is_solved for index in part.solved)]
-    return sorted(names), {body.name: barrier.solver_of(body.index) for body in frame.layout.free}
+    entities, numbers = frame.layout.entities, frame.numbers
+    solving = [
+        name
+        for name, part in barrier.parts.items()
+        if any(entities[index].is_solved and not entities[index].is_absent(numbers) for index in part.solved)
+    ]
+    present = [body for body in frame.layout.free if not body.is_absent(numbers)]
+    return sorted(solving), {body.name: barrier.solver_of(body.index) for body in present}
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:

@@ -23,8 +23,10 @@ from typing import Annotated
 from msgspec import Struct
 from pydantic import Field
 
+from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase
+from foosim.common.units import Quantity
 from foosim.world.forms.forms import ENTITY, ROBOTS
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import *

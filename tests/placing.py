@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from foosim.world.edits import Add
 from foosim.world.forms.forms import NO_ENTITY, References
-from foosim.world.layout import Entity
+from foosim.world.layout import Entity, Layout
 
 
 def place_ball(
@@ -23,3 +24,15 @@ def place_ball(
     start = entity.offsets["linear_velocity"]
     numbers[start : start + 3] = velocity
     numbers[entity.offsets["contacts"] + 2] = -1.0
+
+
+def added_ball(
+    layout: Layout,
+    name: str,
+    position: tuple[float, float, float],
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Add:
+    """Return the edit that adds a spare ball of a layout at `position` (m) with `velocity` (m/s)."""
+    entity, numbers = layout[name], [0.0] * layout.size
+    place_ball(numbers, entity, position, velocity)
+    return Add(name, numbers[entity.start : entity.stop])

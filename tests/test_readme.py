@@ -103,8 +103,8 @@ def command_of(words: list[str]) -> tuple[Any, list[str]]:
 
 def add_a_ball(system: System) -> None:
     """What a reader reads may have had something added to it, for a while."""
-    system.at_tick(1000, lambda: system.request("add", position=[0.0, 0.3, 0.05], velocity=[0.0, 0.0, 0.0]))
-    system.at_tick(1200, lambda: system.request("remove", name="ball2"))
+    system.at_tick(1000, lambda: system.request("add", name="ball", at="0,0.3,0.05"))
+    system.at_tick(1200, lambda: system.request("remove", name="ball-2"))
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +138,8 @@ def test_the_readmes_player_plays(house: Path) -> None:
     commands: list[Command] = [codec_of("rod_position", "actuator").decode(payload) for payload in sent.payload]
     assert {command.spin for command in commands} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
-    assert len(capture.frame_blocks) == 3, "something was added, and removed again"
+    absent = capture.frames.column("ball-2", "absent")
+    assert (absent[0], absent.min(), absent[-1]) == (1.0, 0.0, 1.0), "something was added, and removed again"
 
 
 @pytest.mark.parametrize(

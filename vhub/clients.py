@@ -123,7 +123,8 @@ class Clients:
             return
         for flight in flights:
             flight.released_wall_ns = now_ns
-        go = Go(member.downlink, tick, member.sequence, received(flights))
+        absent = self._state.existence.absent.get(name, [])
+        go = Go(member.downlink, tick, member.sequence, received(flights), member.since, absent)
         self._sessions.send_go(session, go)
         session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
         allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")

@@ -19,6 +19,7 @@ from foosim.common.finding import Location
 from foosim.world.forms import registry
 from foosim.world.forms.forms import (
     ABSENT,
+    INACTIVE,
     LINEAR_VELOCITY,
     POSE,
     ROBOTS,
@@ -118,7 +119,8 @@ class Declared:
     """What a layout has of the deployment.
 
     `carried` is what entities carry, by name; `memory` what the rules of the world remember of each entity of a model;
-    `spares` the entities that are absent at the start, `lasting` those that never leave; `fields` those of the state of
+    `spares` the entities that are absent at the start, `lasting` those that never leave; `switched` the robots with
+    components, which can be switched off; `fields` those of the state of
     entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose settings ask for a
     variant of their model; `demanded` the fields on demand that entities have, by name.
     """
@@ -127,6 +129,7 @@ class Declared:
     memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     spares: frozenset[str] = frozenset()
     lasting: frozenset[str] = frozenset()
+    switched: frozenset[str] = frozenset()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
     demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
@@ -163,6 +166,8 @@ class Layout:
             counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
             if "position" in fields and kind.is_solved and name not in declared.lasting:
                 counts[ABSENT] = 1
+            if name in declared.switched:
+                counts[INACTIVE] = 1
             if STILL_TICKS in fields:
                 counts[STILL_POSE] = sum([fields.get(field, 0) for field in POSE])
             for slot, count in counts.items():
@@ -282,7 +287,14 @@ def build_layout(spec: WorldSpec) -> Layout:
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
-    return Layout(models, Declared(carried, memory, frozenset(spares), frozenset(lasting), fields, variants, demanded))
+    switched = frozenset([name for name, robot in spec.robots.items() if switches_of(robot)])
+    coming = frozenset(spares), frozenset(lasting), switched
+    return Layout(models, Declared(carried, memory, *coming, fields, variants, demanded))
+
+
+def switches_of(robot: RobotSettings) -> dict[str, int]:
+    """Return the bit of each sensor and actuator of a robot in its slot `inactive`, by name."""
+    return {name: 1 << place for place, name in enumerate(sorted({*robot.sensors, *robot.actuators}))}
 
 
 def spares_of(spec: WorldSpec, kit: Kit) -> Mapping[str, str]:

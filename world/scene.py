@@ -135,7 +135,8 @@ class Body:
     that move have a number each in `joint_positions`, in the order of their links.
 
     Radio waves leave from `antenna`, a place in the frame of the link `antenna_link` (an index). `speed_limit` (m/s) is
-    how fast any part of a free body can be, a promise of its model.
+    how fast any part of a free body can be, a promise of its model. What is not `is_solid` is only drawn: rays pass it,
+    and nothing stops at it.
     """
 
     name: str
@@ -146,6 +147,7 @@ class Body:
     speed_limit: float = 0.0
     orientation: Quaternion = UPRIGHT
     antenna_link: int = -1
+    is_solid: bool = True
 
     @property
     def is_free(self) -> bool:

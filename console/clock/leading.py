@@ -6,6 +6,7 @@ All that it tells is passed on; its moments are the clock, and say where its ent
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import isnan
 from typing import Any
 
 from foosim.console.clock.deck import Clock
@@ -96,7 +97,8 @@ class Leader:
         if moment is None:
             return None
         rows = moment.poses.tolist()
-        poses = {name: (tuple(rows[row][:3]), tuple(rows[row][3:])) for name, row in self._places.items()}
+        places = ((name, rows[row]) for name, row in self._places.items())
+        poses = {name: (tuple(pose[:3]), tuple(pose[3:])) for name, pose in places if not isnan(pose[0])}
         return self.clock.time_ns(), poses
 
 

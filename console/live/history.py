@@ -16,8 +16,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from foosim.console.shown.curves import link_figure
 from foosim.console.shown.source import FIGURES, Curve, Link, Reading, Wanted
-from foosim.world.frame import Frame
-from foosim.world.layout import Layout
 
 WINDOW_NS: Final = 300_000_000_000
 """How far back is kept at least, simulated time, where there is room."""
@@ -81,16 +79,17 @@ class Rows:
         """What the numbers of the newest row are, None without one."""
         return self._rows[-1][1] if self._rows else None
 
-    def reader(self, place_in: Callable[[Any], int | None]) -> Callable[[], Points]:
+    def reader(self, place_in: Callable[[Any], int | None], *, has_gaps: bool = False) -> Callable[[], Points]:
         """Return what makes the points of one of the numbers of the rows that there are, in any thread.
 
-        `place_in` gives its place from what the numbers of a row are. Not a number is the value of a hole.
+        `place_in` gives its place from what the numbers of a row are. Not a number is the value of a hole; in a row it
+        is a hole too where the rows have gaps, else no point.
         """
         rows = list(self._rows)
-        return lambda: [*_points(rows, place_in)]
+        return lambda: [*_points(rows, place_in, has_gaps)]
 
 
-def _points(rows: list[Row], place_in: Callable[[Any], int | None]) -> Iterator[tuple[float, float]]:
+def _points(rows: list[Row], place_in: Callable[[Any], int | None], has_gaps: bool) -> Iterator[tuple[float, float]]:
     what: Any = None
     place: int | None = None
     for tick, known, numbers in rows:
@@ -101,7 +100,7 @@ def _points(rows: list[Row], place_in: Callable[[Any], int | None]) -> Iterator[
             what, place = known, place_in(known)
         if place is not None and place < len(numbers):
             value = float(numbers[place])
-            if not isnan(value):  # as of a link that had no packet
+            if has_gaps or not isnan(value):  # as of a link that had no packet
                 yield tick, value
 
 
@@ -129,10 +128,10 @@ class History:
             if reading not in wanted.readings:
                 rows.interrupt()
 
-    def keep_frame(self, frame: Frame) -> None:
-        """Keep the numbers of a frame."""
-        if self._frames.is_due(frame.tick, self._tick_ns, frame.layout.size):
-            self._frames.keep(frame.tick, frame.layout, frame.values)
+    def keep_frame(self, tick: int, values: NDArray[np.float64]) -> None:
+        """Keep the numbers of a frame that are shown."""
+        if self._frames.is_due(tick, self._tick_ns, len(values)):
+            self._frames.keep(tick, "frame", values)
 
     def keep(self, message: Mapping[str, Any]) -> None:
         """Record a message of `status`, `links` or `readings`."""
@@ -174,10 +173,10 @@ class History:
             if rows.is_due(tick, self._tick_ns, len(numbers)):
                 rows.keep(tick, reading, numbers)
 
-    def reader(self, curve: Curve, layout: Layout) -> Callable[[], Points]:
-        """Return what makes the points of a curve, of which a number of the frame is one of this layout."""
+    def reader(self, curve: Curve) -> Callable[[], Points]:
+        """Return what makes the points of a curve."""
         if curve.field is not None:
-            return self._frames.reader(_place_in_layout(layout, curve.field))
+            return self._frames.reader(lambda _: curve.field, has_gaps=True)
         if curve.status:
             return self._statuses.reader(lambda places: places.get(curve.status))
         if curve.link is not None:
@@ -199,17 +198,3 @@ def _numbers(content: Mapping[str, Any], stem: str) -> Iterator[tuple[str, float
 def _places(before: Mapping[Any, int], names: Mapping[Any, Any]) -> Mapping[Any, int]:
     """Return the places of names; the mapping of before where it has the same ones in the same order."""
     return before if [*before] == [*names] else {name: place for place, name in enumerate(names)}
-
-
-def _place_in_layout(layout: Layout, field: int) -> Callable[[Layout], int | None]:
-    """Return what gives the place that a number of a layout has in another one; None where that has not got it."""
-    entity = next((entity for entity in layout.entities if entity.start <= field < entity.stop), None)
-    if entity is None:
-        return lambda other: None
-    name, start = max(((name, at) for name, at in entity.offsets.items() if at <= field), key=lambda found: found[1])
-
-    def place(other: Layout) -> int | None:
-        known = other[entity.name].offsets.get(name) if entity.name in other else None
-        return None if known is None else known + field - start
-
-    return place

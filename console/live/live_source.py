@@ -19,11 +19,12 @@ from typing import Any, Final, TypeVar
 
 from foosim.client.control import Control, NoAnswer, RequestRefused
 from foosim.common.errors import BadValue, Refused
-from foosim.console.live.following import Following, World
+from foosim.console.live.following import Following, World, first_frame
 from foosim.console.live.presence import HERE, away
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.runtime.transport.inbox import Inbox, Item
+from foosim.world.frame import Frame
 
 VERBS: Final = (
     *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "set", "network"),
@@ -71,7 +72,7 @@ class LiveSource:
         self._overlay_s = 0.0
         self._wanted = Wanted()
         self._changed = asyncio.Event()
-        """Set when another subscription is needed, or frames do not fit the layout."""
+        """Set when another subscription is needed."""
         self._closing = threading.Event()
         self._viewing = ThreadPoolExecutor(1, "console-view")
         self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
@@ -189,29 +190,27 @@ class LiveSource:
     async def _describe(self, control: Control, feed: Feed) -> None:
         """Request the description of the world, and publish its scene if that is new."""
 
-        def ask() -> tuple[dict[str, Any], World]:
+        def ask() -> tuple[dict[str, Any], World, Frame | None]:
             what = control.describe(QUESTION_S, self._closing.is_set)
             files = partial(control.files, timeout_s=QUESTION_S, give_up=self._closing.is_set)
-            return what, self._following.world_of(what, files)
+            world = self._following.world_of(what, files)
+            return what, world, first_frame(world.drawing, what)
 
-        what, world = await self._in_thread(ask)
+        what, world, first = await self._in_thread(ask)
         if self._following.turn_to(what, world):
             self.about = self._following.about
             feed.describe(self.about, self._following.content())
-        moment = self._following.first_moment()
+        moment = self._following.first_moment(first)
         if moment is not None:
             feed.show(moment)
 
     async def _poll(self, control: Control, feed: Feed) -> None:
-        """Request statuses, renew the lease, and describe again if frames do not fit, while a browser watches."""
+        """Request statuses, and renew the lease while a browser watches."""
         following, lease = self._following, Wanted()
-        renewed_s = described_s = 0.0
+        renewed_s = 0.0
         while True:
             self._changed.clear()
             wanted = self._wanted
-            if following.is_stale and time.monotonic() >= described_s + POLL_S:
-                await self._describe(control, feed)
-                described_s = time.monotonic()
             now_s = time.monotonic()
             if wanted.readers and (wanted != lease or now_s >= renewed_s + RENEW_S):
                 await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
@@ -244,12 +243,10 @@ class LiveSource:
         wanted = self._wanted
         if not wanted.readers:
             return  # a lease is not over at once
-        found = self._following.read(payload)
-        if found is None:
-            self._changed.set()
+        moment = self._following.show(payload)
+        if moment is None:
             return
-        world, frame = found
-        feed.show(self._following.show(world, frame))
+        feed.show(moment)
         now_s = time.monotonic()
         if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
             self._overlay_s = now_s

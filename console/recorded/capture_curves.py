@@ -27,14 +27,14 @@ SPREAD_NS: Final = 1_000_000_000
 Points = list[tuple[float, float]]
 
 
-def curve_points(history: CaptureHistory, curve: Curve, tick: int, world: int) -> Points:
+def curve_points(history: CaptureHistory, curve: Curve, tick: int) -> Points:
     """Return the points of a curve, of the whole run or, of a reading, of the last time before a tick.
 
-    `world` is that whose scene the page has: numbers of frames of another layout are no points. Raises CaptureError.
+    Raises CaptureError.
     """
     recording = history.recording
     if curve.field is not None:
-        return _field(history, curve.field, world)
+        return _field(history, curve.field)
     if curve.reading is not None:
         at_ns = tick * recording.tick_ns
         found = reading_points(history, *curve.reading, at_ns - READING_NS, at_ns)
@@ -48,14 +48,14 @@ def curve_points(history: CaptureHistory, curve: Curve, tick: int, world: int) -
     return [(at, value) for at, value in values if value is not None]
 
 
-def _field(history: CaptureHistory, field: int, world: int) -> Points:
+def _field(history: CaptureHistory, field: int) -> Points:
     recording = history.recording
     numbers = range(len(recording.index.places[FRAME]))
     points: Points = []
     for number in numbers[:: max(1, len(numbers) // POINTS)]:
         frame = recording.frame(number)
-        if frame is not None and recording.world_at(frame.tick) == world and field < frame.layout.size:
-            points.append((frame.tick, float(frame.values[field])))
+        if frame is not None and field < frame.layout.size:
+            points.append((frame.tick, float(recording.shown(frame)[field])))
     return points
 
 

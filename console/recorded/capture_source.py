@@ -82,11 +82,8 @@ class FileSource:
         self._exact = ThreadPoolExecutor(1, "computed")
         self._history: CaptureHistory | None = None
         self._look: Look | None = None
-        self._world = -1
         self._compare = compare
-        self._ends = Links(self.recording.deployment)
-        self._placed = -1
-        """Number of the world whose scene they are in."""
+        self._ends = Links(self.recording.deployment, self.recording.drawing.entities)
         self._overlay_ns = 0
         self._told_ns = 0
         """Time up to which readings were published."""
@@ -129,7 +126,8 @@ class FileSource:
         return min(max((self.clock.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
 
     async def _show(self, feed: Feed) -> None:
-        """Publish the moment of the newest request, at most at the browsers' rate."""
+        """Publish the scene, then the moment of the newest request, at most at the browsers' rate."""
+        self._describe(feed)
         shown: tuple[int, int, bool] | None = None
         clock, jumps, due_ns = self.clock, self.clock.jumps, 0
         while True:
@@ -166,22 +164,17 @@ class FileSource:
         return min(max(soonest_ns, next_ns), now_ns + 10**9)
 
     def _tell_moment(self, feed: Feed, look: Look, *, jump: bool) -> None:
-        if look.world != self._world:
-            self._world = look.world
-            self._describe(feed)
         self._look = look
         paused = self.clock.paused
         feed.show(Moment(look.tick, look.poses, look.values, jump, paused))
         now_ns = self.clock.clock_ns()
         if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
             self._overlay_ns = now_ns + OVERLAY_NS
-            drawing = self.recording.worlds[look.world].drawing
-            for message in drawing.overlays(look.frame, self._wanted.overlays):
+            for message in self.recording.drawing.overlays(look.frame, self._wanted.overlays):
                 feed.tell(message)
 
     def _describe(self, feed: Feed) -> None:
-        if self._world >= 0:
-            feed.describe(self.about, self.recording.worlds[self._world].drawing.content())
+        feed.describe(self.about, self.recording.drawing.content())
 
     async def _show_exactly(self, feed: Feed, look: Look) -> None:
         """Publish the recomputed frame of a tick without one, or the reason why it cannot be computed."""
@@ -254,8 +247,6 @@ class FileSource:
                 self._deck.playhead.grow(first, last, self._deck.clock_ns())
                 self._deck.changed()
             self._describe(feed)
-            if self._look is not None and self._world >= 0:
-                self._tell_moment(feed, self._look, jump=False)
 
     async def _tell_status(self, feed: Feed) -> None:
         before: Mapping[str, Any] | None = None
@@ -296,10 +287,6 @@ class FileSource:
         ]
         frame = history.recording.frame_up_to(tick)
         if frame is not None:
-            world = history.recording.world_at(frame.tick)
-            if world != self._placed:
-                self._ends.turn_to(history.recording.worlds[world].drawing.scene)
-                self._placed = world
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
         told: list[dict[str, Any]] = [
@@ -338,7 +325,7 @@ class FileSource:
         if history is None:
             return name, unit, []
         try:
-            points = await self._in(self._back, curve_points, history, curve, self.tick(), max(self._world, 0))
+            points = await self._in(self._back, curve_points, history, curve, self.tick())
         except CaptureError:  # the pass over the whole capture reports it
             points = []
         return name, unit, points

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Mapping
+from math import nan
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,8 +31,8 @@ MARKER_M: Final = 0.03
 MARKER_COLOUR: Final = (0.9, 0.6, 0.1, 1.0)
 UNSEEN_HZ: Final = 2.0
 BYTES_MAX: Final = 4 * 1024**3
-NOWHERE: Final = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
-"""The position of a link without a pose at a time: out of sight."""
+NOWHERE: Final = (nan,) * 7
+"""The pose of a link that has none at a time."""
 
 
 def load_tracks(path: Path) -> dict[str, Track]:
@@ -144,11 +145,11 @@ def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[s
     for name in tracks:
         shapes = known[name]["shapes"] if name in known else [{**marker, "colour": MARKER_COLOUR, "name": ""}]
         links.append({"name": name, "body": name, "shapes": shapes})
+    still = {"robot": False, "removable": False, "pushable": False, "settable": {}}
     bodies = [
-        {"name": name, "model": models.get(name, ""), "links": [place], "removable": False, "pushable": False}
-        for place, name in enumerate(tracks)
+        {"name": name, "model": models.get(name, ""), "links": [place], **still} for place, name in enumerate(tracks)
     ]
-    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "addable": [], "marks": {}}
+    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "marks": {}}
     return {**empty, "meshes": content.get("meshes", {}), "links": links, "bodies": bodies, "bounds": _bounds(tracks)}
 
 

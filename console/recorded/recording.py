@@ -9,7 +9,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -22,41 +21,26 @@ from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.reader import DECODERS, CapturedTick, captured_tick, deployment_of, layout_of, read_about, row_of
+from foosim.capture.reader import (
+    DECODERS,
+    CapturedTick,
+    captured_tick,
+    check_frame,
+    check_layout,
+    deployment_of,
+    read_about,
+    row_of,
+)
 from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.shown.drawing import Drawing
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout
 
 TOPICS: Final = (EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, POSES)
 Kind = Literal["frame", "poses", "computed", "held"]
 """What is seen at a tick: its captured frame, its captured poses, its frame computed again from the captured inputs and
 equal in its digest, or what was captured last before it."""
-
-
-@dataclass(frozen=True)
-class World:
-    """A layout, as it is drawn, in force from a tick on."""
-
-    tick: int
-    drawing: Drawing
-
-    @property
-    def layout(self) -> Layout:
-        return self.drawing.layout
-
-    @cached_property
-    def links(self) -> dict[str, int]:
-        """The place of each link in the order of the scene, by name."""
-        names = [link.name for body in self.drawing.scene.bodies.values() for link in body.links]
-        return {name: place for place, name in enumerate(names)}
-
-    @cached_property
-    def entities(self) -> dict[str, int]:
-        """The place of each entity's last link, by the entity's name."""
-        return {name: self.links[body.links[-1].name] for name, body in self.drawing.scene.bodies.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +50,10 @@ class Look:
     asked: int
     tick: int
     kind: Kind
-    world: int
-    """Number of the present world."""
     poses: NDArray[np.float32]
     frame: Frame | None
     values: NDArray[np.float64]
-    """The numbers of that frame; not a number where the layout has no captured frame yet."""
+    """The numbers of that frame that are shown; not a number where there is none yet."""
 
 
 class Recording:
@@ -83,7 +65,9 @@ class Recording:
         self.deployment: Final[Deployment] = deployment_of(self.about)
         self.tick_ns: Final = self.deployment.tick_ns
         self.index: Final = CaptureIndex(path, (*TOPICS, *topics))
-        self.worlds: list[World] = []
+        self.drawing: Final = Drawing(self.deployment)
+        self._is_checked = False
+        """Whether the capture has named its layout, which is that of the deployment."""
         self.epochs: list[EpochRow] = []
         self.recoveries: list[RecoveryRow] = []
         self._generation = self.index.generation
@@ -105,16 +89,16 @@ class Recording:
             return False
         if self.index.generation != self._generation:
             self._generation = self.index.generation
-            self.worlds, self.epochs, self.recoveries = [], [], []
+            self._is_checked = False
+            self.epochs, self.recoveries = [], []
         self._take()
         return True
 
     def _take(self) -> None:
-        """Read the rows that are few: layouts, epochs, recoveries."""
-        for number in range(len(self.worlds), len(self.index.places[LAYOUT])):
-            row = self.row(LAYOUT, number)
-            drawing = Drawing(self.deployment, layout_of(self.path, self.deployment, row))
-            self.worlds.append(World(row.tick, drawing))
+        """Read the rows that are few: layout, epochs, recoveries."""
+        if not self._is_checked and len(self.index.places[LAYOUT]):
+            check_layout(self.path, self.drawing.layout, self.row(LAYOUT, 0))
+            self._is_checked = True
         for topic, rows in ((EPOCHS, self.epochs), (RECOVERIES, self.recoveries)):
             rows += [self.row(topic, number) for number in range(len(rows), len(self.index.places[topic]))]
 
@@ -126,10 +110,6 @@ class Recording:
         """Return what a decoder makes of a message. Raises CaptureError."""
         return row_of(decoder, message, f"{self.path}: ")
 
-    def world_at(self, tick: int) -> int:
-        """Return the number of the world at a tick; the first one before its beginning."""
-        return max(0, bisect_right(self.worlds, tick, key=lambda world: world.tick) - 1)
-
     # --- the world at a tick -----------------------------------------------------------------------------------------
 
     def look(self, tick: int) -> Look | None:
@@ -140,33 +120,28 @@ class Recording:
         posed = self.index.places[POSES].log_ns[number] // self.tick_ns if number >= 0 else -1
         if frame is not None and frame.tick >= posed:
             return self.seen(tick, frame, "frame" if frame.tick == tick else "held")
-        if number < 0 or not self.worlds:
+        if number < 0:
             return None
-        world = self.world_at(posed)
-        poses = self._poses(self.worlds[world], number)
-        layout = self.worlds[world].layout
-        kind: Kind = "poses" if posed == tick else "held"
-        if frame is None or frame.layout is not layout:
-            return Look(tick, posed, kind, world, poses, None, np.full(layout.size, np.nan))
-        return Look(tick, posed, kind, world, poses, frame, frame.values)
+        values = np.full(self.drawing.layout.size, np.nan) if frame is None else self.shown(frame)
+        return Look(tick, posed, "poses" if posed == tick else "held", self._poses(number), frame, values)
 
     def seen(self, tick: int, frame: Frame, kind: Kind) -> Look:
         """Return what is seen of a frame."""
-        world = self.world_at(frame.tick)
-        poses = self.worlds[world].drawing.poser.poses(frame.values)
-        return Look(tick, frame.tick, kind, world, poses, frame, frame.values)
+        return Look(tick, frame.tick, kind, self.drawing.poser.poses(frame.values), frame, self.shown(frame))
+
+    def shown(self, frame: Frame) -> NDArray[np.float64]:
+        """Return the numbers of a frame that are shown."""
+        return self.drawing.poser.numbers(frame.values)
 
     def frame(self, number: int) -> Frame | None:
         """Return a captured frame by its number; None for a negative one. Raises CaptureError."""
         if number < 0:
             return None
         row: FrameRow = self.row(FRAME, number)
-        if not self.worlds:
+        if not self._is_checked:
             raise CaptureError(f"{self.path}: a frame without a layout before it")
-        layout = self.worlds[self.world_at(row.tick)].layout
-        if len(row.values) != 8 * layout.size or any(box.index >= len(layout.entities) for box in row.outboxes):
-            raise CaptureError(f"{self.path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
-        return frame_of(layout, row)
+        check_frame(self.path, self.drawing.layout, row)
+        return frame_of(self.drawing.layout, row)
 
     def frame_up_to(self, tick: int) -> Frame | None:
         """Return the newest captured frame at or before a tick. Raises CaptureError."""
@@ -182,15 +157,10 @@ class Recording:
                 found.append(places.log_ns[number] // self.tick_ns)
         return (min(found) if later else max(found)) if found else None
 
-    def _poses(self, world: World, number: int) -> NDArray[np.float32]:
-        """Return captured poses in the order of a world's links; a link of which there is none stays at the origin."""
-        poses = np.zeros((len(world.links), 7), np.float32)
-        poses[:, 6] = 1.0
-        for pose in read_poses(self.index.read(POSES, number).data):
-            place = world.links.get(pose.link)
-            if place is not None:
-                poses[place] = (*pose.position, *pose.orientation)
-        return poses
+    def _poses(self, number: int) -> NDArray[np.float32]:
+        """Return captured poses in the order of the scene's links."""
+        poses = read_poses(self.index.read(POSES, number).data)
+        return self.drawing.known({pose.link: (pose.position, pose.orientation) for pose in poses})
 
     def inputs(self, after: int, until: int) -> Iterator[CapturedTick]:
         """Yield what led to the ticks behind one, up to another. Raises CaptureError where one is missing."""

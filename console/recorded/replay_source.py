@@ -1,7 +1,7 @@
 """A replay on the replay plane (`foosim capture play`) as a source of the page.
 
-Its connection belongs to a thread, which passes messages on to the event loop. Poses have names of links, so the scene
-is that of the captured deployment with the entities that these names add.
+Its connection belongs to a thread, which passes messages on to the event loop. The scene is that of the captured
+deployment; poses have names of links.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.deployment.schema import Deployment
 from foosim.protocol.replay_messages import PlayedLine, PlayedPoses, PlayedRow, ReplayClock
-from foosim.world.layout import build_layout
 
 ARGUMENTS: Final[Known] = {
     "play": {},
@@ -57,8 +56,8 @@ class PlayedSource:
         deployment = self._replay.deployment
         self.about = About("replay", str(status["capture"]), deployment.world, self.tick_ns, tuple(ARGUMENTS), span)
         self._status: dict[str, Any] = {key: value for key, value in status.items() if key != "deployment"}
-        self._drawing: Drawing | None = None
-        self._places: dict[str, int] = {}
+        self._drawing: Final = Drawing(deployment)
+        self._numbers: Final = np.full(self._drawing.layout.size, np.nan)
         self._jumps = 0
         self._asked: queue.SimpleQueue[Ask] = queue.SimpleQueue()
         self._ended = threading.Event()
@@ -76,6 +75,7 @@ class PlayedSource:
         """A replay sends what it sends, however many look."""
 
     async def run(self, feed: Feed) -> None:
+        feed.describe(self.about, self._drawing.content())
         loop = asyncio.get_running_loop()
         heard = loop.create_future()
 
@@ -134,28 +134,13 @@ class PlayedSource:
         feed.tell({"type": "marks", "marks": [{"tick": time_ns // self.tick_ns, "kind": kind, "text": text}]})
 
     def _show(self, feed: Feed, heard: PlayedPoses) -> None:
-        named = {self._replay.captured_link(pose.link): pose for pose in heard.poses}
-        if self._drawing is None or named.keys() != self._places.keys():
-            self._turn_to(feed, named)
-        poses = np.zeros((len(self._places), 7), np.float32)
-        for link, place in self._places.items():
-            pose = named.get(link)
-            poses[place] = (0, 0, 0, 0, 0, 0, 1) if pose is None else (*pose.position, *pose.orientation)
+        link = self._replay.captured_link
+        poses = self._drawing.known({link(pose.link): (pose.position, pose.orientation) for pose in heard.poses})
         clock = self._replay.clock
         jumps = self._jumps if clock is None else clock.jumps
         paused = clock is not None and clock.state == "paused"
-        assert self._drawing is not None
-        values = np.full(self._drawing.layout.size, np.nan)
-        feed.show(Moment(heard.time_ns / self.tick_ns, poses, values, jumps != self._jumps, paused))
+        feed.show(Moment(heard.time_ns / self.tick_ns, poses, self._numbers, jumps != self._jumps, paused))
         self._jumps = jumps
-
-    def _turn_to(self, feed: Feed, links: Mapping[str, Any]) -> None:
-        """Take the scene of these links."""
-        deployment = self._replay.deployment
-        self._drawing = Drawing(deployment, build_layout(deployment))
-        names = [link.name for body in self._drawing.scene.bodies.values() for link in body.links]
-        self._places = {name: place for place, name in enumerate(names)}
-        feed.describe(self.about, self._drawing.content())
 
     def _tell_status(self, feed: Feed, clock: ReplayClock) -> None:
         tick = clock.time_ns // self.tick_ns

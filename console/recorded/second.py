@@ -56,21 +56,21 @@ def open_follower(
     `deployment` is the first source's. Raises CaptureError, BadPoses, and BadValue for a file that has nothing of the
     first source.
     """
-    scene = build_scene(deployment, build_layout(deployment))
-    ours = {*scene.bodies}
+    bodies = build_scene(deployment, build_layout(deployment)).bodies
+    ours = {*bodies}
     second: FileSource | PosesSource
     if is_table(path):
         second = table = PosesSource(path, leader.clock, offset_ns, deployment, leader)
         theirs = {*table.tracks}
-        ours |= {link.name for body in scene.bodies.values() for link in body.links}
+        ours |= {link.name for body in bodies.values() for link in body.links}
     else:
         recompute = None if recomputing is None else recomputing(path)
         second = capture = FileSource(path, leader.clock, offset_ns, recompute, leader)
-        theirs = {name for world in capture.recording.worlds for name in world.entities}
+        theirs = {*capture.recording.drawing.entities}
     both = sorted(ours & theirs)
     if not both:
         raise BadValue(
-            f"--second has nothing that the {deployment.world} has, {_some(scene.bodies)}; it has {_some(theirs)}",
+            f"--second has nothing that the {deployment.world} has, {_some(bodies)}; it has {_some(theirs)}",
             str(path),
         )
     return second, both

@@ -6,6 +6,7 @@ interpolated, but not over a jump.
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Final
 
 from foosim.console.recorded.recording import Look, Recording
@@ -48,7 +49,11 @@ class Whereabouts:
         }
 
     def _poses(self, look: Look) -> dict[str, Pose]:
-        world = self._recording.worlds[look.world]
+        drawing = self._recording.drawing
         rows = look.poses.tolist()
-        places = {**world.links, **world.entities} if self._links else world.entities
-        return {name: (tuple(rows[place][:3]), tuple(rows[place][3:])) for name, place in places.items()}
+        places = {**drawing.links, **drawing.entities} if self._links else drawing.entities
+        return {
+            name: (tuple(rows[place][:3]), tuple(rows[place][3:]))
+            for name, place in places.items()
+            if not isnan(rows[place][0])
+        }

@@ -24,7 +24,7 @@ from foosim.vhub.line_of_sight.placement import World
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Layout
+from foosim.world.layout import Entity, Layout
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,
@@ -72,15 +72,16 @@ class Outline:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a body was, from the first captured frame to the last, and what it looks like there."""
+    """Where a body was, from the first captured frame that has it to the last, and what it looks like there."""
 
     name: str
     pieces: tuple[tuple[Place, ...], ...]
-    """The ways between which it was put elsewhere, or was not there."""
+    """The ways between which it was put elsewhere, or was absent."""
     at: Place
     outlines: tuple[Outline, ...]
+    """None of what is gone."""
     is_gone: bool
-    """Whether it was removed before the end."""
+    """Whether it is absent at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,8 @@ class _Way:
 
     def cut(self) -> None:
         """What comes next is not joined to what was."""
+        if not self._seen:
+            return
         if self.points[-1] != (self._piece, self.last):
             self.points.append((self._piece, self.last))
         self._piece += 1
@@ -165,16 +168,16 @@ class MapMaker:
         self._deployment, self._tick_ns = deployment, tick_ns
         self._world = World(deployment, deployment.network)
         self._endpoints = deployment.endpoints()
-        self._layout: Layout | None = None
         self._frame: Frame | None = None
         self._bodies: Mapping[str, Body] = {}
         self._bounds: tuple[Place, Place] = ((-1.0, -1.0), (1.0, 1.0))
         self._placed: list[str] = []
         self._outlines: tuple[Outline, ...] = ()
         self._frames: deque[tuple[int, dict[str, Place]]] = deque(maxlen=FRAMES_KEPT)
+        self._points = 0
+        """Places that are kept of each body."""
         self._ways: dict[str, _Way] = {}
-        self._looks: dict[str, tuple[Outline, ...]] = {}
-        """Of bodies that are gone."""
+        """Of bodies that were there."""
         self._losses: list[Loss] = []
         self._lost = self._placeless = 0
         self._counts: Counter[tuple[str, str, str]] = Counter()
@@ -182,32 +185,30 @@ class MapMaker:
 
     def take_frame(self, frame: Frame) -> None:
         """Take the next captured frame."""
-        if frame.layout is not self._layout:
-            self._take_layout(frame.layout)
+        if self._frame is None:
+            self._begin(frame.layout)
         self._frame = frame
         self._world.turn_to(frame)
         at_ns = frame.tick * self._tick_ns
-        places = {name: self._world.antenna(name, ORIGIN)[:2] for name in self._placed}
-        self._frames.append((at_ns, places))
-        for body, way in zip(self._bodies, map(self._ways.__getitem__, self._bodies), strict=True):
+        absent = {entity.name for entity in frame.layout.entities if entity.is_absent(frame.numbers)}
+        placed = [name for name in self._placed if self._world.body(name) not in absent]
+        self._frames.append((at_ns, {name: self._world.antenna(name, ORIGIN)[:2] for name in placed}))
+        for body in absent & self._ways.keys():
+            self._ways[body].cut()
+        for body in self._bodies.keys() - absent:
+            if body not in self._ways:
+                self._ways[body] = _Way(self._points)
             x, y, _ = self._world.antenna(body, ORIGIN)
-            way.add(at_ns, (x, y), partial(self._world.velocity, body))
+            self._ways[body].add(at_ns, (x, y), partial(self._world.velocity, body))
 
-    def _take_layout(self, layout: Layout) -> None:
+    def _begin(self, layout: Layout) -> None:
         scene = build_scene(self._deployment, layout)
-        if self._layout is None:
-            self._outlines = tuple(sorted(map(outline, scene.scenery), key=lambda found: found.top_m))
-            low, high = standing_bounds(scene)
-            self._bounds = low[:2], high[:2]
-        gone = [body for name, body in self._bodies.items() if name not in scene.bodies]
-        self._looks.update((body.name, self._look(body)) for body in gone)
-        for body in gone:
-            self._ways[body.name].cut()
-        self._layout, self._bodies = layout, scene.bodies
+        self._bodies = scene.bodies
+        self._outlines = tuple(sorted(map(outline, scene.scenery), key=lambda found: found.top_m))
+        low, high = standing_bounds(scene)
+        self._bounds = low[:2], high[:2]
         least, most = PATH_POINTS
-        points = max(least, min(most, ALL_POINTS // max(1, len(scene.bodies))))
-        for name in scene.bodies:
-            self._ways.setdefault(name, _Way(points))
+        self._points = max(least, min(most, ALL_POINTS // max(1, len(scene.bodies))))
         written = list(self._deployment.network.places)
         self._placed = [
             name
@@ -215,10 +216,9 @@ class MapMaker:
             if self._world.body(name) in self._bodies or any(selects([glob], name) for glob in written)
         ]
 
-    def _look(self, body: Body) -> tuple[Outline, ...]:
-        """Return a body's shapes as they were in the last frame."""
-        assert self._frame is not None
-        poses = forward_kinematics(body, self._frame.layout[body.name], self._frame.numbers)
+    def _look(self, body: Body, entity: Entity, numbers: Sequence[float]) -> tuple[Outline, ...]:
+        """Return a body's shapes as they are in a frame of these numbers."""
+        poses = forward_kinematics(body, entity, numbers)
         return tuple(
             outline(shape, position, orientation)
             for link, (_, position, orientation) in zip(body.links, poses, strict=True)
@@ -269,8 +269,10 @@ class MapMaker:
         )
 
     def _track(self, name: str, way: _Way) -> Track:
-        is_gone = name not in self._bodies
-        look = self._looks[name] if is_gone else self._look(self._bodies[name])
+        assert self._frame is not None, "no way is known before it"
+        entity, numbers = self._frame.layout[name], self._frame.numbers
+        is_gone = entity.is_absent(numbers)
+        look = () if is_gone else self._look(self._bodies[name], entity, numbers)
         within_m = FINE * dist(*self._bounds)
         return Track(name, tuple(simplified(piece, within_m) for piece in way.pieces()), way.last, look, is_gone)
 

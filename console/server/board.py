@@ -39,6 +39,8 @@ class Told:
 
     about: About
     generation: int = 0
+    described: Mapping[str, Any] = field(default_factory=dict)
+    """The scene as its source has it."""
     scene: bytes = b""
     links: int = 0
     numbers: int = 0
@@ -184,18 +186,21 @@ class Board:
 
     def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
         told = self._told[source]
+        changed, told.about = about != told.about, about
+        if changed:
+            for reader in self.readers.values():
+                reader.put_first("sources", self._welcome(reader, "sources"))
+        if scene == told.described:
+            return
         told.generation += 1
-        told.shown = None
+        told.described, told.shown = scene, None
         told.links = len(scene["links"])
         told.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
         told.scene = encode_json({"type": "scene", "source": source, "generation": told.generation, **scene})
         told.kept.pop("overlay", None)
-        changed, told.about = about != told.about, about
         for reader in self.readers.values():
-            if changed:
-                reader.put_first("sources", self._welcome(reader, "sources"))
             reader.put_first(("scene", source), told.scene)
-            reader.follows[source].fields = ()  # they were places in another layout
+            reader.follows[source].fields = ()  # they were places in another world
 
     def show(self, source: int, moment: Moment) -> None:
         told = self._told[source]

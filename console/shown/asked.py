@@ -14,17 +14,15 @@ def edit_text(edit: EditRow) -> str:
     """Return a description of a requested edit; empty for other edits."""
     if edit.kind == "push":
         return f"push {edit.name} by {_vector(edit.impulse)} N s"
-    if edit.kind == "add":
-        return f"add {edit.name}"
     if edit.kind == "set":
         return _set_text(edit)
-    return f"remove {edit.name}" if edit.kind == "remove" else ""
+    return {"add": f"{edit.name} was added", "remove": f"{edit.name} was removed"}.get(edit.kind, "")
 
 
 def _set_text(edit: EditRow) -> str:
     """Return a description of a field that is set; empty for what comes with a place."""
     if edit.field == DOWN:
-        return f"{edit.name} is {'out of' if edit.numbers == [1.0] else 'in'} service"
+        return f"{edit.name} is {'in' if edit.numbers == [0.0] else 'out of'} service"
     if edit.field == "position":
         return f"put {edit.name} at {_vector(edit.numbers)} m"
     return "" if edit.field in WITH_A_PLACE else f"set {edit.name} {edit.field} to {_vector(edit.numbers)}"

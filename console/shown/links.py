@@ -21,7 +21,7 @@ from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.links.fabric import name_of
 from foosim.world.frame import Frame
-from foosim.world.scene import ORIGIN, Scene, Vector
+from foosim.world.scene import ORIGIN, Vector
 
 WINDOW_S: Final = 5.0
 SIGHTS_MAX: Final = 48
@@ -113,35 +113,25 @@ def _between(before: Count, after: Count) -> Count:
 class Links:
     """The links of one deployment."""
 
-    def __init__(self, deployment: Deployment) -> None:
+    def __init__(self, deployment: Deployment, entities: Mapping[str, int]) -> None:
+        """`entities`: the last link of each body in the scene (`Drawing.entities`)."""
         self._deployment = deployment
         self._world = World(deployment, deployment.network)
         self._profiles = Profiles(deployment.network, deployment.carriers())
         self._windows = Windows()
         self._on_air: dict[Key, bool] = {}
-        self._ends: dict[str, int | None] = {}
+        self._ends = {end: entities.get(self._world.body(end)) for end in deployment.endpoints()}
         """By endpoint: the last link of its body in the scene."""
+        self._absent: frozenset[str] = frozenset()
         self._walls: dict[Pair, list[Vector]] = {}
         self._stale: deque[Pair] = deque()
         """Pairs whose line of sight was worked out longest ago come first."""
         self._placed = False
 
-    def turn_to(self, scene: Scene) -> None:
-        """Take a new scene, whose links the ends are."""
-        self._ends.clear()
-        self._walls.clear()
-        self._stale.clear()
-        self._placed = False
-        links = 0
-        last: dict[str, int] = {}
-        for name, body in scene.bodies.items():
-            links += len(body.links)
-            last[name] = links - 1
-        self._ends = {end: last.get(self._world.body(end)) for end in self._deployment.endpoints()}
-
     def move(self, frame: Frame) -> None:
-        """Take a frame of that scene's layout: where antennas are."""
+        """Take a frame: where antennas are."""
         self._world.turn_to(frame)
+        self._absent = frozenset(entity.name for entity in frame.layout.entities if entity.is_absent(frame.numbers))
         self._placed = True
 
     def message(self, status: Mapping[str, Any]) -> dict[str, Any]:
@@ -227,11 +217,12 @@ class Links:
 
     def _crossed(self, source: str, destination: str) -> list[Vector]:
         """Return the middle of each thing (m, world frame) that the line between two antennas crosses."""
-        ends = self._world.antenna(source, ORIGIN), self._world.antenna(destination, ORIGIN)
-        a, b = sorted(ends)
+        bodies = frozenset({self._world.body(source), self._world.body(destination)})
+        if not self._absent.isdisjoint(bodies):
+            return []
+        a, b = sorted((self._world.antenna(source, ORIGIN), self._world.antenna(destination, ORIGIN)))
         way = dist(a, b)
-        ignoring = frozenset({self._world.body(source), self._world.body(destination)})
-        middles = [(found.entry_m + found.exit_m) / 2 / way for found in self._world.crossings(a, b, ignoring)]
+        middles = [(found.entry_m + found.exit_m) / 2 / way for found in self._world.crossings(a, b, bodies)]
         return [
             (
                 round(a[0] + share * (b[0] - a[0]), 3),

@@ -17,7 +17,7 @@ from foosim.world.layout import Entity, Layout
 
 
 class Overlays:
-    """Makes overlays of the frames of one layout."""
+    """Makes overlays of the frames of one deployment."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._layout = layout
@@ -84,7 +84,8 @@ class Overlays:
 
 
 def _rays_of(sensors: Sequence[FittedSensor], frame: Frame) -> list[list[float]]:
-    """Return both ends of each ray (m). Raises ComponentError, of the first of several."""
+    """Return both ends of each ray (m); absent robots send none. Raises ComponentError, of the first of several."""
+    sensors = [fitted for fitted in sensors if not frame.layout[fitted.robot].is_absent(frame.numbers)]
     if not sensors:
         return []
     first = sensors[0]

@@ -1,6 +1,4 @@
-"""A world as a page draws it, in JSON, said once for each layout: links with their shapes, scenery, bodies, what can be
-plotted and added.
-"""
+"""A world as a page draws it, in JSON, said once: links with their shapes, scenery, bodies, what can be plotted."""
 
 from __future__ import annotations
 
@@ -49,6 +47,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "name": name,
                 "model": body.model,
                 "links": list(range(first, len(links))),
+                "robot": layout[name].is_robot,
                 "removable": layout[name].can_leave,
                 "pushable": layout[name].is_free,
                 "settable": settable(deployment, layout, layout[name]),

@@ -52,9 +52,10 @@ class Moment:
 
     tick: float
     poses: NDArray[np.float32]
-    """Of each link of the scene, in its order, shape (links, 7): x, y, z in m, quaternion x, y, z, w; world frame."""
+    """Of each link of the scene, in its order, shape (links, 7): x, y, z in m, quaternion x, y, z, w; world frame. Not
+    a number where it is absent, or where its pose is not known."""
     values: NDArray[np.float64]
-    """The frame's numbers, which the scene's `fields` index; empty where there are none."""
+    """The frame's numbers, which the scene's `fields` index; not a number for what is absent, empty without a frame."""
     jump: bool = False
     """Not the moment behind the one before: paths are cut here."""
     paused: bool = False

@@ -34,7 +34,7 @@ QUARANTINE, DOWN = "quarantine", "down"
 EPOCH, RECOVERY, MOVE, NETWORK, DROPS = "epoch", "recovery", "move", "network", "drops"
 
 FLAGS: Final = {"quarantined": (QUARANTINE, "is in quarantine"), "down": (DOWN, "is out of service")}
-"""Slots of an entity that are 1 while something holds: the kind of the mark, and its text."""
+"""Slots of a present entity that are 1 while something holds: the kind of the mark, and its text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class WorldEvents:
         if before is None or frame.tick <= before.tick:
             return []
         marks = self._of_flags(before, frame)
-        if self._rules is None or self._rules.layout is not frame.layout:
+        if self._rules is None:
             self._rules = WorldMarks(self._deployment, frame.layout)
         marks += [Mark(*mark) for mark in self._rules.between(before, frame)]
         return sorted(marks, key=lambda mark: mark.tick)
@@ -69,14 +69,16 @@ class WorldEvents:
     def _of_flags(before: Frame, frame: Frame) -> list[Mark]:
         marks = []
         for entity in frame.layout.entities:
-            known = before.layout[entity.name].offsets if entity.name in before.layout else {}
             for slot, (kind, text) in FLAGS.items():
-                if slot in entity.offsets and slot in known:
-                    was, holds = before.at(entity.name, slot) != 0.0, frame.at(entity.name, slot) != 0.0
-                    if holds and not was:
-                        marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
-                    elif was and not holds and kind == DOWN:
-                        marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
+                at = entity.offsets.get(slot)
+                if at is None or (before.numbers[at] != 0.0) is (frame.numbers[at] != 0.0):
+                    continue
+                if entity.is_absent(before.numbers) or entity.is_absent(frame.numbers):
+                    continue
+                if frame.numbers[at] != 0.0:
+                    marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
+                elif kind == DOWN:
+                    marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
         return marks
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from foosim.world.layout import Layout
 
 
-@engine("mujoco", meshes=True, islands=True)
+@engine("mujoco", meshes=True, islands=True, grasps=True)
 class Mujoco:
     """Rigid bodies of any kind by the MuJoCo library, with scenery of any shape."""
 

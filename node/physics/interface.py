@@ -12,20 +12,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from foosim.deployment.schema import Deployment
 from foosim.world.components.drives import Drives
 from foosim.world.layout import Entity, Layout
 
 
+class Weld(NamedTuple):
+    """A body that a link of another one holds: the places of both among the bodies of an island, and the index of the
+    link. The seven numbers of the frame from `grasp` on are the pose of the held body (position of the centre of mass,
+    principal axes as a quaternion x, y, z, w) in the frame of the link."""
+
+    holder: int
+    link: int
+    held: int
+    grasp: int
+
+
 @dataclass(frozen=True, slots=True)
 class Island:
-    """Bodies that an engine solves together, in name order, what is asked of each, and the movers in their way."""
+    """Bodies that an engine solves together, in name order, what is asked of each, the movers in their way, and which
+    of the bodies hold which."""
 
     bodies: tuple[Entity, ...]
     movers: tuple[Entity, ...]
     drives: tuple[Drives, ...]
+    welds: tuple[Weld, ...] = ()
 
 
 @runtime_checkable

@@ -1,13 +1,14 @@
 """Rigid bodies of any kind in MuJoCo: one island at a time, in a model of its composition (`mujoco_model`).
 
 The state of a model is `qpos` and `qvel`. All else that a step reads is set at each load: the warm start and the time
-are 0, motors and applied forces those of the tick. So a tick is a function of the frame, whichever model computes it
-and whatever that has computed before.
+are 0, motors, applied forces and the wind those of the tick. So a tick is a function of the frame, whichever model
+computes it and whatever that has computed before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from math import inf
 from typing import Any, Final
@@ -16,7 +17,7 @@ from mypy_extensions import mypyc_attr
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.floors import Floors, as_plane
-from foosim.node.physics.interface import Island
+from foosim.node.physics.interface import Island, Weld
 from foosim.node.physics.mesh_pieces import MeshPieces
 from foosim.node.physics.mujoco_model import (
     SCENERY,
@@ -37,7 +38,19 @@ from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
-from foosim.world.scene import MOVING, Body, Shape, load_of, rotate
+from foosim.world.rules.wind import air_of
+from foosim.world.scene import (
+    MOVING,
+    ORIGIN,
+    Body,
+    Quaternion,
+    Shape,
+    Vector,
+    load_of,
+    moved,
+    multiply,
+    rotate,
+)
 
 MODELS_MAX: Final = 128
 """Models that an engine keeps: those that were built last."""
@@ -45,10 +58,13 @@ SEATED_MAX: Final = 1024
 """Islands whose entities' places in a model are kept: there are more of them than compositions."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
 
-Composition = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...]]
-"""The kinds of an island's bodies, in name order, those of movers in their way, the pieces of meshes in reach, and the
-floors that all bodies are above. `Key` has the entities themselves, and how many of them are no movers."""
-Key = tuple[tuple[int, ...], int, tuple[int, ...], tuple[int, ...]]
+Composition = tuple[
+    tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int, int], ...]
+]
+"""The kinds of an island's bodies, in name order, those of movers in their way, the pieces of meshes in reach, the
+floors that all bodies are above, and of each weld the place of the body that holds, its link, and the place of the body
+that is held. `Key` has the entities themselves, how many of them are no movers, and the welds."""
+Key = tuple[tuple[int, ...], int, tuple[int, ...], tuple[int, ...], tuple[Weld, ...]]
 
 
 class MujocoIslands:
@@ -58,7 +74,9 @@ class MujocoIslands:
     """Another one may compute other bits, in worlds that the small run of the fingerprint has not."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
-        self._physics = physics_of(deployment)
+        self._physics, self._air = physics_of(deployment), air_of(deployment, layout)
+        if self._air is not None:
+            self._physics = replace(self._physics, density=self._air.density, viscosity=self._air.viscosity)
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
         scene = build_scene(deployment, layout)
@@ -85,7 +103,7 @@ class MujocoIslands:
         """Build each kind of body alone; raise AssetError for the first entity of a kind that MuJoCo refuses."""
         for kind, entity in first.items():
             try:
-                self._build(((kind,), (), (), ()) if entity.is_rigid else ((), (kind,), (), ()))
+                self._build(((kind,), (), (), (), ()) if entity.is_rigid else ((), (kind,), (), (), ()))
             except ValueError as error:
                 raise AssetError(f"{entity.name}: MuJoCo refuses its body: {error}") from error
 
@@ -96,20 +114,22 @@ class MujocoIslands:
         """
         indices = tuple([one.index for one in (*island.bodies, *island.movers)])
         floors = self._floors.below(island.bodies, numbers)
-        key = indices, len(island.bodies), self._pieces_near(island, numbers), floors
+        key = indices, len(island.bodies), self._pieces_near(island, numbers), floors, island.welds
         seated = self._seated.get(key)
         if seated is None:
             if len(self._seated) == SEATED_MAX:
                 self._seated.clear()
             seated = self._seated[key] = self._seat(key, island)
         engine, seats = seated
+        if self._air is not None:
+            engine.blow([numbers[at] for at in self._air.velocity])
         engine.solve(seats, island.drives, numbers, start)
 
     def _seat(self, key: Key, island: Island) -> tuple[CompositionEngine, Seats]:
         """Return a model of an island's composition and its entities' seats in that."""
-        indices, count, pieces, floors = key
+        indices, count, pieces, floors, welds = key
         kinds = tuple([self._kinds[index] for index in indices])
-        composition = kinds[:count], kinds[count:], pieces, floors
+        composition = kinds[:count], kinds[count:], pieces, floors, tuple([weld[:3] for weld in welds])
         engine = self._models.get(composition)
         if engine is None:
             if len(self._models) == MODELS_MAX:
@@ -129,7 +149,7 @@ class MujocoIslands:
         bodies, movers = ([self._unnamed[kind] for kind in kinds] for kinds in key[:2])
         fixed = [as_plane(shape) if place in key[3] else shape for place, shape in enumerate(self._scenery)]
         scenery = [*fixed, *chain.from_iterable([self._meshes.pieces[piece] for piece in key[2]])]
-        return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers)
+        return CompositionEngine(self._physics, self._dt, self._substeps, scenery, bodies, movers, key[4])
 
     def close(self) -> None:
         """Free all models."""
@@ -158,7 +178,7 @@ class _Seat:
 class Seats:
     """The entities of an island in a model, in the order of its bodies, movers last."""
 
-    __slots__ = ("bodies", "everybody", "fixed", "movers", "q", "turned", "v")
+    __slots__ = ("bodies", "everybody", "fixed", "grasps", "movers", "q", "turned", "v")
 
     def __init__(self, m: Any, places: Sequence[Placed], island: Island, bodies: Sequence[Body]) -> None:
         self.everybody = [_Seat(*its) for its in zip(places, (*island.bodies, *island.movers), strict=True)]
@@ -166,6 +186,8 @@ class Seats:
         everything = list(zip(self.everybody, (*island.bodies, *island.movers), bodies, strict=True))
         self.movers = [its for its in everything if its[0].placed.is_mover]
         self.fixed = [(seat.placed, body) for seat, _, body in everything if not body.is_free]
+        self.grasps = [one.grasp for one in island.welds]
+        """Of each weld the first place of its grasp in the frame."""
         self.turned: list[tuple[int, int]] = []
         """Of each free body the first places of its angular velocity in `qvel` and of its orientation in the frame."""
         self.q, self.v = [0] * m.nq, [0] * m.nv
@@ -209,14 +231,16 @@ class CompositionEngine:
         scenery: Sequence[Shape],
         bodies: Sequence[Body],
         movers: Sequence[Body],
+        welds: Sequence[tuple[int, int, int]] = (),
     ) -> None:
         self._dt, self._substeps, self._count = substep_s, substeps, len(bodies)
-        built = ModelBuilder(physics, substep_s, scenery, bodies, movers)
+        built = ModelBuilder(physics, substep_s, scenery, bodies, movers, welds)
+        self._welds = built.welds
         self.m, self._placed, self._owners = built.m, built.placed, built.owners
         self._motors, clock = built.motors, built.clock
         self.d = d = built.d
         self._qpos, self._qvel, self._warm, self._applied = d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied
-        self._contact = d.contact
+        self._contact, self._wind = d.contact, self.m.opt.wind
         self._touches: dict[tuple[int, int], _Touch] = {}
         self._forces: list[float] = []
         self._governed: list[tuple[Placed, int, Motor, float]] = []
@@ -229,6 +253,10 @@ class CompositionEngine:
     def seats_of(self, island: Island, bodies: Sequence[Body]) -> Seats:
         """Return which of an island's entities, movers last, with their bodies, is which body of the model."""
         return Seats(self.m, self._placed, island, bodies)
+
+    def blow(self, velocity: Sequence[float]) -> None:
+        """Set how fast the air goes (m/s), until it is set anew."""
+        self._wind[:] = velocity
 
     def solve(self, seats: Seats, drives: Sequence[Drives], numbers: list[float], start: Sequence[float]) -> None:
         """Write the next state of the bodies into the numbers, as `MujocoIslands.solve` does."""
@@ -252,6 +280,8 @@ class CompositionEngine:
         for placed, body in seats.fixed:
             if placed.stands is not body:
                 self._stand(placed, body)
+        for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
+            self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
             self._command(drives)
             qpos[self._clock_q], qvel[self._clock_v] = 0.0, 1.0
@@ -264,6 +294,13 @@ class CompositionEngine:
         x, y, z, w = body.orientation
         placed.stands = body
         self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
+
+    def _weld(self, number: int, origin: Vector, axes: Quaternion, grasp: Sequence[float]) -> None:
+        """Set how a body is held by a link whose frame has the pose (`origin`, `axes`) in MuJoCo's body."""
+        px, py, pz, qx, qy, qz, qw = grasp
+        x, y, z, w = multiply(axes, (qx, qy, qz, qw))
+        place = moved(origin, rotate(axes, (px, py, pz)), 1.0)
+        self.m.eq_data[number, :10] = *ORIGIN, *place, w, x, y, z
 
     def _command(self, everybody: Sequence[Drives]) -> None:
         """Set the target speeds of motors, and the greatest forces with which they are reached."""

@@ -136,8 +136,9 @@ class Episodes:
     def step(self, actions: Mapping[str, NDArray[Any]]) -> Stepped:
         """Take the actions of agents, compute the time to the next ones, and return what that led to.
 
-        An agent without an action sends nothing: its robots keep their last commands. Raises BadValue for an action of
-        another shape or with a number that is not finite, UnknownName for one of no agent.
+        An agent without an action sends nothing: its robots keep their last commands. Nor does one that does not exist.
+        Raises BadValue for an action of another shape or with a number that is not finite, UnknownName for one of no
+        agent.
         """
         assert self.is_running, "reset begins an episode"
         simulation = self.simulation
@@ -146,7 +147,9 @@ class Episodes:
             if name not in self.vectors:
                 raise UnknownName("an action of no agent", name, self.agents)
         packets = {
-            name: self.vectors[name][1].packets(np.asarray(action, np.float64)) for name, action in actions.items()
+            name: self.vectors[name][1].packets(np.asarray(action, np.float64))
+            for name, action in actions.items()
+            if simulation.agents[name].exists
         }
         simulation.advance(packets, self.ticks)
         after = simulation.frame
@@ -164,6 +167,10 @@ class Episodes:
         for name, agent in simulation.agents.items():
             found[name] = self.vectors[name][0].join(agent.newest, now_ns)
         return found
+
+    def present(self) -> list[str]:
+        """Return the agents that exist in the present frame, in order."""
+        return [name for name, agent in self.simulation.agents.items() if agent.exists]
 
     def paint(self) -> NDArray[np.uint8]:
         """Return the present frame from above, an array of uint8 of the shape (height, width, 3)."""

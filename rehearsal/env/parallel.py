@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -21,10 +21,14 @@ from foosim.rehearsal.simulation import Simulation
 
 Actions = Mapping[str, NDArray[np.float64]]
 Infos = dict[str, dict[str, Any]]
+Told = TypeVar("Told")
 
 
 class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64]]):  # type: ignore[misc]
     """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
+
+    `agents` are those that exist. One whose last robot is removed is terminated; when one is added it comes back, with
+    an observation.
 
     `infos` have the tick and the simulated time (`tick`, `time_s`). `metadata["render_fps"]` of an environment is the
     rate at which its agents act.
@@ -74,25 +78,25 @@ class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64
     ) -> tuple[dict[str, NDArray[np.float64]], Infos]:
         """Begin an episode. The option `start` is what to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`."""
         found = self._episodes.reset(seed, options)
-        self.agents = list(self.possible_agents)
-        return found, self._infos()
+        self.agents = self._episodes.present()
+        return _of(found, self.agents), self._infos(self.agents)
 
     def step(
         self, actions: Actions
     ) -> tuple[dict[str, NDArray[np.float64]], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Take an action of each agent; return observations, rewards, terminations, truncations and infos."""
-        if not self.agents:
+        if not self._episodes.is_running:
             return {}, {}, {}, {}, {}
         found = self._episodes.step(actions)
-        agents = self.possible_agents
-        ends = dict.fromkeys(agents, found.is_over), dict.fromkeys(agents, found.is_cut)
-        if found.is_over or found.is_cut:
-            self.agents = []
-        return found.observations, found.rewards, *ends, self._infos()
+        here = self._episodes.present()
+        told = [name for name in self.possible_agents if name in here or name in self.agents]
+        ends = {name: found.is_over or name not in here for name in told}, dict.fromkeys(told, found.is_cut)
+        self.agents = [] if found.is_over or found.is_cut else here
+        return _of(found.observations, told), _of(found.rewards, told), *ends, self._infos(told)
 
-    def _infos(self) -> Infos:
+    def _infos(self, agents: Sequence[str]) -> Infos:
         simulation = self.simulation
-        return {name: {"tick": simulation.tick, "time_s": simulation.time_s} for name in self.possible_agents}
+        return {name: {"tick": simulation.tick, "time_s": simulation.time_s} for name in agents}
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the present frame from above, with `render_mode="rgb_array"`: uint8, (height, width, 3)."""
@@ -101,3 +105,7 @@ class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64
     def close(self) -> None:
         """Free the engines."""
         self._episodes.close()
+
+
+def _of(told: Mapping[str, Told], agents: Sequence[str]) -> dict[str, Told]:
+    return {name: told[name] for name in agents}

@@ -13,6 +13,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received, Sent
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, received
+from foosim.vhub.state.existence import Existence
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT, HubState
 from foosim.vhub.state.members import Member
 from foosim.world.edits import Disrupt
@@ -22,6 +23,11 @@ from foosim.world.robot_packets import Delivered, RobotPacket
 
 class Carrier(Protocol):
     """Carries packets. At each frame it is opened, then closed."""
+
+    existence: Existence
+    """Who exists in the newest frame."""
+    members: dict[str, Member]
+    """The clients that take part."""
 
     def open(self, frame: Frame, packets: Sequence[RobotPacket], events: Sequence[Disrupt]) -> list[str]:
         """Take what the robots send at a frame, in (robot, index) order, and what happens to the network from it on;
@@ -39,6 +45,7 @@ class EmulatedNetwork:
 
     def __init__(self, deployment: Deployment, first_tick: int, joining: Sequence[Joining]) -> None:
         self.state = HubState(deployment, first_tick)
+        self.existence, self.members = self.state.existence, self.state.members
         self._joining = {one.name: one for one in sorted(joining, key=lambda one: one.name)}
         self._released: dict[str, list[Flight]] = {}
         self._delivered: list[Delivered] = []
@@ -73,7 +80,8 @@ class Bypass:
 
     def __init__(self, deployment: Deployment, first_tick: int, joining: Sequence[Joining]) -> None:
         self._tick_ns = deployment.tick_ns
-        self._members: dict[str, Member] = {}
+        self.existence = Existence(deployment)
+        self.members: dict[str, Member] = {}
         self._joining = {one.name: one for one in sorted(joining, key=lambda one: one.name)}
         self._receivers: dict[tuple[str, str], list[str]] = {}
         for one in self._joining.values():
@@ -93,9 +101,12 @@ class Bypass:
         tick = frame.tick
         if self._joining:
             for name in [name for name, one in self._joining.items() if one.suits(tick)]:
-                self._members[name] = Member.of(self._joining.pop(name), tick)
+                self.members[name] = Member.of(self._joining.pop(name), tick)
+                self.existence.look_again()
+        for name in self.existence.turn_to(frame, self.members):
+            self._waiting.pop(name, None)
         for name in self._turns:
-            member = self._members.get(name)
+            member = self.members.get(name)
             if member is not None and member.is_over(tick):
                 member.called_tick = tick
         arrived, self._to_clients = self._to_clients, []
@@ -113,12 +124,12 @@ class Bypass:
                 message = Received(packet.robot, sequence, 0, packet.channel, now_ns, now_ns, packet.payload)
                 for name in names:
                     self._hand(name, message, tick)
-        return sorted([name for name, member in self._members.items() if member.is_due(tick)])
+        return sorted([name for name, member in self.members.items() if member.is_due(tick)])
 
     def _hand(self, name: str, message: Received, tick: int) -> None:
-        """Let a packet reach a client that takes part."""
-        member = self._members.get(name)
-        if member is None:
+        """Let a packet reach a client that takes part and exists."""
+        member = self.members.get(name)
+        if member is None or not member.has_existed_at(message.due_ns, self._tick_ns):
             return
         self._waiting.setdefault(name, []).append(message)
         calling = self._turns.get(name)

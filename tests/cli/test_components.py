@@ -103,7 +103,10 @@ TOLD: Final = {
     ],
     ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
-    ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)", "can be added: ball"],
+    ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)"],
+    ("model", "fire"): ["can be set: at (a pose), radius (0 m to 100 m)", "moved by: fire", "tags: fire"],
+    ("model", "door"): ["can be set: open (0 % to 100 %, or true or false)"],
+    ("rule", "wind"): ["can be set: x (-100 m/s to 100 m/s), y (-100 m/s to 100 m/s), z (-100 m/s to 100 m/s)"],
     ("entity_rule", "battery"): ["slots: charge", "slots that are the model's where it has them: charge"],
     ("model", "differential_drive"): [
         "moved by: differential_drive",
@@ -133,7 +136,7 @@ def test_all_are_told_of_in_json(told: Telling) -> None:
     )
     assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"
     assert football["writes"] == ["ball"] and football["each"]["ball"]["still_ticks"] == 1
-    assert by_name["kit", "table"]["entities"] == {"ball": "ball"} and by_name["kit", "table"]["addable"] == ["ball"]
+    assert by_name["kit", "table"]["entities"] == {"ball": "ball"}
 
 
 @pytest.mark.usefixtures("site")

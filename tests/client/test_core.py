@@ -50,7 +50,7 @@ TEXT = apply_sets(
     ["players={}", "network.links=[]", "clients={hand: {lockstep: true, rate: 250 Hz}, ear: {lockstep: false}}"],
 )
 DEPLOYMENT = load_deployment(TEXT, NAME)
-LAYOUT = build_layout(DEPLOYMENT, [])
+LAYOUT = build_layout(DEPLOYMENT)
 NUMBERS = np.array(initial_numbers(DEPLOYMENT, LAYOUT))
 HEARD = [("red.goal", "encoder")]
 ECHO = Packet("red.goal", "echo", b"one")
@@ -66,7 +66,7 @@ class Air:
         self.hub = HubCore("boot", bytes(32), 0)
         self.deliveries: list[Deliveries] = []
         self._said: list[Publish] = []
-        build = Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast", [])
+        build = Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast")
         self.tell(channels.BUILD, "vhub", encode(build))
         self.hub.begin(None, 0)
 
@@ -107,7 +107,7 @@ class Air:
 
     def start(self) -> None:
         owners = [(robot, "n1") for robot in DEPLOYMENT.robots]
-        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")))
+        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, b"")))
 
     def close(self) -> None:
         """Give the hub one more tick: its frame and, at every fifth, one packet of the red goalkeeper."""

@@ -10,13 +10,13 @@ from typing import Any, Final
 import pytest
 
 from foosim.client.commands import CommandEncoder
-from foosim.client.jobs import Jobs
+from foosim.client.jobs import Job, Jobs
 from foosim.client.player import Sample
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.go_to import Place
 from foosim.world.forms.jobs import JobState
-from foosim.world.sensors.job import Jobs as Reading
+from foosim.world.sensors.states.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
 GUIDE: Final = Path(__file__).parents[2] / "docs" / "how-to" / "give_jobs.md"
@@ -106,13 +106,17 @@ def test_commands_are_those_that_a_player_returns() -> None:
     assert its.commands(4) == {}
 
 
+def known(its: Jobs) -> Job | None:
+    return its.job
+
+
 def test_after_a_restart_the_last_job_is_the_one_of_the_reading() -> None:
     its = jobs()
-    assert its.job is None
+    assert known(its) is None
     hear(its, 0.0, 0.0)
-    assert its.job is None
+    assert known(its) is None
     hear(its, 7.0, RUNNING, 2.0)
-    job = its.job
+    job = known(its)
     assert job is not None
     assert (job.number, job.state) == (7, RUNNING)
     assert sent(its, range(5)) == [], "it runs already"

@@ -46,7 +46,7 @@ class Storm(Air):
     def come_back(self, run: str = "run-1") -> None:
         """Another one is started."""
         self.hub = HubCore("boot-2", bytes(32), self.now_ns)
-        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", run, NAME, TEXT, "fast", [])))
+        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", run, NAME, TEXT, "fast")))
         self.hub.begin(recall(DEPLOYMENT, run, self.records, None, limits.DOWNLINK_KEPT_NS), self.now_ns)
         self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", "boot-2", 0)))
         self.tick = self.closed()

@@ -18,7 +18,7 @@ from foosim.console.server.server import ConsoleServer, Tokens
 from foosim.console.shown.poses import HEAD, Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import build_scene
@@ -33,22 +33,27 @@ def table() -> Deployment:
     return load_deployment(TABLE.read_text(), TABLE.name)
 
 
+def table_with_spares(count: int = 1) -> Deployment:
+    """The same with balls that can be added."""
+    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [f"table.spare_balls={count}"]), TABLE.name)
+
+
 class MemorySource:
     """A world that a test moves."""
 
-    def __init__(self, deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> None:
-        self.deployment = deployment
+    def __init__(self, deployment: Deployment) -> None:
         self.about = About("live", "test", deployment.world, deployment.tick_ns, ("pause", "push"))
         self.wanted: list[Wanted] = []
         self.asked: list[tuple[str, Mapping[str, Any]]] = []
         self.frame = initial_frame(deployment)
         self.feed: Feed | None = None
         self.begun = asyncio.Event()
-        self.turn_to(added)
+        self.turn_to(deployment)
 
-    def turn_to(self, added: tuple[tuple[str, str], ...]) -> None:
-        """Have a layout with these entities."""
-        self.layout = build_layout(self.deployment, added)
+    def turn_to(self, deployment: Deployment) -> None:
+        """Have the world of a deployment."""
+        self.deployment = deployment
+        self.layout = build_layout(self.deployment)
         self.scene = build_scene(self.deployment, self.layout)
         self.poser = Poser(self.layout, self.scene)
         if self.feed is not None:

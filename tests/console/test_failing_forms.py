@@ -123,7 +123,7 @@ Act = str | Callable[[], Any]
 def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act, said: str) -> None:
     forms.acts["red.goal"] = act
     frame = initial_frame(deployment())
-    drawing = Drawing(deployment(), frame.layout)
+    drawing = Drawing(deployment())
     content, note = drawing.overlays(frame, {"rays", "contacts"})
     assert content["rays"] == [RAY]
     assert note["type"] == "note" and note["level"] == "error"
@@ -135,7 +135,7 @@ def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act
 
 def test_rays_of_none_that_fails_are_all_drawn(forms: Any) -> None:
     frame = initial_frame(deployment())
-    (content,) = Drawing(deployment(), frame.layout).overlays(frame, {"rays"})
+    (content,) = Drawing(deployment()).overlays(frame, {"rays"})
     assert content["rays"] == [RAY, RAY]
 
 

@@ -1,4 +1,4 @@
-"""What becomes of what a running system says: frames as moments, layouts that change, requests as marks, overlays."""
+"""What becomes of what a running system says: frames as moments, requests as marks, overlays."""
 
 from __future__ import annotations
 
@@ -8,93 +8,89 @@ from typing import Any
 
 import numpy as np
 
-from foosim.console.live.following import Following, World, readable
+from foosim.console.live.following import Following, first_frame, readable
 from foosim.console.shown.overlays import Overlays
-from foosim.console.shown.source import About, Wanted
-from foosim.deployment.loader import load_deployment
+from foosim.console.shown.source import About, Moment, Wanted
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.forms.forms import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.parameters.hall import hall_of
 from foosim.world.sensors.proximity import ProximitySettings
-from tests.console.memory import TABLE, table
-
-BALL2 = [["ball2", "ball"]]
+from tests.console.memory import TABLE, table, table_with_spares
 
 
 def commit(frame: Frame) -> bytes:
     return encode(Commit(1, frame.tick, frame.digest, frame.values.tobytes(), [], [], False))
 
 
-def described(frame: Frame, added: list[list[str]], paused: bool = False) -> dict[str, Any]:
+def described(frame: Frame) -> dict[str, Any]:
     return {
         "run": "test",
         "deployment_name": TABLE.name,
-        "deployment": TABLE.read_text(),
-        "added": added,
+        "deployment": apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=1"]),
         "layout": frame.layout.digest.hex(),
         "tick": frame.tick,
         "frame": b64encode(commit(frame)).decode(),
     }
 
 
-def frame_of(tick: int, *added: list[str]) -> Frame:
-    layout = build_layout(table(), [(name, model) for name, model in added])
-    return Frame(tick, layout, np.arange(layout.size, dtype=np.float64))
+def frame_of(tick: int, *, is_absent: bool = False) -> Frame:
+    """A frame whose numbers are their places; the spare ball is in the world, or not."""
+    layout = build_layout(table_with_spares())
+    values = np.arange(layout.size, dtype=np.float64)
+    values[layout["ball-2"].offsets[ABSENT]] = is_absent
+    return Frame(tick, layout, values)
 
 
-def following() -> tuple[Following, World]:
+def following() -> Following:
     found = Following(About("live", "test", "", 1, ()))
-    what = described(frame_of(5), [])
+    what = described(frame_of(5))
     world = found.world_of(what, lambda deployment: {})
     assert found.turn_to(what, world)
-    return found, world
+    assert found.first_moment(first_frame(world.drawing, what)) is not None
+    return found
 
 
-def is_stale(found: Following) -> bool:
-    return found.is_stale
+def show(found: Following, frame: Frame) -> Moment:
+    moment = found.show(commit(frame))
+    assert moment is not None
+    return moment
 
 
-def test_a_frame_of_another_layout_is_not_drawn_and_asks_for_the_new_one() -> None:
-    found, _ = following()
-    first = found.first_moment()
-    assert first is not None and (first.tick, first.jump) == (5, True)
-    assert found.read(commit(frame_of(7, BALL2[0]))) is None
-    assert is_stale(found)
-    what = described(frame_of(7, BALL2[0]), BALL2)
-    assert found.turn_to(what, found.world_of(what, lambda deployment: {}))
-    assert not is_stale(found)
-    moment = found.first_moment()
-    assert moment is not None and len(moment.poses) == 18
+def test_a_frame_of_another_world_is_not_drawn() -> None:
+    found = following()
+    layout = build_layout(table())
+    assert found.show(commit(Frame(7, layout, np.zeros(layout.size)))) is None
+    assert found.show(b"no commit") is None
+    assert show(found, frame_of(8)).tick == 8
 
 
-def test_a_frame_of_another_layout_of_the_same_size_is_not_drawn() -> None:
-    found, _ = following()
-    what = described(frame_of(7, BALL2[0]), BALL2)
-    found.turn_to(what, found.world_of(what, lambda deployment: {}))
-    assert found.read(commit(frame_of(8, BALL2[0]))) is not None
-    assert found.read(commit(frame_of(9, ["ball3", "ball"]))) is None
-    assert is_stale(found)
+def test_a_ball_comes_and_goes_in_one_scene() -> None:
+    found = following()
+    names = [link["name"] for link in found.content()["links"]]
+    ball = names.index("ball-2")
+    seen = [show(found, frame_of(tick, is_absent=tick % 2 == 1)) for tick in (7, 8, 9)]
+    assert [bool(np.isnan(moment.poses[ball]).all()) for moment in seen] == [True, False, True]
+    assert all(np.isfinite(np.delete(moment.poses, ball, 0)).all() for moment in seen)
 
 
 def test_the_same_world_described_again_is_no_new_scene() -> None:
-    found, _ = following()
-    found.first_moment()
-    what = described(frame_of(9), [])
-    assert not found.turn_to(what, found.world_of(what, lambda deployment: {}))
-    moment = found.first_moment()
-    assert moment is not None and moment.tick == 9
+    found = following()
+    what = described(frame_of(9))
+    world = found.world_of(what, lambda deployment: {})
+    assert not found.turn_to(what, world)
+    first = found.first_moment(first_frame(world.drawing, what))
+    assert first is not None and (first.tick, first.jump) == (9, True)
+    assert found.first_moment(first_frame(world.drawing, what)) is None
 
 
 def test_time_that_goes_back_is_a_jump() -> None:
-    found, world = following()
-    found.first_moment()
-    jumps = []
-    for tick in (6, 7, 3, 4):
-        jumps.append(found.show(world, frame_of(tick)).jump)
-    assert jumps == [False, False, True, False]
+    found = following()
+    assert [show(found, frame_of(tick)).jump for tick in (6, 7, 3, 4)] == [False, False, True, False]
 
 
 def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
@@ -112,8 +108,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
-    found, world = following()
-    found.first_moment()
+    found = following()
     found.asked("operator-1-abc", 5, "pause", "browser 2")
     entry = {"tick": 5, "verb": "pause", "text": "paused at tick 5", "who": "operator-1-abc", "accepted": True}
     other = {**entry, "tick": 4, "verb": "rate", "text": "pace 2x from tick 4", "who": "operator-9-xyz"}
@@ -124,15 +119,15 @@ def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
     standing = found.standing_moment()
     assert standing is not None and standing.paused
     assert found.standing_moment() is None
-    assert found.show(world, frame_of(6)).paused, "the last frame may come behind the status"
+    assert show(found, frame_of(6)).paused, "the last frame may come behind the status"
     assert "marks" not in {message["type"] for message in found.take_status(status("paused", other, entry))}
 
 
 def test_events_of_the_deployment_are_marked_when_their_time_is_reached() -> None:
     events = "events: [{at: 4 ms, partition: [[camera], [rest]], for: 1 s}, {at: 1 s, heal: all}]"
-    text = TABLE.read_text().replace("\nnetwork:\n", f"\nnetwork:\n  {events}\n")
+    what = described(frame_of(9))
+    what["deployment"] = what["deployment"].replace("\nnetwork:\n", f"\nnetwork:\n  {events}\n")
     found = Following(About("live", "test", "", 1, ()))
-    what = described(frame_of(9), []) | {"deployment": text}
     found.turn_to(what, found.world_of(what, lambda deployment: {}))
     marks = {"tick": 2, "kind": "network", "text": "partition camera | rest, for 1 s"}
     messages = {message["type"]: message for message in found.take_status(status("running"))}
@@ -141,14 +136,14 @@ def test_events_of_the_deployment_are_marked_when_their_time_is_reached() -> Non
 
 
 def test_what_this_world_does_not_have_is_not_asked_for() -> None:
-    found, _ = following()
+    found = following()
     wanted = Wanted(1, 500.0, links=(("camera", "player-red"), ("a", "b")), readings=(("camera", "ball"), ("x", "y")))
     asked = found.watch_arguments(wanted, 100.0)
     assert asked == {"hz": 100.0, "links": [("camera", "player-red")], "readings": [("camera", "ball")]}
 
 
 def test_a_link_that_is_watched_is_told_with_its_rule_before_it_drops_anything() -> None:
-    found, _ = following()
+    found = following()
     report = {"drops": {"camera>player-red": []}, "readings": {}, "asked": [], "here": []}
     watched = status("running") | {"watched": report}
     wanted = Wanted(1, links=(("camera", "player-red"), ("camera", "player-blue")))
@@ -170,12 +165,13 @@ def test_contacts_are_where_balls_touch_something() -> None:
 
 
 def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(1, "robots.rover01.heading=90 deg"), "hall")
+    sets = ("robots.rover01.heading=90 deg", "robots.rover02.spare=true")
+    deployment = load_deployment(fleet_text(2, *sets), "hall")
     frame = initial_frame(deployment)
     rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
     sensor = next(s for s in deployment.robots["rover01"].sensors.values() if isinstance(s, ProximitySettings))
     radius = hall_of(deployment).rover.radius
-    assert rays.shape == (sensor.rays, 6)
+    assert rays.shape == (sensor.rays, 6), "one that is absent sends none"
     rays[:, (0, 3)] -= frame.at("rover01", "position")
     rays[:, (1, 4)] -= frame.at("rover01", "position", 1)
     np.testing.assert_allclose(np.hypot(*rays[:, :2].T), radius, atol=1e-3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from math import isnan
 from pathlib import Path
 from typing import Literal
 
@@ -27,7 +28,7 @@ from foosim.world.frame import Frame
 from foosim.world.kits.table import BALL
 from foosim.world.layout import WORLD
 from foosim.world.rules.football import kickoff_ticks
-from tests.replay.conftest import TABLE, TICK_NS, TICKS
+from tests.replay.conftest import TABLE, TICK_NS, TICKS, added_tick
 
 SECOND_NS = 1_000_000_000
 
@@ -111,6 +112,22 @@ def test_an_empty_battery_is_marked_once(fleet_text: Callable[..., str]) -> None
     assert marks == [Mark(20, "empty", text), Mark(50, "empty", text)]
 
 
+def test_who_comes_and_goes_is_marked_by_the_event_alone(fleet_text: Callable[..., str]) -> None:
+    """A robot that is absent is down in the frame, which is no mark."""
+    sets = ("robots.rover02.spare=true", "events=[{at: 200 ms, entity: rover02, add: true}]")
+    deployment = load_deployment(fleet_text(2, *sets), "hall")
+    frame, events = initial_frame(deployment), WorldEvents(deployment)
+    absent, down = (frame.layout["rover02"].offsets[slot] for slot in ("absent", "down"))
+    assert (frame.values[absent], frame.values[down], events.take(frame)) == (1.0, 1.0, [])
+    marks = []
+    for tick, numbers in ((10, (1, 1)), (30, (0, 0)), (40, (0, 1)), (50, (1, 1)), (60, (0, 0))):
+        values = np.array(frame.values)
+        values[[absent, down]] = numbers
+        marks += events.take(Frame(tick, frame.layout, values))
+    added = 1 + 200_000_000 // deployment.tick_ns
+    assert marks == [Mark(added, "event", "rover02 is added"), Mark(40, "down", "rover02 is out of service")]
+
+
 def epoch(tick: int, number: int, roster: list[str], **owners: str) -> EpochRow:
     return EpochRow(tick, number, "0" * 64, roster, [OwnerRow(*pair) for pair in sorted(owners.items())], "")
 
@@ -123,6 +140,8 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     timeline.take_recovery(RecoveryRow("node", "n2", "silent", 89, 3, 120_000_000))
     push = EditRow("push", "ball", impulse=[0.1, 0.0, 0.0])
     timeline.take_edits(21, [push, EditRow("set", "a", field="down", numbers=[1.0]), EditRow("network", event="{")])
+    timeline.take_edits(26, [EditRow("add", "ball-2", numbers=[0.0] * 25)])
+    timeline.take_edits(29, [EditRow("remove", "ball-2")])
     cut = '{"partition": [["player-red"], ["camera"]]}'
     timeline.take_edits(30, [EditRow("network", event=cut)])
     for at_ns in (0, 1, 30 * SECOND_NS):
@@ -133,6 +152,8 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
         Mark(20, "push", edit_text(push)),
         Mark(20, "set", "a is out of service"),
         Mark(21, "network", "an event of the network that cannot be read"),
+        Mark(25, "add", "ball-2 was added"),
+        Mark(28, "remove", "ball-2 was removed"),
         Mark(30, "network", "partition player-red | camera"),
         Mark(50, "move", "move a from n1 to n2"),
         Mark(89, "recovery", "node n2: silent, 120 ms without a commit"),
@@ -252,21 +273,24 @@ def test_curves_of_a_run_are_what_the_capture_has(history: CaptureHistory) -> No
     recording = history.recording
     frames = [*open_capture(recording.path).each_frame()]
     place = frames[0].layout[BALL].offsets["position"]
-    first = [(frame.tick, float(frame.values[place])) for frame in frames if len(frame.layout.of("ball")) == 1]
-    assert curve_points(history, Curve("a", field=place), TICKS, 0) == first
-    score = curve_points(history, Curve("b", status="score.red"), TICKS, 0)
+    every = [(frame.tick, float(frame.values[place])) for frame in frames]
+    assert curve_points(history, Curve("a", field=place), TICKS) == every
+    spare = curve_points(history, Curve("s", field=frames[0].layout["ball-2"].offsets["position"]), TICKS)
+    assert [tick for tick, _ in spare] == [tick for tick, _ in every]
+    assert [isnan(value) for _, value in spare] == [tick < added_tick(recording.path) for tick, _ in every]
+    score = curve_points(history, Curve("b", status="score.red"), TICKS)
     assert len(score) > 100 and {value for _, value in score} == {0.0}
-    offered = curve_points(history, Curve("c", status="packets.offered"), TICKS, 0)
+    offered = curve_points(history, Curve("c", status="packets.offered"), TICKS)
     assert offered[-1][1] == history.links.packets and offered == sorted(offered)
-    link = curve_points(history, Curve("d", link=("camera", "player-red"), figure="delivered"), TICKS, 0)
+    link = curve_points(history, Curve("d", link=("camera", "player-red"), figure="delivered"), TICKS)
     (window,) = history.links.windows(TICKS * TICK_NS, 5 * SECOND_NS, ("camera", "player-red"))
     assert [link[-1]] == [(TICKS, window["delivered"])]
     readings = reading_points(history, "camera", "ball", -1, TICKS * TICK_NS)
     assert len(readings) > 20 and all(len(numbers) == 3 for _, numbers in readings)
-    assert curve_points(history, Curve("e", reading=("camera", "ball"), index=2), TICKS, 0) == [
+    assert curve_points(history, Curve("e", reading=("camera", "ball"), index=2), TICKS) == [
         (tick, numbers[2]) for tick, numbers in readings
     ]
-    assert curve_points(history, Curve("f", reading=("camera", "nothing")), TICKS, 0) == []
+    assert curve_points(history, Curve("f", reading=("camera", "nothing")), TICKS) == []
 
 
 def test_the_marks_of_packets_are_a_part_of_their_rows(run: Path) -> None:

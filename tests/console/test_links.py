@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
 from foosim.console.shown.rule_text import RuleTexts, rule_text
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.layout import build_layout
 
 KEY = ("a", "b", "rule")
 
@@ -119,10 +120,8 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
     size = "length: 20 cm, width: 4 m, height: 3 m"
     wall = f"scenery.wall={{shape: box, x: 0 m, y: 0 m, z: 1.5 m, {size}, radio: {{loss: 9 dB}}}}"
     deployment = load_deployment(fleet_text(2, *places, wall), "hall")
-    layout = build_layout(deployment)
-    drawing = Drawing(deployment, layout)
-    links = Links(deployment)
-    links.turn_to(drawing.scene)
+    drawing = Drawing(deployment)
+    links = Links(deployment, drawing.entities)
     links.move(initial_frame(deployment))
     row = ["pilot01", "pilot02", 10, 6, 4, 2_000_000, "fleet/wifi", 0, {"snr": 3, "queue_full": 1}, []]
     message = links.message({**status(100, row), "links_in_all": 300})
@@ -143,3 +142,14 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
         ("queue_full", "sender", 1),
     }
     assert links.message({**status(100, row), "links_in_all": 300})["drops"] == [], "told already"
+
+
+def test_nothing_stands_between_the_ends_of_a_link_of_which_one_is_absent(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2, "robots.rover02.spare=true"), "hall")
+    drawing, frame = Drawing(deployment), initial_frame(deployment)
+    links = Links(deployment, drawing.entities)
+    links.move(frame)
+    row = ["pilot01", "pilot02", 10, 0, 10, 0, "fleet/wifi", 0, {"rx_down": 10}, []]
+    (line,) = links.message(status(100, row))["links"]
+    assert (line["radio"], line["walls"]) == (True, [])
+    assert np.isnan(drawing.moment(frame).poses[line["to_link"]]).all(), "its end is not drawn"

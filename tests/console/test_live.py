@@ -138,7 +138,7 @@ class ResumeState(Control):
         self.asked: list[str] = []
 
     def describe(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
-        return described(frame_of(5), [])
+        return described(frame_of(5))
 
     def status(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
         self.asked.append("status")

@@ -11,43 +11,28 @@ import pytest
 from foosim.console.live import history as kept
 from foosim.console.live.history import APART_NS, ROWS_MAX, History, Rows
 from foosim.console.shown.source import Curve, Wanted
-from foosim.world.layout import build_layout
-from tests.console.memory import table
-from tests.console.test_following import BALL2, commit, described, following, frame_of, status
+from tests.console.test_following import commit, following, frame_of, status
 
 TICK_NS = 2_000_000
 APART = APART_NS // TICK_NS
 WIDE = 4 * APART
 
 
-def place(entity: str, field: str, added: list[list[str]]) -> int:
-    """The index of a field's first number."""
-    layout = build_layout(table(), [(name, model) for name, model in added])
-    return layout[entity].offsets[field]
-
-
-def test_numbers_of_frames_are_kept_some_time_apart_by_name_through_a_change_of_the_layout() -> None:
-    found, world = following()
-    for tick in range(10, 10 + 3 * APART):
-        found.show(world, frame_of(tick))
-    ball = place("world", "football.score", [])
-    points = found.points(Curve("z", field=ball))()
-    assert points == [(tick, float(ball)) for tick in (10, 10 + APART, 10 + 2 * APART)]
-    later = 20 * APART
-    what = described(frame_of(later, BALL2[0]), BALL2)
-    found.turn_to(what, found.world_of(what, lambda deployment: {}))
-    read = found.read(commit(frame_of(later, BALL2[0])))
-    assert read is not None
-    found.show(*read)
-    moved = place("world", "football.score", BALL2)
-    assert moved != ball
-    assert found.points(Curve("z", field=moved))() == [*points, (later, float(moved))]
-    assert found.points(Curve("b", field=place("ball2", "position", BALL2)))()[0][0] == later
+def test_numbers_of_frames_are_kept_some_time_apart_with_a_hole_where_their_entity_is_absent() -> None:
+    found = following()
+    for tick in range(10, 10 + 4 * APART):
+        found.show(commit(frame_of(tick, is_absent=tick < 10 + 2 * APART)))
+    layout = frame_of(0).layout
+    score, ball = layout["world"].offsets["football.score"], layout["ball-2"].offsets["position"]
+    ticks = [10 + number * APART for number in range(4)]
+    assert found.points(Curve("z", field=score))() == [(tick, float(score)) for tick in ticks]
+    points = found.points(Curve("b", field=ball))()
+    assert [(tick, isnan(value)) for tick, value in points] == list(zip(ticks, [True, True, False, False], strict=True))
     assert found.points(Curve("w", field=10_000))() == []
 
 
 def test_values_of_the_status_figures_of_links_and_readings_are_kept() -> None:
-    found, _ = following()
+    found = following()
     found.listen(Wanted(1, 50.0, readings=(("camera", "ball"),)))
     link = ["a", "b", 4, 3, 1, 2_000_000, "everything", 5_000_000, {"loss": 1}]
     for number in range(1, 5):
@@ -69,18 +54,18 @@ def test_values_of_the_status_figures_of_links_and_readings_are_kept() -> None:
 
 
 def test_what_nobody_looked_at_is_a_hole_and_time_that_goes_back_forgets_what_was_later() -> None:
-    history, layout = History(TICK_NS), frame_of(1).layout
+    history = History(TICK_NS)
     curve = Curve("z", field=3)
     for tick in (APART, 2 * APART):
-        history.keep_frame(frame_of(tick))
+        history.keep_frame(tick, frame_of(tick).values)
     for wanted in (Wanted(), Wanted(1, 50.0)):
         history.listen(wanted)
-    history.keep_frame(frame_of(9 * APART))
-    points = history.reader(curve, layout)()
+    history.keep_frame(9 * APART, frame_of(9 * APART).values)
+    points = history.reader(curve)()
     assert [tick for tick, _ in points] == [APART, 2 * APART, 2 * APART + 1, 9 * APART]
     assert [isnan(value) for _, value in points] == [False, False, True, False]
-    history.keep_frame(frame_of(2 * APART))
-    assert [tick for tick, _ in history.reader(curve, layout)()] == [APART, 2 * APART]
+    history.keep_frame(2 * APART, frame_of(2 * APART).values)
+    assert [tick for tick, _ in history.reader(curve)()] == [APART, 2 * APART]
 
 
 @pytest.mark.parametrize("count", [1, 1000, 100_000])
@@ -98,20 +83,20 @@ def test_what_is_kept_is_bounded_and_reaches_as_far_back_in_a_large_world(count:
 
 
 def test_readings_that_come_after_nobody_plots_them_are_none_and_leave_a_hole() -> None:
-    history, layout = History(TICK_NS), frame_of(1).layout
+    history = History(TICK_NS)
     plotted = Wanted(1, 50.0, readings=(("camera", "ball"),))
     for number, wanted in enumerate((plotted, Wanted(1, 50.0), Wanted(), plotted), start=1):
         history.listen(wanted)
         said = {"type": "readings", "robot": "camera", "channel": "ball", "points": [[number * WIDE, [1.0]]]}
         history.keep(said)
-    points = history.reader(Curve("x", reading=("camera", "ball")), layout)()
+    points = history.reader(Curve("x", reading=("camera", "ball")))()
     assert [(tick, isnan(value)) for tick, value in points] == [(WIDE, False), (WIDE + 1, True), (4 * WIDE, False)]
 
 
 def test_readings_of_the_channels_that_were_heard_last_are_kept() -> None:
-    history, layout = History(TICK_NS), frame_of(1).layout
+    history = History(TICK_NS)
     history.listen(Wanted(1, 50.0, readings=tuple((f"r{number}", "c") for number in range(kept.READINGS_MAX + 1))))
     for number in range(kept.READINGS_MAX + 1):
         history.keep({"type": "readings", "robot": f"r{number}", "channel": "c", "points": [[5, [1.0]]]})
-    known = [bool(history.reader(Curve("x", reading=(f"r{number}", "c")), layout)()) for number in (0, 1)]
+    known = [bool(history.reader(Curve("x", reading=(f"r{number}", "c")))()) for number in (0, 1)]
     assert known == [False, True]

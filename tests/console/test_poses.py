@@ -4,22 +4,28 @@ from collections.abc import Callable
 
 import numpy as np
 
+from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.poses import Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import build_scene
+from foosim.world.forms.forms import ABSENT
+from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
-from tests.console.memory import table
+from tests.console.memory import table, table_with_spares
 from tests.forms.worlds import SOLIDS
 
 
-def check(deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> None:
-    layout = build_layout(deployment, added)
+def check(deployment: Deployment) -> None:
+    layout = build_layout(deployment)
     scene = build_scene(deployment, layout)
     values = np.linspace(-3.0, 3.0, layout.size)
+    for entity in layout.entities:
+        if entity.can_leave:
+            values[entity.offsets[ABSENT]] = 0.0
     expected = [
         (name, [*position, *turned])
         for body in scene.bodies
@@ -32,7 +38,26 @@ def check(deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> No
 
 
 def test_poses_of_a_table_with_two_balls() -> None:
-    check(table(), (("ball2", "ball"),))
+    check(table_with_spares())
+
+
+def test_what_is_absent_has_neither_poses_nor_numbers(fleet_text: Callable[..., str]) -> None:
+    for deployment, spare in (
+        (table_with_spares(2), "ball-3"),
+        (load_deployment(fleet_text(3, "robots.rover02.spare=true"), "hall"), "rover02"),
+    ):
+        drawing = Drawing(deployment)
+        there = initial_frame(deployment)
+        moment, entity = drawing.moment(there), drawing.layout[spare]
+        absent = {name for name, place in drawing.entities.items() if np.isnan(moment.poses[place]).all()}
+        assert absent == drawing.layout.spares and spare in absent
+        its = slice(entity.start, entity.stop)
+        assert moment.values[entity.offsets[ABSENT]] == 1.0
+        assert np.isnan(moment.values[its]).sum() == entity.stop - entity.start - 1
+        assert np.isfinite(moment.values).sum() >= sum(e.stop - e.start for e in drawing.layout.present(there.numbers))
+        values = there.values.copy()
+        values[entity.offsets[ABSENT]] = 0.0
+        assert np.isfinite(drawing.moment(Frame(1, drawing.layout, values)).values[its]).all()
 
 
 def test_poses_of_a_hall(fleet_text: Callable[..., str]) -> None:
@@ -71,17 +96,15 @@ def test_the_commands_of_a_world_are_the_set_points_of_its_actuators(fleet_text:
 
 
 def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str]) -> None:
-    """Units of fields, what can be added where, and how marks of the rules look."""
-    football, hall = table(), load_deployment(fleet_text(2), "hall")
-    layout = build_layout(football, (("new", "ball"), ("ball2", "ball")))
+    """Units of fields, what can leave, and how marks of the rules look."""
+    football, hall = table_with_spares(), load_deployment(fleet_text(2), "hall")
+    layout = build_layout(football)
     shown = scene_content(football, layout, build_scene(football, layout))
     units = {(run["entity"], run["field"]): run["unit"] for run in shown["fields"]}
     assert units["ball", "football.wait_ticks"] == "ticks" and units["ball", "position"] == "m"
     assert units["world", "football.score"] == ""
-    spot = (0.0, 0.0, table_of(football).ball.radius)
-    assert shown["addable"] == [{"model": "ball", "position": spot, "velocity": (0.0, 0.0, 0.0)}]
     bodies = {body["name"]: (body["pushable"], body["removable"]) for body in shown["bodies"]}
-    assert (bodies["ball"], bodies["ball2"], bodies["red.goal"]) == ((True, False), (True, True), (False, False))
+    assert (bodies["ball"], bodies["ball-2"], bodies["red.goal"]) == ((True, False), (True, True), (False, False))
     assert shown["marks"]["goal"] == {"look": "score", "text": "goals", "cut": True}
     assert {name for name, mark in shown["marks"].items() if mark["cut"]} == {
         *("goal", "own_goal", "kickoff", "out", "dead", "end")
@@ -90,8 +113,9 @@ def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str])
     shown = scene_content(hall, layout, build_scene(hall, layout))
     units = {(run["entity"], run["field"]): run["unit"] for run in shown["fields"]}
     rover = [units["rover01", field] for field in ("heading", "wheel_speeds", "wheel_travel", "charge")]
-    assert rover == ["rad", "m/s", "m", "J"] and shown["addable"] == []
-    assert not any(body["pushable"] or body["removable"] for body in shown["bodies"])
+    assert rover == ["rad", "m/s", "m", "J"]
+    can = {body["name"]: (body["robot"], body["pushable"], body["removable"]) for body in shown["bodies"]}
+    assert can == {"base": (True, False, False), **dict.fromkeys(("rover01", "rover02"), (True, False, True))}
     assert shown["marks"] == {
         "empty": {"look": "lost", "text": "empty batteries", "cut": False},
         "failed": {"look": "lost", "text": "forms that failed", "cut": False},

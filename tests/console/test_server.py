@@ -10,7 +10,7 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 
 from foosim.console.server import server
 from foosim.console.server.server import CONNECTIONS_MAX
-from tests.console.memory import Console, MemorySource, console, table
+from tests.console.memory import Console, MemorySource, console, table, table_with_spares
 
 Part = Callable[[Console], Awaitable[None]]
 
@@ -44,10 +44,14 @@ def test_a_browser_gets_scene_and_moment_at_once_and_its_numbers_behind_the_pose
             await browser.say(type="plot", series=[{"id": "z", "field": ball["index"] + 2}], generation=1)
             head, poses, values = await browser.moment()
             assert values.tolist() == [5.0 + ball["index"] + 2]
-            stage.source.turn_to((("ball2", "ball"),))
-            stage.source.show(6)
+            stage.source.describe()
+            stage.source.show(6, jump=True)
+            head, poses, values = await browser.moment()
+            assert (head[4], head[5], len(values)) == (1, 6.0, 1), "the same scene is said once"
+            stage.source.turn_to(table_with_spares())
+            stage.source.show(7, jump=True)
             scene = await browser.hear("scene")
-            assert [body["name"] for body in scene["bodies"] if body["removable"]] == ["ball2"]
+            assert [body["name"] for body in scene["bodies"] if body["removable"]] == ["ball-2"]
             head, poses, values = await browser.moment()
             assert (head[4], len(poses), len(values)) == (2, 18, 0)
 

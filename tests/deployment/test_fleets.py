@@ -130,8 +130,8 @@ def test_places_are_added_exactly_and_rounded_once(start: str, step: str, count:
          ["8:40: robots.r.spacing: unknown key (there are: x, y), 'z'"]),
         ("r: {like: rover, count: 3, spacing: {z: 1 m, y: 1 m}, x: 1 m, y: 1 m}\n  r-3: {z: 4 m, charge: 9 %}",
          ["8:40: robots.r.spacing: unknown key (there are: x, y), 'z'",
-          "9:9: robots.r-3: unknown key (there are: model, tags, sensors, actuators, rules, x, y, heading, charge), "
-          "'z'"]),
+          "9:9: robots.r-3: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y, heading, "
+          "charge), 'z'"]),
         ("r: {like: rover, count: 3, spacing: {x: 1 m}, y: 1 m}", ["8:6: robots.r-1: missing key, 'x'"]),
         ("r: {like: rover, count: 3, x: one, spacing: {x: 1 m}, y: 1 m}",
          ["8:33: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km), 'one'"]),

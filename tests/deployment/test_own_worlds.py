@@ -14,6 +14,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from foosim.common.errors import DeploymentError
+from foosim.common.names import NAME_RULE
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.rehearsal.run import rehearse
@@ -197,8 +198,7 @@ KIT: Final = (
     "    def physics(self): return None",
     "    def findings(self): return iter(())",
     "class Beast(Own):",
-    "    def check_place(self, position, velocity): pass",
-    "    def place_at(self, view, position, velocity): pass",
+    "    pass",
     "class RuleOf(RuleSettings):",
     "    count: int = 1",
     "class Rule(Own): pass",
@@ -206,13 +206,12 @@ KIT: Final = (
     "class InHall(Own): pass",
     "rule('in-hall', RuleSettings, kit='hall')(InHall)",
     "model('beast', RobotSettings, is_robot=False, slots={'position': 3})(Beast)",
-    "class Stone(Own): pass",
-    "model('stone', RobotSettings, is_robot=False)(Stone)",
     "class Crate(Own): pass",
     "model('crate', RobotSettings, is_robot=False, is_rigid=True, couples=False)(Crate)",
 )
 KITS: Final = {
-    "entities={'leo': 'beast'}, addable=('beast',), rules={'feed': {'kind': 'feed', 'count': 2}}": [],
+    "entities={'leo': 'beast'}, rules={'feed': {'kind': 'feed', 'count': 2}}": [],
+    "spares=lambda section: {'egg': 'ball'}": [],
     "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
                                 "are in robots:"],
     "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: "
@@ -229,10 +228,15 @@ KITS: Final = {
     "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: there is no module own_none (it is neither beside the "
                                                "deployment nor on PYTHONPATH), 'own_none:X', nearest is 'own_form:X'"],
     "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
-    "addable=('stone',)": ["what can be added is of the model stone, which has no method check_place and no method "
-                           "place_at and no field position"],
-    "addable=('lion',)": ["what can be added is of a model that is not there: unknown model (there are: "
-                          f"{installed('model')}, or any module:Class), 'lion'"],
+    "spares=lambda section: {'leo': 'lion'}": ["its entity leo is of a model that is not there: unknown model (there "
+                                               f"are: {installed('model')}, or any module:Class), 'lion'"],
+    "spares=lambda section: {'leo': 'beast'}": ["leo, a spare that could not be absent: a beast without a place of its "
+                                                "own"],
+    "spares=lambda section: {'ball-2': 'ball'}": ["its entity ball-2 has a name that is also one of the kit table's"],
+    "spares=lambda section: {'Leo': 'ball'}": [f"spares returns the entity 'Leo': {NAME_RULE}"],
+    "spares=lambda section: ['ball']": ["spares returns a mapping of names to models, not a list of 1"],
+    "spares=lambda section: 1 // 0": ["spares fails: ZeroDivisionError: integer division or modulo by zero "
+                                      "(own_form.py:70)"],
 }  # fmt: skip
 """Kits, and what is said of a table with each."""
 

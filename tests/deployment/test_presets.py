@@ -44,7 +44,7 @@ def test_a_preset_is_a_whole_table(name: str) -> None:
 
 
 def test_the_german_one_is_that_of_the_deployed_table() -> None:
-    assert table("table={preset: german}") == table()
+    assert table("table={preset: german, spare_balls: 2}") == table()
 
 
 def test_a_us_table_has_three_figures_before_the_goal() -> None:

@@ -113,8 +113,8 @@ TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\
           "or any module:Class), 'rovr', "
           "nearest is 'rover'"),
         (("    model: rover", "    model: rover\n    colour: red"),
-         "4:5: templates.rover: unknown key (there are: model, tags, sensors, actuators, rules, x, y, heading, charge)"
-         ", 'colour'"),
+         "4:5: templates.rover: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y, heading, "
+         "charge), 'colour'"),
         (("      pose:", "      echo:"),
          "5:7: robots.r0.sensors: a reserved name, 'echo'"),
         (("    model: rover", "    model: rover\n    heading: 400 deg"),
@@ -238,7 +238,7 @@ def test_the_warehouse_is_what_it_would_be_written_out() -> None:
     assert tree is not None
     data = plain(tree)
     templates = data.pop("templates")
-    rovers = [f"rover{number:02}" for number in range(1, 21)]
+    rovers = [f"rover{number:02}" for number in range(1, 22)]
     assert [name for name in data["robots"] if name != "base"] == rovers
     for section in ("robots", "scenery"):
         for name, entry in data[section].items():
@@ -261,9 +261,9 @@ def test_a_further_rover_of_the_warehouse_is_one_line() -> None:
     text = WAREHOUSE.read_text()
     line = "  rover20: {like: rover, x: 13.75 m, y: -6.25 m, heading: 90 deg, charge: 61 %}\n"
     assert line in text
-    more = load_deployment(text.replace(line, f"{line}  rover21: {{like: rover, x: 17 m, y: -4 m}}\n"), "w")
-    assert more.owners()["rover21"] == "east"
-    assert (more.players["pilot21"].on, more.players["pilot21"].process) == ("rover21", "fleet-east")
+    more = load_deployment(text.replace(line, f"{line}  rover22: {{like: rover, x: 17 m, y: -4 m}}\n"), "w")
+    assert more.owners()["rover22"] == "east"
+    assert (more.players["pilot22"].on, more.players["pilot22"].process) == ("rover22", "fleet-east")
 
 
 def test_the_example_of_the_reference_is_a_deployment() -> None:

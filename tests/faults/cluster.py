@@ -237,9 +237,8 @@ class Cluster:
             verified = verify_capture(self.capture)
             if not verified.equal:
                 raise FaultError(f"the capture differs when it is computed again: {verified}")
-            for block in open_capture(self.capture).frame_blocks:
-                if not np.isfinite(block.values).all():
-                    raise FaultError("the capture has frames with numbers that are not finite")
+            if not np.isfinite(open_capture(self.capture).frames.values).all():
+                raise FaultError("the capture has frames with numbers that are not finite")
             return
         again = rehearse(self.text, "table.yaml", result["ticks"], None, pace=parse_pace("fast")).json
         for figure in ("digest", "packets", "score"):

@@ -251,8 +251,8 @@ def node_joins(trial: Trial) -> Figures:
 def add_bodies(cluster: Cluster) -> None:
     """Fill the table: rows of balls that fall on it."""
     for number in range(ADDED):
-        position = (-0.5 + 0.125 * (number % 9), -0.25 + 0.125 * (number // 9), 0.1)
-        cluster.control.ask("add", position=position)
+        x, y = -0.5 + 0.125 * (number % 9), -0.25 + 0.125 * (number // 9)
+        cluster.control.ask("add", name="ball", at=f"{x:g},{y:g},0.1")
 
 
 class Lost:
@@ -309,7 +309,7 @@ KINDS: Final = (
         "a node comes to a world of 50 bodies",
         node_joins,
         {"join": JOIN_MS},
-        sets=("tick=10 ms", "substeps=20"),
+        sets=("tick=10 ms", "substeps=20", f"table.spare_balls={ADDED}"),
         prepare=add_bodies,
         altered=True,
     ),

@@ -136,6 +136,11 @@ def _yard() -> dict[str, Any]:
         "pace": "fast",
         "scene": {"kind": "boxes", "boxes": {"box": box}},
         "rules": {"corner": {"kind": "zone", "length": "2 m", "width": "2 m", "tag": "vehicle"}},
+        "objects": {
+            "fire": {"model": "fire", "at": {"x": "-1 m", "y": "-2 m"}, "radius": "10 cm", "growth": "1 m/s"},
+            "gate": {"model": "door", "closed": {"x": "3 m", "yaw": "90 deg"}, "travel": "-2 m"},
+        },
+        "events": [{"at": "0.1 s", "entity": "gate", "set": {"open": "70 %"}}],
         "robots": {name: {**robot, "sensors": {}} for name, robot in robots.items()},
         "players": players,
         "nodes": {"n": {"robots": ["*"]}},
@@ -172,6 +177,7 @@ def _solids() -> dict[str, Any]:
         "engine": "mujoco",
         "pace": "fast",
         "scene": {"kind": "empty"},
+        "rules": {"wind": {"kind": "wind", "x": "5 m/s", "z": "-1 m/s"}},
         "objects": objects,
         "robots": robots,
         "players": driver(flyers, "rotor_speeds", (900.0,) * 4, "50 Hz"),
@@ -214,6 +220,17 @@ def _pushed() -> World:
         robot["actuators"] = {"push": {"kind": "force", "force": "20 N", "torque": "0.1 N m"}}
     flyers = list(data["robots"])
     return World(data | {"players": driver(flyers, "force", (20.0, 20.0, 20.0, 0.1, 0.1, 0.1), "50 Hz")})
+
+
+def _gripping() -> World:
+    """Robots on two wheels that take boxes and let them go."""
+    data = json.loads(json.dumps(_drives()))
+    gripper = {"kind": "gripper", "at": {"x": "20 cm", "z": "10 cm"}, "reach": "40 cm"}
+    for robot in data["robots"].values():
+        robot["actuators"] = {"drive": {"kind": "v_w"}, "gripper": gripper}
+    robots = tuple(data["robots"])
+    data["players"]["hands"] = driver(robots, "gripper", (1.0,), "10 Hz")["driver"]
+    return World(data, ("robots", "one", "actuators", "gripper"))
 
 
 def _jointed(kind: str, bounds: Sequence[float]) -> World:
@@ -300,6 +317,7 @@ EARTH: Final = World(HALL.data | {"origin": {"latitude": "52.5 deg", "longitude"
 YARD: Final = World(_yard())
 SOLIDS: Final = World(_solids())
 DRIVES: Final = World(_drives())
+GRIPS: Final = _gripping()
 JOBS: Final = World(_going(), ("robots", "one", "actuators", "go"))
 
 
@@ -336,6 +354,10 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "mover"): World(YARD.data, ("robots", "door")),
     ("model", "rotorcraft"): World(YARD.data, ("robots", "craft")),
     ("motion", "differential_drive"): HALL,
+    ("model", "door"): World(YARD.data, ("objects", "gate")),
+    ("model", "fire"): World(YARD.data, ("objects", "fire")),
+    ("motion", "door"): YARD,
+    ("motion", "fire"): YARD,
     ("motion", "holonomic"): YARD,
     ("motion", "rotorcraft"): YARD,
     ("motion", "track"): YARD,
@@ -348,6 +370,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "motor_current"): sensor(TABLE, RODS, "motor_current", slide="9 N/A", spin="0.2 N m/A"),
     ("sensor", "gps"): sensor(EARTH, ROVERS, "gps", at={"x": "10 cm", "z": "50 cm"}),
     ("sensor", "imu"): sensor(TABLE, RODS, "imu", at={"link": "spin", "x": "5 cm", "y": "20 cm"}),
+    ("sensor", "gripper"): sensor(GRIPS, ("one", "two"), "gripper"),
     ("sensor", "joint_state"): sensor(
         TABLE, RODS, "joint_state", modifiers=[{"kind": "gaussian_noise", "std": {"motion": 0.001, "efforts": 0.5}}]
     ),
@@ -359,8 +382,10 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ),
     ("sensor", "proximity"): sensor(HALL, ROVERS, "proximity", rays=12, range="3 m"),
     ("sensor", "range"): sensor(HALL, ROVERS, "range", range="3 m", cone="30 deg", at={"z": "20 cm"}),
+    ("sensor", "thermometer"): sensor(YARD, ["one", "base", "craft"], "thermometer", at={"z": "20 cm"}),
     ("sensor", "velocity"): sensor(YARD, ["one", "base", "craft"], "velocity", at={"x": "20 cm"}),
     ("actuator", "force"): _pushed(),
+    ("actuator", "gripper"): GRIPS,
     ("actuator", "joint_position"): _jointed("joint_position", (0.1, 2.0)),
     ("actuator", "joint_velocity"): _jointed("joint_velocity", (0.5, 20.0)),
     ("actuator", "rod_force"): _driven("rod_force", (40.0, 0.5)),
@@ -388,7 +413,11 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("modifier", "gaussian_noise"): modifier("gaussian_noise", {"std": {"heading": "1 deg"}}, {"std": "10 mm/s"}),
     ("modifier", "quantise"): modifier("quantise", {"step": {"heading": "1 deg"}}, {"step": "50 mm/s"}),
     ("rule", "football"): TABLE,
+    ("rule", "wind"): World(SOLIDS.data, ("rules", "wind")),
     ("rule", "zone"): World(YARD.data, ("rules", "corner")),
+    ("entity_rule", "burns"): YARD.with_(
+        ("robots", "base", "rules"), {"own": {"kind": "burns", "after": "50 ms"}}, ("robots", "base", "rules", "own")
+    ),
     ("entity_rule", "battery"): YARD.with_(
         ("robots", "base", "rules"),
         {"own": {"kind": "battery", "capacity": "5 J", "idle": "1 W", "drag": "5 N", "chargers": [CHARGER]}},

@@ -92,8 +92,8 @@ def _old_parts(planting: Planting) -> None:
 
 @register("node deals shares its own way", "exactly one solver for each entity at each tick", 1)
 def _own_shares(planting: Planting) -> None:
-    def make_term(self: Any, layout: Any) -> Any:
-        term = before(self, layout)
+    def make_term(self: Any) -> Any:
+        term = before(self)
         if self.name != self.roster[0]:
             object.__setattr__(term.assignment, "roster", (self.name, *self.roster))
         return term
@@ -150,9 +150,9 @@ def _full_outbox(planting: Planting) -> None:
 @register("ready is said once", "hello and ready are said again until they are answered", 2)
 def _ready_once(planting: Planting) -> None:
     def wake(self: Any, now_ns: int, heartbeat: Any) -> None:
-        said, self._said_ready = self._said_ready, None
+        said, self.is_ready = self.is_ready, False
         before(self, now_ns, heartbeat)
-        self._said_ready = self._said_ready or said
+        self.is_ready = self.is_ready or said
 
     before: Any = planting.swap(Member, "wake", wake)
 

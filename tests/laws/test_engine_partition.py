@@ -99,10 +99,9 @@ class Comparison:
     """One world, computed twice at every tick from the same numbers."""
 
     def __init__(self, factory: EngineFactory, sets: Sequence[str] = (), balls: int = 1, parts: int = 3) -> None:
-        text = apply_sets(TABLE.read_text(), "table.yaml", sets)
+        text = apply_sets(TABLE.read_text(), "table.yaml", [*sets, f"table.spare_balls={balls - 1}"])
         self.deployment = load_deployment(text, "table.yaml").with_assets(FILES)
-        added = [(f"extra{index}", "ball") for index in range(balls - 1)]
-        self.layout = build_layout(self.deployment, added)
+        self.layout = build_layout(self.deployment)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.reach = table_reach_of(self.deployment, self.layout)
         self.actuators = {

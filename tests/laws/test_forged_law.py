@@ -30,7 +30,6 @@ NOBODY: Final = "nobody"
 PLAYERS: Final = ("player-blue", "player-red")
 NAN: Final = float("nan")
 INFINITE: Final = float("inf")
-REST: Final = (0.0, 0.0, 0.0)
 
 
 def with_number(raw: bytes, at: int, number: float) -> bytes:
@@ -58,7 +57,7 @@ PARTS: Final[dict[str, Callable[[Any], Any]]] = {
 }
 ORDERS: Final[dict[str, Callable[[Any], Any]]] = {
     "a push that is not finite": lambda order: replace(order, edits=[Push("ball", (NAN, 0.0, 0.0))]),
-    "an addition at infinity": lambda order: replace(order, edits=[Add("b2", "ball", (0.0, INFINITE, 0.0), REST)]),
+    "an addition at infinity": lambda order: replace(order, edits=[Add("ball-2", [0.0, INFINITE])]),
     "another epoch": lambda order: replace(order, epoch=0),
 }
 COMMITS: Final[dict[str, Callable[[Any], Any]]] = {

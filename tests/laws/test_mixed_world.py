@@ -81,6 +81,11 @@ CELL: Final = {
     "drag": "5 N",
     "chargers": [{"tag": "vehicle", "radius": "1 m", "power": "2 W"}],
 }
+WARMTH: Final = {
+    "kind": "thermometer",
+    "rate": "30 Hz",
+    "modifiers": [{"kind": "gaussian_noise", "std": "0.5 degC"}],
+}
 WALK: Final = [{"x": "-5 m", "y": "-2 m"}, {"x": "-5 m", "y": "2 m", "yaw": "180 deg"}]
 
 
@@ -123,8 +128,14 @@ def mixed() -> str:
         "walker": {"model": "mover", "shape": "sphere", "radius": "30 cm", "path": WALK, "speed": "1 m/s"},
     }
     for robot in ("tug", "omni", "craft"):
-        data["robots"][robot]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}}
+        data["robots"][robot]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}, "warmth": WARMTH}
     data["robots"]["omni"]["rules"] = {"own": CELL}
+    data["robots"]["craft"]["rules"] = {"skin": {"kind": "burns", "after": "100 ms"}}
+    data["objects"] = {
+        "door": {"model": "door", "closed": {"x": "-6 m", "y": "1 m"}, "height": "50 cm", "open": "50 %"},
+        "fire": {"model": "fire", "at": {"x": "-3 m", "y": "-4 m"}, "radius": "50 cm", "growth": "3 m/s"},
+    }
+    data["events"] = [{"at": "20 ms", "entity": "door", "set": {"open": True}}]
     for rover, modifiers in OF_COMMANDS.items():
         data["robots"][rover]["actuators"] = {"drive": {"kind": "wheel_speeds", "modifiers": modifiers}}
     data["scene"] = {"kind": "empty"}

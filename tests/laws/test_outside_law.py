@@ -44,7 +44,6 @@ from foosim.protocol.messages import (
     Order,
     Part,
     Piece,
-    Prepare,
     Ready,
     Recall,
     Refusal,
@@ -61,7 +60,6 @@ from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.edits import Edit, Push
 from foosim.world.robot_packets import Delivered, RobotPacket
-from foosim.world.start import AddedEntity
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed
@@ -133,7 +131,7 @@ def lies_to_nodes(system: System) -> list[Lie]:
     part = Part(epoch, tick + 1, "n2", bytes(32), [], b"", b"", [])
     push: list[Edit] = [Push("ball", (1.0, 0.0, 0.0))]
     owners = sorted(core.state.owners.items())
-    new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [], b"")
+    new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, b"")
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.PART, "n2", replace(part, node="n1")),
         (channels.PART, "n2", replace(part, epoch=0)),
@@ -149,9 +147,7 @@ def lies_to_nodes(system: System) -> list[Lie]:
         (channels.EPOCH, SUPERVISOR, replace(new, owners=[*owners, owners[0]])),
         (channels.EPOCH, SUPERVISOR, replace(new, owners=[(robot, NOBODY) for robot, _ in owners])),
         (channels.EPOCH, SUPERVISOR, replace(new, roster=["n1", "n1", "n2"])),
-        (channels.EPOCH, SUPERVISOR, replace(new, added=[AddedEntity("dragon", "dragon")])),
-        (channels.PREPARE, SUPERVISOR, Prepare([AddedEntity("red.goal", "ball")])),
-        (channels.BUILD, "n1", Build("n1", "other", "first", "run", "t", "", "fast", [])),
+        (channels.BUILD, "n1", Build("n1", "other", "first", "run", "t", "", "fast")),
         (channels.REFUSAL, "n1", Refusal("n1", "other", "go away")),
         (channels.PIECE, "n1", Piece("n1", "boot-1", bytes(32), 0, 3, b"lie")),
         (channels.COMMIT, "n1", Commit(epoch, tick, frame.digest, frame.values.tobytes(), [], [], True)),
@@ -180,11 +176,11 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.SAMPLES, "n1", samples),
         (channels.SAMPLES, "n1", replace(samples, tick=FAR)),
         (channels.RESUME_GRANT, VHUB, ResumeGrant(VHUB, "other", FAR)),
-        (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
-        (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
+        (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], b"")),
+        (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
         (channels.WATCHED, SUPERVISOR, Watched([(NOBODY, "dragon")], [("red.goal", "dragon")])),
-        (channels.BUILD, VHUB, Build(VHUB, "other", "first", "run", "t", "", "fast", [])),
+        (channels.BUILD, VHUB, Build(VHUB, "other", "first", "run", "t", "", "fast")),
         (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),
         (channels.PIECE, VHUB, Piece(VHUB, "boot", bytes(32), 0, 3, b"lie")),
         (channels.CLIENT_HELLO, "player-red", ClientHello("player-red", "other", limits.PROTOCOL_VERSION, "", 0)),
@@ -206,7 +202,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
     beat = Heartbeat("n1", FAR, FAR, "", "player-red", float("nan"), b"{}")
     asked: tuple[tuple[str, dict[str, Any]], ...] = (
         ("push", {"impulse": [10**400, 0, 0]}),
-        ("add", {"position": "x"}),
+        ("add", {"name": "ball", "at": "x"}),
         ("dragon", {}),
     )
     said: list[tuple[Channel, str, msgspec.Struct]] = [
@@ -224,7 +220,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (
             channels.RESUME_STATE,
             VHUB,
-            ResumeState(VHUB, "other", "boot", FAR, b"", bytes(32), [], 0, True, True, ""),
+            ResumeState(VHUB, "other", "boot", FAR, b"", bytes(32), 0, True, True, ""),
         ),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
         (channels.HEARTBEAT, "n1", beat),

@@ -18,10 +18,12 @@ from foosim.node.edited_frame import edit
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.edits import Add, Remove, removed
+from foosim.world.edits import Remove
+from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from tests.forms.worlds import HALL, TABLE, World, driver
 from tests.frames import Frames, broken_laws
+from tests.placing import added_ball
 from tests.swarm.faults import PUSH_MAX
 
 NAME: Final = "others.yaml"
@@ -131,17 +133,18 @@ def test_what_comes_under_the_name_of_what_went_in_one_order_is_new() -> None:
     """Its memory, that of rules about it, and references to the old one are gone."""
     deployment = load_deployment(TABLE.text(), NAME)
     start = initial_frame(deployment)
-    edits: list[Any] = [Add("second", "ball", (0.2, 0.0, 0.02), (0.0, 0.0, 0.0))]
-    layout, numbers = edit(start, edits, deployment)
-    waits = layout["second"].offsets["football.still_ticks"]
-    numbers[waits] = 17.0
+    layout = start.layout
+    spare, other = layout["ball-2"], layout["ball"].offsets["football.touched_by"]
+    numbers, _ = edit(start, [added_ball(layout, "ball-2", (0.2, 0.0, 0.02))], deployment)
+    waits = spare.offsets["football.still_ticks"]
+    numbers[waits], numbers[other] = 17.0, float(spare.index)
     frame = Frame(1, layout, np.array(numbers))
-    again: list[Any] = [Remove("second"), Add("second", "ball", (0.1, 0.1, 0.02), (0.0, 0.0, 0.0))]
-    assert removed(layout, again) == {"second"}
-    same, after = edit(frame, again, deployment)
-    assert same is layout and after[waits] == 0.0
-    assert after[layout["second"].offsets["position"]] == 0.1
-    assert after[: layout["second"].start] == numbers[: layout["second"].start]
+    again: list[Any] = [Remove("ball-2"), added_ball(layout, "ball-2", (0.1, 0.1, 0.02))]
+    after, moved = edit(frame, again, deployment)
+    assert moved == [spare, spare] and after[waits] == 0.0 and after[other] == NO_ENTITY
+    assert after[spare.offsets["position"]] == 0.1
+    numbers[other] = NO_ENTITY
+    assert after[: spare.start] == numbers[: spare.start] and after[spare.stop :] == numbers[spare.stop :]
 
 
 def test_a_state_that_cannot_be_is_said_once_with_what_it_is() -> None:

@@ -324,12 +324,34 @@ def test_with_freeze_the_robots_of_a_lost_node_are_down_until_it_is_back() -> No
     assert run.json["reason"] == "done" and not run.json["failed"]
 
 
+def test_with_freeze_an_operators_down_holds_when_the_node_is_back() -> None:
+    """Set before the loss, and while the robot is down by it; what is set to be up runs at once."""
+    down: list[list[str]] = []
+
+    def look(system: System) -> None:
+        frame = system.supervisor.state.frame
+        down.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
+
+    its: list[str] = []
+
+    def note(system: System) -> None:
+        its.extend(sorted(robot for robot, owner in system.supervisor.state.owners.items() if owner == "n2"))
+
+    def put(number: int, value: bool) -> Callable[[System], object]:
+        return lambda system: system.request("set", name=its[number], field="down", value=value)
+
+    faults: list[Fault] = [(10, note), (20, put(0, True)), (40, kill("n2")), (60, put(1, True)), (60, put(2, False))]
+    run = disturbed([*faults, (90, look), (100, start("n2")), (200, look)], sets=(*PURE, "on_node_loss=freeze"))
+    assert down == [[*its[:2], *its[3:]], its[:2]]
+    assert run.json["reason"] == "done" and not run.json["failed"]
+
+
 def test_a_ball_that_is_added_while_a_node_is_lost() -> None:
     faults: list[Fault] = [
-        (50, lambda system: system.request("add", name="b2", position=[0.1, 0.0, 0.02])),
+        (50, lambda system: system.request("add", name="ball", at="0.1,0,0.02")),
         (50, kill("n2")),
         (150, start("n2")),
-        (200, lambda system: system.request("remove", name="b2")),
+        (200, lambda system: system.request("remove", name="ball-2")),
         (203, kill("n3")),
     ]
     run = disturbed(faults)

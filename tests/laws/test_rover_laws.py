@@ -150,22 +150,29 @@ def test_the_rovers_of_a_node_that_is_lost_can_brake_and_wait_for_it(text: str) 
     assert max(speeds(240, lost)) > 0.3 and not any(frames[240].at(name, "down") for name in lost)
 
 
+REFUSED: Final[tuple[tuple[str, dict[str, Any]], ...]] = (
+    ("add", {"name": "ball"}),
+    ("push", {"impulse": [0.1, 0.0, 0.0]}),
+    ("remove", {"name": "base"}),
+)
+
+
 def test_what_is_of_a_table_is_refused_in_a_hall(text: str) -> None:
     systems: list[System] = []
     asked: list[str] = []
 
     def prepare(system: System) -> None:
         systems.append(system)
-        for verb, arguments in (("add", {}), ("push", {"impulse": [0.1, 0.0, 0.0]}), ("remove", {"name": "rover01"})):
+        for verb, arguments in REFUSED:
             system.at_tick(20, partial(lambda v, a: asked.append(system.request(v, **a)), verb, arguments))
 
     assert not rehearse(text, "hall.yaml", 60, 2, prepare=prepare).json["failed"]
     refused = [systems[0].answers[identity] for identity in asked]
     assert not any(answer.accepted for answer in refused)
     assert [answer.text for answer in refused] == [
-        "nothing can be added to this world: no kit of it says of what there can be more",
+        f"nothing to add (there are: {', '.join(f'rover{number:02}' for number in range(1, ROVERS + 1))}), 'ball'",
         "nothing can be pushed: this world has no free bodies",
-        "'rover01' cannot be removed: only what was added can, and nothing was",
+        "base is always in the world: what is fixed, or belongs to a kit, neither comes nor goes",
     ]
 
 

@@ -31,6 +31,7 @@ TICKS: Final = 300
 SEED: Final = 7
 NAME: Final = "yard.yaml"
 RULES: Final = {"battery": {"kind": "battery", "capacity": "1 kJ", "idle": "5 W"}}
+SENSORS: Final = {"pose": {"kind": "pose", "rate": "50 Hz"}}
 BOX: Final = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg"}
 
 
@@ -41,7 +42,7 @@ def text(events: list[dict[str, Any]]) -> str:
         "w-1": {**wheels, "at": {"x": "-3 m"}},
         "w-2": {**wheels, "at": {"x": "-3 m", "y": "2 m"}},
         "k-1": {"model": "holonomic", "at": {"x": "3 m"}, "rules": RULES},
-        "k-2": {"model": "holonomic", "at": {"x": "3 m", "y": "2 m"}, "rules": RULES},
+        "k-2": {"model": "holonomic", "at": {"x": "3 m", "y": "2 m"}, "rules": RULES, "sensors": SENSORS},
     }
     objects = {f"b-{number}": {**BOX, "at": {"z": f"{10 + 20 * number} cm"}} for number in range(3)}
     return yard_text(robots, engine="mujoco", substeps=4, objects=objects, events=events)
@@ -58,7 +59,7 @@ def drawn_events() -> list[dict[str, Any]]:
             {"entity": f"b-{draw.randrange(3)}", "set": {"at": {"x": f"{draw.uniform(-2, 2):.2f} m", "yaw": "30 deg"}}},
             {"choose": "1 of k-*" if number % 2 else "2 of w-*", "set": {"down": bool(number % 5)}},
             {"choose": "1 of k-*", "set": {"battery.charge": f"{draw.randrange(101)} %", "at": pose}},
-            {"entity": f"w-{draw.randrange(1, 3)}", "set": {"at": pose}},
+            {"entity": f"w-{draw.randrange(1, 3)}", "set": {"at": pose, "motion.active": number % 3 == 0}},
         ]
         events.append({**when, **what[number % 4]})
     return events
@@ -130,6 +131,41 @@ def test_a_simulation_sets_what_an_event_sets(tmp_path: Path) -> None:
     assert digests[0] == digests[1]
 
 
+def test_a_component_that_is_switched_off_does_nothing_until_it_is_switched_on() -> None:
+    """The drive holds and refuses commands, the sensor does not measure; each alone."""
+    moves = {"k-2": {"x": 0.5, "y": 0.0, "angular": 0.0}}
+    with Simulation(load_deployment(text([]), NAME)) as simulation:
+        for field, is_moving, is_measured in (
+            ("", True, True),
+            ("motion.active", False, True),
+            ("pose.active", False, False),
+        ):
+            if field:
+                simulation.set("k-2", field, False)
+                simulation.step(ticks=100)
+            before = state_of(simulation)
+            simulation.step(moves, ticks=10)
+            after = state_of(simulation)
+            assert [one > other for one, other in zip(after, before, strict=True)] == [
+                is_moving,
+                not is_moving,
+                is_measured,
+            ]
+        simulation.set("k-2", "motion.active", True)
+        simulation.set("k-2", "pose.active", True)
+        before = state_of(simulation)
+        simulation.step(moves, ticks=1)
+        simulation.step(moves, ticks=9)
+        after = state_of(simulation)
+        assert after[0] > before[0] and after[2] > before[2] and simulation.frame.at("k-2", "inactive") == 0.0
+
+
+def state_of(simulation: Simulation) -> tuple[float, float, int]:
+    """The x of a robot, how many commands it has refused, the number of its newest reading."""
+    frame = simulation.frame
+    return frame.at("k-2", "position"), frame.at("k-2", "refused"), simulation.readings["k-2", "pose"].sequence
+
+
 @pytest.mark.parametrize("gives", [{"charge": [1.0, 2.0]}, {"charge": [nan]}, {"full": [1.0]}, None])
 def test_a_component_that_gives_no_numbers_of_its_slots_is_an_error_of_it(
     gives: object, monkeypatch: pytest.MonkeyPatch
@@ -167,7 +203,7 @@ REFUSED: Final = (
     ("k-1", "at", "3", "valid are X,Y or X,Y,Z"),
     ("k-1", "at", {"x": "3 s"}, "not a length"),
     ("k-1", "down", "yes", "neither true nor false"),
-    ("k-1", "dwon", True, "not settable on k-1: settable are down, at, battery.charge"),
+    ("k-1", "dwon", True, "not settable on k-1: settable are down, at, motion.active, battery.charge"),
     ("k-1", "battery.charge", "120 %", "out of range 0 % to 100 %"),
     ("b-9", "at", "0,0", "no entity 'b-9'; there are b-0, "),
 )

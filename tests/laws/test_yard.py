@@ -84,6 +84,7 @@ def yard() -> str:
             "seed": 1,
             "tick": "10 ms",
             "substeps": 4,
+            "rules": {"breeze": {"kind": "wind", "x": "30 cm/s", "z": "10 cm/s"}},
             "engine": "mujoco",
             "pace": "fast",
             "assets": "models",

@@ -25,6 +25,7 @@ from foosim.world.layout import Entity, Layout, build_layout
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
+BODIES: Final = {entity.name for entity in LAYOUT.entities if entity.is_solved and entity.name not in LAYOUT.spares}
 TICKS: Final = 1000
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s")
 
@@ -56,7 +57,7 @@ def counted(nodes: int) -> tuple[Rehearsed, dict[str, list[set[str]]], dict[str,
         if traced.what == "publish" and traced.channel == PART.name:
             part = decode(Part, traced.payload)
             entities = (LAYOUT.entities[index] for index in part.solved)
-            solved.setdefault(part.node, {})[part.tick] = {entity.name for entity in entities if entity.is_solved}
+            solved.setdefault(part.node, {})[part.tick] = BODIES & {entity.name for entity in entities}
 
     def prepare(system: System) -> None:
         for name, solver in system.solvers.items():
@@ -74,10 +75,9 @@ def counted(nodes: int) -> tuple[Rehearsed, dict[str, list[set[str]]], dict[str,
 def test_each_engine_loads_what_its_node_solves_and_every_body_is_loaded_once(nodes: int) -> None:
     result, loads, solved = counted(nodes)
     assert result.json["handovers"] > 1, "else nothing was handed over"
-    bodies = {entity.name for entity in LAYOUT.entities if entity.is_solved}
     for tick in range(1, TICKS + 1):
         shares = [solved[node][tick] for node in sorted(solved)]
-        assert sorted(name for share in shares for name in share) == sorted(bodies), tick
+        assert sorted(name for share in shares for name in share) == sorted(BODIES), tick
     for node, parts in solved.items():
         expected = [share for _, share in sorted(parts.items()) if share]
         assert loads[node] == expected, node

@@ -129,10 +129,10 @@ def test_what_is_not_asked_for_is_left_as_it_is(engine: Engine) -> None:
 def test_balls_meet_with_the_values_of_their_pair(kind: str, restitution: float, friction: float) -> None:
     """Head-on, one of the two spinning. The impulse of friction is friction x impulse while they slip."""
     balls = f"table.surfaces.balls={{restitution: {restitution}, friction: {friction}}}"
-    sets = [f"engine={kind}", "table.contact_erp=0", "table.gravity=0 m/s2", balls]
+    sets = [f"engine={kind}", "table.contact_erp=0", "table.gravity=0 m/s2", balls, "table.spare_balls=1"]
     deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
-    layout = build_layout(deployment, [("ball2", "ball")])
-    pair = [layout["ball"], layout["ball2"]]
+    layout = build_layout(deployment)
+    pair = [layout["ball"], layout["ball-2"]]
     numbers = initial_numbers(deployment, layout)
     for ball, side in zip(pair, (-1.0, 1.0), strict=True):
         place_ball(numbers, ball, (0.03 * side, 0.05, 0.1), (-2.0 * side, 0.0, 0.0))

@@ -159,7 +159,8 @@ class World:
         stepper = Stepper(self.deployment, self.layout, is_watched=is_watched)
         frame = Frame(tick, self.layout, np.array(initial_numbers(self.deployment, self.layout)))
         stepper.sense(frame, self.layout.robots)
-        layout, numbers = stepper.edited(frame, [])
+        layout = self.layout
+        numbers, _ = stepper.edited(frame, [], {})
         solved = tuple(entity.index for entity in layout.entities if entity.is_solved)
         bodies = tuple(layout.entities[index] for index in solved)
         packet = Delivered(0, "hand", 0, 0, "red.goal", "motors", np.array([0.01, 0.5]).tobytes())

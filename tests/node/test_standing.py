@@ -58,7 +58,8 @@ class Node:
         self.solved = 0
 
     def tick(self, packets: list[Delivered], throw: tuple[Any, Any] | None = None) -> list[float]:
-        layout, numbers = self.stepper.edited(self.frame, [])
+        layout = self.layout
+        numbers, _ = self.stepper.edited(self.frame, [], {})
         if throw is not None:
             place_ball(numbers, layout["ball"], *throw)
         share = self.assignment.shares(numbers)["n"]
@@ -105,6 +106,6 @@ def test_an_edit_wakes_it() -> None:
     assert one.frame.at("red.goal", "unmoved") == 1.0
     numbers = list(one.frame.numbers)
     numbers[one.layout["red.goal"].offsets["joint_velocities"]] = 0.1
-    one.stepper._standing.wake_edited(one.frame, one.layout, numbers)
+    one.stepper._standing.wake_edited(one.frame, numbers)
     assert numbers[one.layout["red.goal"].offsets["unmoved"]] == 0.0
     assert numbers[one.layout["blue.goal"].offsets["unmoved"]] == 1.0

@@ -12,35 +12,38 @@ import numpy as np
 import pytest
 
 from foosim.common.errors import Malformed
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.node.due_sensors import DueSensors
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.edits import Add, Edit, Push, Remove, check_edits
+from foosim.world.edits import Add, Edit, Push, Remove, Set, check_edits
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
-from tests.placing import place_ball
+from tests.placing import added_ball, place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 STEPPER: Final = Stepper(DEPLOYMENT, LAYOUT)
+SPARES: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=2"]), TABLE.name)
+WITH_SPARES: Final = build_layout(SPARES)
+SPARE: Final = Stepper(SPARES, WITH_SPARES)
 EVERY: Final = tuple(range(len(LAYOUT.entities)))
 MASS: Final = table_of(DEPLOYMENT).ball.mass
 HERE: Final = (0.1, -0.2, 0.03)
 THERE: Final = (1.0, 2.0, -3.0)
-REST: Final = (0.0, 0.0, 0.0)
 
 
-def in_play(layout: Layout = LAYOUT, tick: int = 7) -> Frame:
-    """A frame in which the ball rolls and a rod turns, so that nothing is zero by chance; the match is over, so that no
-    clock counts."""
-    numbers = initial_numbers(DEPLOYMENT, layout)
-    for number, ball in enumerate(layout.of("ball")):
+def in_play(deployment: Deployment = DEPLOYMENT, layout: Layout = LAYOUT, tick: int = 7, balls: int = 1) -> Frame:
+    """A frame in which so many balls roll and a rod turns, so that nothing is zero by chance; the match is over, so
+    that no clock counts."""
+    numbers = initial_numbers(deployment, layout)
+    for number, ball in enumerate(layout.of("ball")[:balls]):
         place_ball(numbers, ball, (0.2 - 0.1 * number, 0.1, 0.0175), (-1.5, 0.3, 0.0))
     numbers[layout["red.goal"].offsets["joint_velocities"]] = 0.4
     numbers[layout["world"].offsets["football.is_over"]] = 1.0
@@ -74,9 +77,9 @@ def test_who_measures_is_worked_out_once_for_robots_that_stay(monkeypatch: pytes
     stepper, frame = Stepper(DEPLOYMENT, LAYOUT), in_play(tick=5)
     made: list[Sequence[Entity]] = []
 
-    def counted(robots: Sequence[Entity], sensors: Any) -> DueSensors:
+    def counted(robots: Sequence[Entity], sensors: Any, switches: Any) -> DueSensors:
         made.append(robots)
-        return DueSensors(robots, sensors)
+        return DueSensors(robots, sensors, switches)
 
     monkeypatch.setattr("foosim.node.tick.DueSensors", counted)
     first, _ = stepper.sense(frame, LAYOUT.robots)
@@ -89,62 +92,45 @@ def test_who_measures_is_worked_out_once_for_robots_that_stay(monkeypatch: pytes
 # --- what an order does ----------------------------------------------------------------------------------------------
 
 
-def test_a_layout_that_is_equal_has_its_world_already(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each commit that comes by the wire brings a layout of its own; a world is made for one that differs."""
-
-    def made(*_: object, **more: object) -> None:
-        raise AssertionError("a world is made in a tick")
-
-    monkeypatch.setattr("foosim.node.tick.World", made)
-    equal = build_layout(DEPLOYMENT)
-    frame = Frame(0, equal, np.array(initial_numbers(DEPLOYMENT, equal)))
-    layout, _ = STEPPER.edited(frame, [])
-    assert layout is equal and equal is not STEPPER.layout
-    with pytest.raises(AssertionError, match="a world is made"):
-        STEPPER.edited(frame, [Add("a2", "ball", HERE, REST)])
-
-
 def test_without_edits_and_rules_at_work_the_frame_is_as_it_was() -> None:
     frame = in_play()
-    layout, numbers = STEPPER.edited(frame, [])
-    assert layout is LAYOUT and numbers is not frame.numbers
+    numbers, _ = STEPPER.edited(frame, [], {})
+    assert numbers is not frame.numbers
     assert unclocked(numbers, LAYOUT) == unclocked(frame.numbers, LAYOUT)
 
 
+def others_are_as_they_were(numbers: list[float], frame: Frame, name: str) -> None:
+    for entity in frame.layout.entities:
+        if entity.name not in (name, "world"):  # its clock goes on
+            assert numbers[entity.start : entity.stop] == frame.numbers[entity.start : entity.stop], entity.name
+
+
 def test_an_added_ball_is_there_at_once() -> None:
-    frame = in_play()
-    layout, numbers = STEPPER.edited(frame, [Add("a2", "ball", HERE, THERE)])
-    assert layout.digest == build_layout(DEPLOYMENT, [("a2", "ball")]).digest
-    assert slots(numbers, layout, "a2", "position", 3) == list(HERE)
-    assert slots(numbers, layout, "a2", "linear_velocity", 3) == list(THERE)
-    assert slots(numbers, layout, "a2", "orientation", 4) == [0.0, 0.0, 0.0, 1.0]
-    for entity in LAYOUT.entities:
-        moved = layout[entity.name]
-        if entity.name == "world":
-            continue  # its clock goes on
-        assert numbers[moved.start : moved.stop] == frame.numbers[entity.start : entity.stop], entity.name
+    frame = in_play(SPARES, WITH_SPARES)
+    numbers, _ = SPARE.edited(frame, [added_ball(WITH_SPARES, "ball-2", HERE, THERE)], {})
+    assert WITH_SPARES["ball-2"].is_absent(frame.numbers) and not WITH_SPARES["ball-2"].is_absent(numbers)
+    assert slots(numbers, WITH_SPARES, "ball-2", "position", 3) == list(HERE)
+    assert slots(numbers, WITH_SPARES, "ball-2", "linear_velocity", 3) == list(THERE)
+    assert slots(numbers, WITH_SPARES, "ball-2", "orientation", 4) == [0.0, 0.0, 0.0, 1.0]
+    others_are_as_they_were(numbers, frame, "ball-2")
 
 
-def test_a_removed_ball_is_gone_and_the_others_stay() -> None:
-    bigger = build_layout(DEPLOYMENT, [("a2", "ball"), ("c2", "ball")])
-    frame = in_play(bigger)
-    layout, numbers = Stepper(DEPLOYMENT, bigger).edited(frame, [Remove("a2")])
-    assert "a2" not in layout and layout.size == bigger.size - (bigger["a2"].stop - bigger["a2"].start)
-    for entity in layout.entities:
-        old = bigger[entity.name]
-        if entity.name == "world":
-            continue  # its clock goes on
-        assert numbers[entity.start : entity.stop] == frame.numbers[old.start : old.stop], entity.name
+def test_a_removed_ball_is_as_it_was_before_it_was_added_and_the_others_stay() -> None:
+    frame = in_play(SPARES, WITH_SPARES, balls=3)
+    numbers, _ = SPARE.edited(frame, [Remove("ball-2")], {})
+    gone, never = WITH_SPARES["ball-2"], initial_numbers(SPARES, WITH_SPARES)
+    assert numbers[gone.start : gone.stop] == never[gone.start : gone.stop] and gone.is_absent(numbers)
+    others_are_as_they_were(numbers, frame, "ball-2")
 
 
 def test_a_push_is_impulse_over_mass_and_adds_up() -> None:
     frame = in_play()
     impulse = (0.021, -0.0042, 0.0)
-    _, once = STEPPER.edited(frame, [Push("ball", impulse)])
+    once, _ = STEPPER.edited(frame, [Push("ball", impulse)], {})
     before = frame.vector("ball", "linear_velocity", 3)
     expected = [v + p / MASS for v, p in zip(before, impulse, strict=True)]
     assert slots(once, LAYOUT, "ball", "linear_velocity", 3) == expected
-    _, twice = STEPPER.edited(frame, [Push("ball", impulse), Push("ball", impulse)])
+    twice, _ = STEPPER.edited(frame, [Push("ball", impulse), Push("ball", impulse)], {})
     assert slots(twice, LAYOUT, "ball", "linear_velocity", 3) == [
         v + p / MASS for v, p in zip(expected, impulse, strict=True)
     ]
@@ -155,30 +141,40 @@ def test_a_push_is_impulse_over_mass_and_adds_up() -> None:
 
 
 def test_edits_apply_in_their_order() -> None:
-    _, numbers = STEPPER.edited(in_play(), [Add("a2", "ball", HERE, REST), Push("a2", (MASS, 0.0, 0.0))])
-    layout = build_layout(DEPLOYMENT, [("a2", "ball")])
-    assert slots(numbers, layout, "a2", "linear_velocity", 3) == [1.0, 0.0, 0.0]
+    edits: list[Edit] = [added_ball(WITH_SPARES, "ball-2", HERE), Push("ball-2", (MASS, 0.0, 0.0))]
+    numbers, _ = SPARE.edited(in_play(SPARES, WITH_SPARES), edits, {})
+    assert slots(numbers, WITH_SPARES, "ball-2", "linear_velocity", 3) == [1.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
     "edit",
-    [Add("ball", "ball", HERE, THERE), Push("red.goal", HERE), Push("nobody", HERE), Remove("ball")],
-    ids=lambda edit: type(edit).__name__,
+    [
+        added_ball(WITH_SPARES, "ball", HERE),
+        added_ball(WITH_SPARES, "ball-3", HERE),
+        Add("ball-2", [0.0]),
+        Push("red.goal", HERE),
+        Push("ball-2", HERE),
+        Push("nobody", HERE),
+        Remove("ball"),
+        Remove("ball-2"),
+        Set("ball-2", "position", [*HERE]),
+        Set("ball", "position", [1.0]),
+    ],
+    ids=lambda edit: f"{type(edit).__name__} {edit.name}",
 )
 def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
-    frame = in_play()
-    layout, numbers = STEPPER.edited(frame, [edit])
-    assert layout is LAYOUT and unclocked(numbers, LAYOUT) == unclocked(frame.numbers, LAYOUT)
+    """`ball` and `ball-3` are in the world, `ball-2` is not."""
+    numbers = in_play(SPARES, WITH_SPARES).numbers
+    place_ball(numbers, WITH_SPARES["ball-3"], (-0.2, -0.1, 0.0175))
+    frame = Frame(7, WITH_SPARES, np.array(numbers))
+    edited, _ = SPARE.edited(frame, [edit], {})
+    assert unclocked(edited, WITH_SPARES) == unclocked(numbers, WITH_SPARES)
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 def test_edits_with_numbers_that_are_not_finite_are_malformed(bad: float) -> None:
-    check_edits([Add("a2", "ball", HERE, THERE), Push("ball", HERE), Remove("a2")])
-    wrong: list[Edit] = [
-        Add("a2", "ball", (0.0, bad, 0.0), REST),
-        Add("a2", "ball", HERE, (0.0, 0.0, bad)),
-        Push("ball", (bad, 0.0, 0.0)),
-    ]
+    check_edits([Add("a2", [*HERE]), Push("ball", HERE), Remove("a2")])
+    wrong: list[Edit] = [Add("a2", [0.0, bad]), Push("ball", (bad, 0.0, 0.0)), Set("ball", "position", [bad])]
     for edit in wrong:
         with pytest.raises(Malformed, match="not finite"):
             check_edits([Remove("a2"), edit])
@@ -261,7 +257,7 @@ def test_a_share_without_bodies_needs_no_engine() -> None:
 def test_the_frame_that_a_tick_starts_from_is_not_touched() -> None:
     frame = in_play()
     digest, raw = frame.digest, frame.values.tobytes()
-    layout, numbers = STEPPER.edited(frame, [Push("ball", HERE)])
+    numbers, _ = STEPPER.edited(frame, [Push("ball", HERE)], {})
     STEPPER.deliver([delivered("red.goal", command(0.01, 1.0))], EVERY, numbers, 7)
-    STEPPER.sense(frame, layout.robots)
+    STEPPER.sense(frame, LAYOUT.robots)
     assert frame.values.tobytes() == raw and Frame(frame.tick, LAYOUT, np.array(frame.numbers)).digest == digest

@@ -32,13 +32,13 @@ STILL: Final = "table.gravity=0 m/s2"
 
 
 class Driven:
-    """The table, of which one rod is driven; of two balls the second is called `also`."""
+    """The table, of which one rod is driven; which has so many balls."""
 
     def __init__(self, engine: str, actuator: str, *sets: str, rod: str = "red.goal", balls: int = 1) -> None:
         own = [f"robots.{rod}.actuators={{motors: {actuator}}}", *sets]
-        own += [f"engine={engine}"]
+        own += [f"engine={engine}", f"table.spare_balls={balls - 1}"]
         self.deployment = load_deployment(apply_sets(TEXT, TABLE.name, own), TABLE.name)
-        self.layout = build_layout(self.deployment, [("also", "ball")][: balls - 1])
+        self.layout = build_layout(self.deployment)
         self.rod, self.table = self.layout[rod], table_of(self.deployment)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.stepper = Stepper(self.deployment, self.layout)

@@ -91,7 +91,7 @@ def test_a_member_asks_until_all_is_there_and_lives_meanwhile(pinned: str) -> No
     """Every second message is lost; what is for another boot, or comes twice, changes nothing."""
     actions: list[Action] = []
     member = Member("node", "n1", "boot", bytes(32), "", actions, 0)
-    build = Build("n1", "boot", "super", "run", "t", pinned, "fast", [])
+    build = Build("n1", "boot", "super", "run", "t", pinned, "fast")
     assert [(member.take_build(given), member.is_fetching) for given in (replace(build, boot="other"), build)] == [
         (False, False),
         (False, True),
@@ -123,7 +123,7 @@ def test_a_member_asks_until_all_is_there_and_lives_meanwhile(pinned: str) -> No
 
 def test_a_member_that_begins_anew_in_between_starts_over(pinned: str) -> None:
     member = Member("node", "n1", "boot", bytes(32), "", [], 0)
-    build = Build("n1", "boot", "super", "run", "t", pinned, "fast", [])
+    build = Build("n1", "boot", "super", "run", "t", pinned, "fast")
     member.take_build(build)
     member.begin_anew()
     assert not member.is_fetching

@@ -27,13 +27,15 @@ from foosim.console.report.collect import Report, gather
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
 from foosim.vhub.recording import writer as capture_writer
+from foosim.world.edits import Add
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
 TICK_NS: Final = 2_000_000
 ADDED_AT: Final = 60
-SETS: Final = ("engine=pure", *(text for text in BY_PERIOD if "player-blue" in text))
+SPARE: Final = "table.spare_balls=1"
+SETS: Final = ("engine=pure", SPARE, *(text for text in BY_PERIOD if "player-blue" in text))
 """One player acts at arrival, the other at ticks of its own."""
 
 NETWORK: Final = (
@@ -48,12 +50,18 @@ CLOG: Final = {"clog": {"from": "player-blue", "to": "*"}, "for": "50 ms"}
 
 def disturb(system: System) -> None:
     system.at_tick(20, lambda: system.request("push", impulse=[0.03, 0.01, 0.0]))
-    system.at_tick(ADDED_AT, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(ADDED_AT, lambda: system.request("add", name="ball", at="0.2,0.1,0.05"))
 
 
 def capture_to(path: Path, ticks: int = TICKS) -> Path:
     rehearse(TABLE.read_text(), TABLE.name, ticks, 2, SETS, prepare=disturb, capture=path)
     return path
+
+
+def added_tick(path: Path) -> int:
+    """The tick of the first frame of a capture in which a ball is added."""
+    ticks = open_capture(path).captured_ticks()
+    return next(tick.tick for tick in ticks if any(isinstance(edit, Add) for edit in tick.edits))
 
 
 @pytest.fixture(scope="session")
@@ -75,15 +83,15 @@ def disrupt(system: System) -> None:
     system.at_tick(20, lambda: system.request("push", impulse=[0.02, 0.0, -0.01]))
     system.at_tick(40, lambda: system.request("move", robot="red.goal", node="n2"))
     system.at_tick(60, lambda: system.request("network", event=CLOG))
-    system.at_tick(70, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
-    system.at_tick(150, lambda: system.request("remove", name="ball2"))
+    system.at_tick(70, lambda: system.request("add", name="ball", at="0.2,0.1,0.05"))
+    system.at_tick(150, lambda: system.request("remove", name="ball-2"))
 
 
 @pytest.fixture(scope="session")
 def radio_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of 0.4 s over radio with places, a partition, changed settings and a clog that was asked for."""
     path = tmp_path_factory.mktemp("report") / "radio.mcap"
-    rehearse(TABLE.read_text(), TABLE.name, 200, 2, ["engine=pure", NETWORK], prepare=disrupt, capture=path)
+    rehearse(TABLE.read_text(), TABLE.name, 200, 2, ["engine=pure", SPARE, NETWORK], prepare=disrupt, capture=path)
     return path
 
 

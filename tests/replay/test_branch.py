@@ -15,6 +15,7 @@ from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app as rehearse_app
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.rehearsal.resimulation import Replica
 from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
@@ -23,10 +24,11 @@ from foosim.supervisor import records
 from foosim.vhub.state.records import fold
 from foosim.world.assembly.initial_state import first_frame, start_with
 from foosim.world.frame import Frame
-from foosim.world.start import AddedEntity, Start
+from foosim.world.start import Start
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT = TABLE.read_text()
+SPARE = "table.spare_balls=1"
+TEXT = apply_sets(TABLE.read_text(), TABLE.name, [SPARE])
 TICKS = 300
 PUSHED_AT, ADDED_AT, PUSHED_AGAIN_AT = 20, 60, 160
 
@@ -38,7 +40,7 @@ def push(system: System) -> None:
 def disturbed(system: System) -> None:
     """Ask for what changes the world, before and behind where the branch begins."""
     system.at_tick(PUSHED_AT, lambda: push(system))
-    system.at_tick(ADDED_AT, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(ADDED_AT, lambda: system.request("add", name="ball", at="0.2,0.1,0.05"))
     system.at_tick(PUSHED_AGAIN_AT, lambda: push(system))
 
 
@@ -69,7 +71,8 @@ def test_a_branch_with_the_same_inputs_is_the_run_that_it_left(captured: Capture
     """Digests and chain, on another number of nodes, with an added ball in the world."""
     start = start_of(captured.alone, "0.215 s")
     tick = start.origin.tick
-    assert tick == 100 and [added.name for added in start.added] == ["ball2"]
+    frame = first_frame(load_deployment(TEXT, TABLE.name), start)
+    assert tick == 100 and not frame.layout["ball-2"].is_absent(frame.numbers)
     branch = tmp_path / "branch.mcap"
     told: list[tuple[str, bytes]] = []
     settings = Settings(on_journal=lambda process, record: told.append((process, record)))
@@ -160,6 +163,13 @@ def refusals(captured: Captured, tmp_path: Path) -> Iterator[tuple[str, str, str
     yield f"{alone}@0.1s", loop, f"does not fit the capture: components of red.goal are {have}, {want}"
 
 
+def with_eye() -> Deployment:
+    """The deployment with another name of its camera: its frames have as many numbers."""
+    text = TABLE.read_text().replace("  camera:\n    model: camera", "  eye:\n    model: camera")
+    text = text.replace("      - camera\n", "      - eye\n")
+    return load_deployment(apply_sets(text, "other.yaml", ["players={}", SPARE]), "other.yaml")
+
+
 def test_what_does_not_fit_is_refused_by_name(captured: Captured, tmp_path: Path) -> None:
     for what, changed, text in refusals(captured, tmp_path):
         sets = ["players={}", *([changed] if changed else [])]
@@ -167,31 +177,25 @@ def test_what_does_not_fit_is_refused_by_name(captured: Captured, tmp_path: Path
         with pytest.raises((BadValue, BadBranch), match=text) as caught:
             read_branch(what, deployment)
         assert caught.value.exit_code == 2
-    smaller = TEXT.replace("  camera:\n    model: camera", "  eye:\n    model: camera").replace(
-        "      - camera\n", "      - eye\n"
-    )
-    deployment = load_deployment(apply_sets(smaller, "other.yaml", ["players={}"]), "other.yaml")
     with pytest.raises(
         BadValue, match="does not fit the capture: it lacks camera camera; the capture has no camera eye"
     ):
-        read_branch(f"{captured.alone}@0.1s", deployment)
+        read_branch(f"{captured.alone}@0.1s", with_eye())
 
 
 def test_a_start_that_does_not_fit_is_refused_where_it_is_used(captured: Captured) -> None:
-    deployment = load_deployment(TEXT, TABLE.name)
-    frame: Frame = open_capture(captured.alone).frame_blocks[-1].frame(0)
-    start = start_with(frame, "x.mcap", bytes(32), [])
+    frame: Frame = open_capture(captured.alone).frames.frame(0)
+    start = start_with(frame, "x.mcap", bytes(32))
     with pytest.raises(BadValue, match="does not fit the deployment"):
-        first_frame(deployment, start)
-    start = start_with(frame, "x.mcap", bytes(32), [AddedEntity("other", "ball")])
+        first_frame(load_deployment(TABLE.read_text(), TABLE.name), start)
     with pytest.raises(BadValue, match="has another digest in this deployment's layout"):
-        first_frame(deployment, start)
+        first_frame(with_eye(), start)
 
 
 def test_the_commands_say_where_a_run_begins(captured: Captured, tmp_path: Path) -> None:
     runner = CliRunner()
     branch = tmp_path / "branch.mcap"
-    arguments = [str(TABLE), "--for", "40 ms", "--engine", "pure", "--from", f"{captured.alone}@0.39s"]
+    arguments = [str(TABLE), "--set", SPARE, "--for", "40 ms", "--engine", "pure", "--from", f"{captured.alone}@0.39s"]
     done = runner.invoke(rehearse_app, [*arguments, "--capture", str(branch)])
     assert done.exit_code == 0, done.output
     assert done.output.startswith(f"the run begins with frame 190 of {captured.alone}, at 0.38 s\nnetwork everything: ")

@@ -19,7 +19,7 @@ from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK
 from foosim.capture.start_frame import read_branch
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
-from tests.replay.conftest import ADDED_AT, TICK_NS, contents_of, damaged, messages_of, replay
+from tests.replay.conftest import TICK_NS, added_tick, contents_of, damaged, messages_of, replay
 
 MS = 1_000_000
 
@@ -37,9 +37,9 @@ def test_a_part_has_all_that_was_recorded_of_its_ticks(run: Path, part: Path) ->
     assert capture.digests.tolist() == whole.digests[120:201].tolist()
     assert capture.about.deployment_text == whole.about.deployment_text and capture.about.files == whole.about.files
     assert capture.about.versions == whole.about.versions
-    assert capture.frames.ticks.tolist() == list(range(120, 201, 10)) and "ball2" in capture.frames.layout
-    frame = next(block for block in whole.frame_blocks if 120 in block.ticks)
-    assert capture.frames.frame(0).digest == frame.frame(frame.ticks.tolist().index(120)).digest
+    assert capture.frames.ticks.tolist() == list(range(120, 201, 10))
+    assert capture.frames.layout.digest == whole.frames.layout.digest
+    assert capture.frames.frame(0).digest == whole.frames.frame(whole.frames.ticks.tolist().index(120)).digest
     assert list(capture.captured_ticks()) == list(whole.captured_ticks())[120:201]
     assert capture.clients == whole.clients and capture.epochs == whole.epochs, "who takes part is repeated"
     assert {message.topic for message in messages_of(part)} >= {TICK, LAYOUT, EPOCHS, CLIENTS, SCENE, POSES, PACKETS}
@@ -47,7 +47,7 @@ def test_a_part_has_all_that_was_recorded_of_its_ticks(run: Path, part: Path) ->
     theirs = [message for message in messages_of(run) if message.topic == PACKETS]
     start = theirs.index(mine[0])
     assert theirs[start : start + len(mine)] == mine and len(mine) > 100
-    assert (capture.poses("ball2").positions == whole.poses("ball2").positions[-19:-10]).all()
+    assert (capture.poses("ball-2").positions == whole.poses("ball-2").positions[-19:-10]).all()
 
 
 def test_digest_and_chain_are_those_of_the_whole_at_that_tick(run: Path, part: Path, tmp_path: Path) -> None:
@@ -80,12 +80,16 @@ def test_what_a_part_leaves_out_is_all_that_it_differs_in(run: Path, tmp_path: P
     assert end.metadata["reason"] == "cut"
 
 
-def test_a_layout_that_changes_within_is_there_at_its_tick(run: Path, tmp_path: Path) -> None:
+def test_the_layout_is_at_its_start_and_a_ball_that_is_added_within_comes_at_its_tick(
+    run: Path, tmp_path: Path
+) -> None:
     cut_capture(run, tmp_path / "o.mcap", 100 * MS, 200 * MS)
-    blocks = open_capture(tmp_path / "o.mcap").frame_blocks
-    assert len(blocks) == 2 and blocks[0].ticks.tolist() == [50, 60] and blocks[1].ticks[0] >= ADDED_AT
-    layouts = [message for message in messages_of(tmp_path / "o.mcap") if message.topic == LAYOUT]
-    assert layouts[0].log_ns == 100 * MS and msgspec.json.decode(layouts[0].data)["tick"] == 0
+    frames, added = open_capture(tmp_path / "o.mcap").frames, added_tick(run)
+    ticks = [*range(50, 101, 10)]
+    assert frames.ticks.tolist() == ticks
+    assert frames.column("ball-2", "absent").tolist() == [float(tick < added) for tick in ticks]
+    (layout,) = [message for message in messages_of(tmp_path / "o.mcap") if message.topic == LAYOUT]
+    assert layout.log_ns == 100 * MS and msgspec.json.decode(layout.data)["tick"] == 0
 
 
 def test_verify_refuses_it_and_a_run_begins_with_its_frames(run: Path, part: Path, tmp_path: Path) -> None:

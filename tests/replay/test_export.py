@@ -138,8 +138,8 @@ def test_poses_are_those_of_the_frames(run: Path, tmp_path: Path) -> None:
     export_capture(run, "poses", tmp_path / "poses.csv")
     capture = open_capture(run)
     lines = lines_of(tmp_path / "poses.csv")
-    assert {line["link"] for line in lines} > {"ball", "ball2", "red.goal/slide", "red.goal/spin"}
-    for link in ("ball", "ball2", "red.goal/spin"):
+    assert {line["link"] for line in lines} > {"ball", "ball-2", "red.goal/slide", "red.goal/spin"}
+    for link in ("ball", "ball-2", "red.goal/spin"):
         mine = [line for line in lines if line["link"] == link]
         poses = capture.poses(link)
         place = {int(tick): index for index, tick in enumerate(poses.ticks)}

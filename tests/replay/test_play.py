@@ -124,9 +124,9 @@ def test_a_listener_hears_all_that_was_delivered_in_order(run: Path) -> None:
         ball = [packet for packet in packets if packet.channel == "ball"]
         assert ball and all(isinstance(heard.value(packet), BallPosition) for packet in ball)
         poses = [item for item in items if isinstance(item, PlayedPoses)]
-        assert poses[0].poses[0].link == "ball" and "ball2" in {pose.link for pose in poses[-1].poses}
+        assert poses[0].poses[0].link == "ball" and "ball-2" in {pose.link for pose in poses[-1].poses}
         scenes = [item for item in items if isinstance(item, PlayedScene)]
-        assert len(scenes) == 2 and scenes[0].time_ns == 0 and b"ball2" in scenes[1].update
+        assert len(scenes) == 2 and scenes[0].time_ns == 0 and b"ball-2" in scenes[1].update
         assert any(item.text.startswith("supervisor: ") for item in items if isinstance(item, PlayedLine))
         rows = [item for item in items if isinstance(item, PlayedRow)]
         assert {row.topic for row in rows} == {"ages", "clients", "epochs", "layout"}

@@ -29,16 +29,16 @@ from foosim.replay.verify import Verified, verify, verify_capture
 from foosim.world.layout import Layout
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT = TABLE.read_text()
+TEXT = apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=1"])
 TICKS = 450
 
 
 def disturb(system: System) -> None:
     """Ask for everything that changes world or owners."""
     system.at_tick(50, lambda: system.request("push", impulse=[0.03, 0.01, 0.0]))
-    system.at_tick(120, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(120, lambda: system.request("add", name="ball", at="0.2,0.1,0.05"))
     system.at_tick(300, lambda: system.request("move", robot="red.goal", node="n2"))
-    system.at_tick(400, lambda: system.request("remove", name="ball2"))
+    system.at_tick(400, lambda: system.request("remove", name="ball-2"))
 
 
 def capture_to(path: Path, engine: str = "pure", nodes: int = 2) -> Rehearsed:
@@ -132,8 +132,8 @@ def test_a_missing_tick_is_named(captured: Captured) -> None:
 class OtherNode(NodeCore):
     """A node that says another digest of its engine's small run than it has."""
 
-    def engine_ready(self, layout: Layout, fingerprint: bytes) -> None:
-        super().engine_ready(layout, bytes(31) + b"?")
+    def engine_ready(self, fingerprint: bytes) -> None:
+        super().engine_ready(bytes(31) + b"?")
 
 
 def heavier(deployment: Deployment, layout: Layout) -> Engine:

@@ -19,7 +19,7 @@ from foosim.world.edits import Push
 TEXT = apply_sets(
     (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text(),
     "table.yaml",
-    ["engine=pure", "players={}"],
+    ["engine=pure", "players={}", "table.spare_balls=1"],
 )
 DEPLOYMENT = load_deployment(TEXT, "table.yaml")
 TICKS = 60
@@ -57,10 +57,10 @@ def watched() -> Watched:
     system = Watched()
     asked: dict[int, tuple[str, dict[str, Any]]] = {
         10: ("push", {"impulse": [0.02, 0.0, 0.0]}),
-        12: ("add", {"position": [0.1, 0.1, 0.0175]}),
+        12: ("add", {"name": "ball", "at": "0.1,0.1,0.0175"}),
         20: ("move", {"robot": "red.goal", "node": "blue"}),
-        30: ("push", {"name": "ball2", "impulse": [0.0, 0.02, 0.0]}),
-        40: ("remove", {"name": "ball2"}),
+        30: ("push", {"name": "ball-2", "impulse": [0.0, 0.02, 0.0]}),
+        40: ("remove", {"name": "ball-2"}),
         50: ("stop", {"node": "red"}),
         51: ("start", {"node": "red"}),
         52: ("stop", {"node": "red"}),

@@ -18,7 +18,7 @@ from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.messages import Answer, Epoch, Order, Prepare, Request
+from foosim.protocol.messages import Answer, Epoch, Order, Request
 from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.rehearsal.trace import Traced
@@ -33,18 +33,21 @@ MS: Final = 1_000_000
 T: Final = 2 * MS
 FAST: Final = Pace("fast")
 REALTIME: Final = Pace("realtime")
-SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
+SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms", "table.spare_balls=3")
 
 
 class Run:
     """A rehearsal and what was seen of it: frames and when they were committed, what was said, what was closed."""
 
-    def __init__(self, nodes: int = 1, ticks: int = TICKS, pace: Pace = FAST, sets: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, nodes: int = 1, ticks: int = TICKS, pace: Pace = FAST, sets: tuple[str, ...] = (), world: str = ""
+    ) -> None:
+        """`world` is the text of another one than the table."""
         self.frames: list[Frame] = []
         self.times_ns: list[int] = []
         self.said: list[tuple[str, bytes]] = []
         self.closings: list[Closing] = []
-        text = with_nodes(TEXT, TABLE.name, nodes, (*SETS, *sets))
+        text = with_nodes(world or TEXT, TABLE.name, nodes, sets if world else (*SETS, *sets))
         settings = Settings(observer=self._observe, on_commit=self._commit, on_closing=self.closings.append)
         self.system = System(RunSettings("run", TABLE.name, text, pace, ticks), settings)
         self.asked: list[str] = []
@@ -123,69 +126,40 @@ def test_two_pushes_in_one_tick_add_up_in_their_order() -> None:
     assert both.frames[-1].vector("ball", "position", 3) == pytest.approx(one.frames[-1].vector("ball", "position", 3))
 
 
-def test_an_added_ball_is_in_the_layout_of_the_frame_after_its_tick() -> None:
-    run = Run(nodes=3).ask_at(30, "add", name="second", position=[0.3, 0.2, 0.05], velocity=[0.5, 0.0, 0.0]).go()
+def present(frame: Frame) -> list[str]:
+    """The names of the balls that are in the world in a frame."""
+    return [entity.name for entity in frame.layout.present(frame.numbers) if entity.model == "ball"]
+
+
+def test_an_added_ball_is_in_the_frame_after_its_tick() -> None:
+    run = Run(nodes=3).ask_at(30, "add", name="ball", at="0.3,0.2,0.05").go()
     (answer,) = run.answers
-    assert answer.accepted and answer.text == f"second added at tick {answer.tick}"
-    assert ["second" in frame.layout for frame in run.frames] == [frame.tick > answer.tick for frame in run.frames]
+    assert answer.accepted and answer.text == f"ball-2 added at tick {answer.tick}"
+    assert ["ball-2" in present(frame) for frame in run.frames] == [frame.tick > answer.tick for frame in run.frames]
     first = run.frames[answer.tick]
-    assert first.vector("second", "position", 2) == pytest.approx([0.3 + 0.5 * 0.002, 0.2], abs=1e-5), "solved at once"
+    assert first.vector("ball-2", "position", 2) == pytest.approx([0.3, 0.2], abs=1e-5)
+    assert 0.049 < first.at("ball-2", "position", 2) < 0.05, "solved at once: it falls"
     orders = [decode(Order, payload) for channel, payload in run.said if channel == channels.ORDER.name]
     assert [order.tick for order in orders if order.edits] == [answer.tick]
 
 
-def test_an_add_waits_for_the_engines_of_all_nodes_and_the_world_does_not() -> None:
-    run = Run(nodes=3)
-    slow = run.system.solvers["n2"]
-    build, held = slow.build_wanted, []
-
-    def build_late() -> None:
-        if len(slow._core.layouts_wanted) > 1 and run.system.supervisor.state.frame.tick < 70:
-            held.append(run.system.supervisor.state.frame.tick)
-            return
-        build()
-
-    slow.build_wanted = build_late  # type: ignore[method-assign]
-    run.ask_at(30, "add", name="second").go()
-    (answer,) = run.answers
-    assert min(held) < 40 and 70 <= answer.tick < 90
-    assert len(run.frames) == TICKS, "ticks went on"
-    prepared = [decode(Prepare, payload) for channel, payload in run.said if channel == channels.PREPARE.name]
-    assert prepared and all([entity.name for entity in prepare.added] == ["second"] for prepare in prepared)
-
-
 def test_a_removed_ball_is_gone_from_the_frame_after_its_tick() -> None:
-    run = Run().ask_at(20, "add", name="second").ask_at(50, "remove", name="ball").ask_at(60, "remove", name="second")
-    added, other, removed = run.go().answers
-    assert other.text == "'ball' cannot be removed: only what was added can, and those are second"
-    assert removed.text == f"second removed at tick {removed.tick}"
-    present = [frame.tick for frame in run.frames if "second" in frame.layout]
-    assert present == list(range(added.tick + 1, removed.tick + 1))
-
-
-def test_changes_of_layout_go_one_after_the_other() -> None:
-    run = Run(nodes=2)
-    for name in ("b2", "b3", "b4"):
-        run.ask_at(30, "add", name=name, position=[0.1 * int(name[1]), 0.0, 0.05])
-    run.ask_at(30, "add").ask_at(30, "remove", name="b3").ask_at(60, "remove", name="b3").go()
-    *adds, early, late = run.answers
-    assert [answer.accepted for answer in adds] == [True] * 4
-    assert not early.accepted, "it was not there yet"
-    assert early.text == "'b3' cannot be removed: only what was added can, and nothing was"
-    assert late.accepted and {"b2", "b4", "ball2"} <= set(run.frames[-1].layout.names)
-    assert "b3" not in run.frames[-1].layout
-    for answer, name in zip(adds, ("b2", "b3", "b4", "ball2"), strict=True):
-        assert min(frame.tick for frame in run.frames if name in frame.layout) == answer.tick + 1
+    run = Run().ask_at(20, "add", name="ball-2", at="0.3,0.2,0.05").ask_at(50, "remove", name="ball")
+    added, other, removed = run.ask_at(60, "remove", name="ball-2").go().answers
+    assert other.text == "ball is always in the world: what is fixed, or belongs to a kit, neither comes nor goes"
+    assert removed.text == f"ball-2 removed at tick {removed.tick}"
+    there = [frame.tick for frame in run.frames if "ball-2" in present(frame)]
+    assert there == list(range(added.tick + 1, removed.tick + 1))
 
 
 def busy(nodes: int) -> Run:
-    """Adds, removes, pushes and moves, close to each other; in realtime, where engines are there in no virtual time."""
+    """Adds, removes, pushes and moves, close to each other."""
     run = Run(nodes, ticks=260, pace=REALTIME)
     for tick in range(20, 240, 20):
         run.ask_at(tick, "push", impulse=[0.008 if tick % 40 else -0.008, 0.002, 0.0])
-    run.ask_at(30, "add", name="b2", position=[0.05, 0.1, 0.05]).ask_at(31, "add", name="a2", velocity=[1.0, 0.5, 0.0])
-    run.ask_at(90, "push", name="b2", impulse=[0.02, 0.0, 0.0]).ask_at(120, "remove", name="b2")
-    run.ask_at(160, "add", name="b2", position=[-0.2, 0.0, 0.05]).ask_at(200, "remove", name="a2")
+    run.ask_at(30, "add", name="ball-2", at="0.05,0.1,0.05").ask_at(31, "add", name="ball-3", at="-0.05,-0.1,0.05")
+    run.ask_at(90, "push", name="ball-2", impulse=[0.02, 0.0, 0.0]).ask_at(120, "remove", name="ball-2")
+    run.ask_at(160, "add", name="ball-2", at="-0.2,0,0.05").ask_at(200, "remove", name="ball-3")
     for tick in (50, 51, 130, 180) if nodes > 1 else ():
         run.ask_at(tick, "move", robot="red.midfield", node=f"n{tick % nodes + 1}")
     return run.go()
@@ -193,7 +167,7 @@ def busy(nodes: int) -> Run:
 
 def test_what_is_asked_gives_the_same_world_on_any_number_of_nodes() -> None:
     alone = busy(1)
-    worlds = {tuple(frame.layout.names) for frame in alone.frames}
+    worlds = {tuple(present(frame)) for frame in alone.frames}
     assert len(worlds) == 4 and all(answer.accepted for answer in alone.answers)
     for nodes in (2, 3):
         many = busy(nodes)
@@ -358,7 +332,7 @@ def said_again(verb: str, **arguments: Any) -> tuple[Run, list[bytes]]:
 
 CHANGES: Final[dict[str, dict[str, Any]]] = {
     "push": {"impulse": [0.0, 0.01, 0.0]},
-    "add": {"name": "second"},
+    "add": {"name": "ball", "at": "0.3,0.2,0.05"},
     "move": {"robot": "red.goal", "node": "n2"},
     "rate": {"pace": "2x"},
 }
@@ -367,15 +341,14 @@ CHANGES: Final[dict[str, dict[str, Any]]] = {
 @pytest.mark.parametrize("verb", CHANGES)
 def test_the_same_id_gets_the_same_answer_and_is_done_once(verb: str) -> None:
     run, answers = said_again(verb, **CHANGES[verb])
-    assert len(answers) == (2 if verb == "add" else 4), "while it waits for engines it is not answered"
-    assert len(set(answers)) == 1
+    assert len(answers) == 4 and len(set(answers)) == 1
     edits = [edit for channel, said in run.said if channel == channels.ORDER.name for edit in decode(Order, said).edits]
     assert len(edits) == (1 if verb in ("push", "add") else 0)
     assert run.system.supervisor.state.epoch == (2 if verb == "move" else 1)
 
 
 def test_a_refusal_is_the_same_too() -> None:
-    _, answers = said_again("remove", name="second")
+    _, answers = said_again("remove", name="ball-2")
     assert len(answers) == 4 and len(set(answers)) == 1 and not decode(Answer, answers[0]).accepted
 
 
@@ -421,20 +394,27 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("push", {"impulse": [0.6, 0.6, 0.0]}, "which are the limit of ball, 40 m/s, at 0.021 kg"),
     ("push", {"name": "bal", "impulse": [0, 0, 0]}, "no free body 'bal'; there are ball, nearest is ball"),
     ("push", {"name": 7, "impulse": [0, 0, 0]}, "name: a name is needed, not 7"),
-    ("add", {"name": "ball"}, "name 'ball' is taken; taken are ball, "),
-    ("add", {"name": "camera"}, "name 'camera' is taken"),
-    ("add", {"name": "Not A Name"}, "'Not A Name' is no name; a name is a lower case letter, then "),
-    ("add", {"name": ""}, "'' is no name; "),
-    ("add", {"name": "x" * 33}, "is no name; "),
-    ("add", {"position": [9.0, 0.0, 0.1]}, "is outside the table: at most (0.6, 0.34, 0.15) m"),
-    ("add", {"position": [0.0, 0.0, 0.0]}, "is outside the table"),
-    ("add", {"position": [-GREAT, 0, 0]}, "three numbers of at most"),
-    ("add", {"velocity": [0.0, 40.1, 0.0]}, "is above the ball's limit of 40.0 m/s"),
-    ("add", {"velocity": [1e99, 1e99, 1e99]}, "is above the ball's limit"),
-    ("add", {"velocity": 5}, "three numbers of at most 1e+100 are needed, not 5"),
+    ("add", {}, "name: a name is needed, not null"),
+    ("add", {"name": "bal"}, "nothing to add (there are: ball, ball-2, ball-3, ball-4), 'bal', nearest is 'ball'"),
+    ("add", {"name": "ball-5"}, "ball-4), 'ball-5', nearest is 'ball"),
+    ("add", {"name": "camera"}, "camera is always in the world: what is fixed, or belongs to a kit, neither"),
+    ("add", {"name": "world"}, "world is always in the world: "),
+    ("add", {"name": "ball-2", "node": "n1"}, "ball-2 is no robot: it has no node"),
+    ("add", {"name": "ball-2", "node": "n9"}, "no node 'n9'; there are n1, n2"),
+    ("add", {"name": "ball", "at": "9,0,0.1"}, "at of ball-2: a place outside of the table: valid are x up to 0.6 m"),
+    ("add", {"name": "ball", "at": "0,0,0"}, "at of ball-2: a place outside of the table"),
+    ("add", {"name": "ball", "at": "0"}, "no place: valid are X,Y or X,Y,Z"),
+    ("add", {"name": "ball", "at": "0,one"}, "at of ball-2: "),
+    ("add", {"name": "ball", "at": [0, 0]}, "no place: valid are X,Y or X,Y,Z, or some of x, y, z, roll, pitch, yaw"),
+    ("add", {"name": "ball", "at": {"x": "0 m", "yow": "1 rad"}}, "at of ball-2: "),
+    ("add", {"name": "ball", "at": f"{GREAT},0"}, "at of ball-2: "),
     ("remove", {}, "name: a name is needed, not null"),
-    ("remove", {"name": "ball"}, "'ball' cannot be removed: only what was added can, and nothing was"),
-    ("remove", {"name": "red.goal"}, "'red.goal' cannot be removed"),
+    ("remove", {"name": "ball"}, "ball is always in the world: what is fixed, or belongs to a kit, neither comes"),
+    ("remove", {"name": "ball-2"}, "ball-2 is absent already"),
+    ("remove", {"name": "boll-2"}, "nothing to remove (there are: none), 'boll-2'"),
+    ("push", {"name": "ball-2", "impulse": [0, 0, 0]}, "no free body 'ball-2'; there are ball"),
+    ("set", {"name": "ball-2", "field": "at", "value": "0,0"}, "ball-2 is absent: add it first"),
+    ("remove", {"name": "red.goal"}, "red.goal is always in the world"),
 )
 
 
@@ -478,25 +458,3 @@ def test_before_the_start_and_after_the_end_only_status_and_down_are_answered() 
         (False, "the run has ended"),
         (True, "the run ends at tick 30"),
     ]
-
-
-def test_what_waits_for_engines_is_refused_when_the_run_ends() -> None:
-    run = Run(nodes=2)
-    slow = run.system.solvers["n2"]
-    build = slow.build_wanted
-    slow.build_wanted = lambda: None if len(slow._core.layouts_wanted) > 1 else build()  # type: ignore[method-assign]
-    run.ask_at(30, "add", name="second").go()
-    assert [(answer.accepted, answer.text) for answer in run.answers] == [(False, "the run has ended")]
-
-
-def test_no_more_wait_for_engines_than_a_limit() -> None:
-    run = Run(nodes=2, ticks=60)
-    slow = run.system.solvers["n2"]
-    build = slow.build_wanted
-    slow.build_wanted = lambda: None if len(slow._core.layouts_wanted) > 1 else build()  # type: ignore[method-assign]
-    for _ in range(258):
-        run.ask_at(30, "add")
-    run.go()
-    texts = [answer.text for answer in run.answers]
-    assert texts.count("the run has ended") == 256
-    assert texts[256:] == ["256 additions and removals wait for engines already"] * 2

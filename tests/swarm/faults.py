@@ -235,10 +235,21 @@ def _move(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _add(dice: Dice, names: Sequence[str]) -> Fault:
-    x, y, name = dice.unit() - 0.5, 0.5 * (dice.unit() - 0.5), f"b{dice.between(2, 4)}"
+    """Of those who may leave one that is absent is added, a ball anywhere, or any is removed."""
+    x, y, place = dice.unit() - 0.5, 0.5 * (dice.unit() - 0.5), dice.between(2, 4)
     verb = dice.one_of(("add", "add", "remove"))
-    arguments = {"name": name, "position": [x, y, 0.05]} if verb == "add" else {"name": name}
-    return Fault(_tick(dice), "add", f"{verb} {name}", partial(ask, verb=verb, **arguments))
+
+    def do(system: System) -> None:
+        frame = system.supervisor.state.frame
+        leaving = [entity for entity in frame.layout.entities if entity.can_leave]
+        if verb == "add":
+            leaving = [entity for entity in leaving if entity.is_absent(frame.numbers)]
+        if leaving:
+            chosen = leaving[int((x + 0.5) * place * len(leaving)) % len(leaving)]
+            at = {"at": f"{x:.4f},{y:.4f},0.05"} if verb == "add" and chosen.model == "ball" else {}
+            ask(system, verb, name=chosen.name, **at)
+
+    return Fault(_tick(dice), "add", f"{verb} one of those who may leave", do)
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:

@@ -9,12 +9,13 @@ from foosim.world.frame import Frame
 
 
 def strays(deployment: Deployment, frame: Frame) -> list[str]:
-    """Return descriptions of the entities of a frame that are out of bounds."""
+    """Return descriptions of the entities of a frame that are in the world and out of bounds."""
     found: list[str] = []
     for index, model in models_of(deployment, frame.layout).items():
-        wrong = model.out_of_bounds(frame.numbers) if hasattr(model, "out_of_bounds") else ""
-        if wrong:
-            found.append(f"{frame.layout.entities[index].name} {wrong}")
+        entity = frame.layout.entities[index]
+        if hasattr(model, "out_of_bounds") and not entity.is_absent(frame.numbers):
+            wrong = model.out_of_bounds(frame.numbers)
+            found += [f"{entity.name} {wrong}"] if wrong else []
     for _, kit in kits_of(deployment):
         if hasattr(kit, "strays"):
             found += kit.strays(frame)

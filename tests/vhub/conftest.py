@@ -46,11 +46,10 @@ from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.edits import Add, Edit, Push, Remove
+from foosim.world.edits import Add, Edit, Push, Remove, write
 from foosim.world.frame import Frame
-from foosim.world.layout import build_layout
+from foosim.world.layout import Layout, build_layout
 from foosim.world.robot_packets import RobotPacket
-from foosim.world.start import AddedEntity
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -67,6 +66,7 @@ RECOVERED = {
 """What the commits of these frames tell of."""
 SETS = (
     *BY_PERIOD,
+    "table.spare_balls=1",
     "clients={watcher: {lockstep: false}}",
     "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms},"
     " {id: steady, from: '*', to: red.goal, delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}},"
@@ -78,6 +78,20 @@ SETS = (
 def noise(size: int, *key: object) -> bytes:
     """Bytes that depend on the key alone."""
     return shake_128(repr(key).encode()).digest(size)
+
+
+def spare_ball(layout: Layout) -> Add:
+    """The edit that adds the spare ball."""
+    ball = layout["ball-2"]
+    numbers = [0.0] * (ball.stop - ball.start)
+    for name, values in (
+        ("position", (0.1, -0.0, 1e-9)),
+        ("orientation", (0, 0, 0, 1)),
+        ("linear_velocity", (0, 1, -2.5)),
+    ):
+        at = ball.offsets[name] - ball.start
+        numbers[at : at + len(values)] = map(float, values)
+    return Add(ball.name, numbers)
 
 
 @dataclass
@@ -105,6 +119,7 @@ class Driver:
     def __init__(self, sets: Sequence[str] = SETS) -> None:
         text = apply_sets(TABLE.read_text(), NAME, sets)
         self.deployment = load_deployment(text, NAME)
+        self.layout = build_layout(self.deployment)
         self.core = HubCore("boot", bytes(32), 0)
         self.run = HubRun(text, self.deployment, self.core)
         self.sent = dict.fromkeys((*self.deployment.players, WATCHER), 0)
@@ -143,7 +158,7 @@ class Driver:
                     self._done(action.name, message.tick)
 
     def start(self) -> None:
-        build = Build("vhub", "boot", "first", "run-1", NAME, self.run.text, "fast", [])
+        build = Build("vhub", "boot", "first", "run-1", NAME, self.run.text, "fast")
         self.say(channels.BUILD, "vhub", encode(build))
         self.core.begin(None, self._now_ns)
         self._perform()
@@ -155,7 +170,7 @@ class Driver:
     def begin_epoch(self, epoch: int, node: str, arithmetic: bytes) -> None:
         """Begin an epoch at the tick that was closed last, in which one of two nodes owns everything; say it twice."""
         owners = [(robot, node) for robot in self.deployment.robots]
-        message = Epoch(epoch, max(0, self.tick), bytes([epoch]) * 32, ["n1", "n2"], owners, [], arithmetic)
+        message = Epoch(epoch, max(0, self.tick), bytes([epoch]) * 32, ["n1", "n2"], owners, arithmetic)
         for _ in range(2):
             self.say(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
@@ -201,9 +216,10 @@ class Driver:
 
     def frame(self, tick: int) -> Frame:
         """A frame whose numbers are all different from tick to tick; `down` is the only one that means something."""
-        added = [AddedEntity("ball2", "ball")] if ADDED_AT <= tick < REMOVED_AT else []
-        layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
+        layout = self.layout
         numbers = initial_numbers(self.deployment, layout)
+        if ADDED_AT <= tick < REMOVED_AT:
+            write(layout, numbers, spare_ball(layout))
         for entity in layout.of("rod"):
             at = entity.offsets["joint_positions"]
             numbers[at : at + 2] = np.frombuffer(noise(16, tick, entity.name), np.uint64).astype(float) * 2.0**-66
@@ -214,10 +230,10 @@ class Driver:
     def edits(self, tick: int) -> list[Edit]:
         """The edits of the order that led to frame `tick`."""
         if tick == ADDED_AT:
-            return [Add("ball2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
+            return [spare_ball(self.layout)]
         if tick == PUSHED_AT:
-            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball2", (0.0, -1e-300, 2.5))]
-        return [Remove("ball2")] if tick == REMOVED_AT else []
+            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball-2", (0.0, -1e-300, 2.5))]
+        return [Remove("ball-2")] if tick == REMOVED_AT else []
 
     def _samples(self, tick: int, robot: str) -> list[RobotPacket]:
         sensors = sorted(self.deployment.robots[robot].sensors)

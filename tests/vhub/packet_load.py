@@ -173,7 +173,7 @@ class Talk:
     def _start(self) -> None:
         """Start a vHub, which goes on from the journal if there is one; the clients come (back) to it."""
         core = self.core = HubCore(f"boot-{self.count.crashes}", bytes(32), 0)
-        build = Build(VHUB, core.member.boot, "first", RUN, TABLE.name, self._text, "fast", [])
+        build = Build(VHUB, core.member.boot, "first", RUN, TABLE.name, self._text, "fast")
         self._say(channels.BUILD, VHUB, encode(build))
         core.begin(self._journal.past(core, RUN), 0)
         self._say(channels.RESUME_GRANT, VHUB, encode(ResumeGrant(VHUB, core.member.boot, 0)))
@@ -181,7 +181,7 @@ class Talk:
         for name in (*self._clients, EAR):
             self._come(name, self.count.crashes)
         owners = [(robot, "n1") for robot in self._robots]
-        self._say(channels.EPOCH, SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")))
+        self._say(channels.EPOCH, SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, b"")))
         self._say(channels.TEMPO, SUPERVISOR, encode(Tempo("fast", False)))
 
     def _come(self, name: str, returns: int) -> None:

@@ -55,49 +55,42 @@ def test_ticks_with_their_inputs_come_back(capture: CaptureData, hub_run: HubRun
 
 
 def test_frames_come_back_at_their_ticks_with_the_first_and_the_last(capture: CaptureData, hub_run: HubRun) -> None:
-    blocks = capture.frame_blocks
-    assert [block.ticks.tolist() for block in blocks] == [[0, 10, 20], [30, 40], [50, 60, 64]]
-    for block in blocks:
-        assert block.values.shape == (len(block), block.layout.size)
-        for index, tick in enumerate(block.ticks):
-            kept = hub_run.closings[tick].frame
-            assert block.frame(index).digest == kept.digest
-            assert block.frame(index).outboxes == kept.outboxes
-        joint = block.column("red.goal", "joint_positions", 2)
-        assert joint[0].tolist() == block.frame(0).vector("red.goal", "joint_positions", 2)
-        assert block.column("red.attack", "down")[0] == block.frame(0).at("red.attack", "down")
-    for one in ("layout", "values"):
-        with pytest.raises(CaptureError, match=r"frames of 3 layouts \(from 0, 30, 50\): frame_blocks"):
-            getattr(capture.frames, one)
+    frames = capture.frames
+    assert frames.values.shape == (len(frames), frames.layout.size)
+    for index, tick in enumerate(frames.ticks):
+        kept = hub_run.closings[tick].frame
+        assert frames.frame(index).digest == kept.digest
+        assert frames.frame(index).outboxes == kept.outboxes
+        joint = frames.column("red.goal", "joint_positions", 2)
+        assert joint[index].tolist() == kept.vector("red.goal", "joint_positions", 2)
+        assert frames.column("red.attack", "down")[index] == kept.at("red.attack", "down")
 
 
-def test_a_column_goes_across_layouts_with_gaps_where_the_entity_was_not_there(
-    capture: CaptureData, hub_run: HubRun
-) -> None:
+def test_a_column_has_gaps_where_the_entity_was_absent(capture: CaptureData, hub_run: HubRun) -> None:
     frames = capture.frames
     assert frames.ticks.tolist() == [0, 10, 20, 30, 40, 50, 60, 64] and len(frames) == 8
     kept = [hub_run.closings[tick].frame for tick in frames.ticks]
     positions = frames.column("ball", "position", 3)
     assert positions.tolist() == [frame.vector("ball", "position", 3) for frame in kept]
-    added = frames.column("ball2", "position", 3)
+    added = frames.column("ball-2", "position", 3)
     assert np.isnan(added).all(axis=1).tolist() == [True] * 3 + [False] * 2 + [True] * 3
-    assert added[3:5].tolist() == [frame.vector("ball2", "position", 3) for frame in kept[3:5]]
-    assert np.isnan(frames.column("ball2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
+    assert added[3:5].tolist() == [frame.vector("ball-2", "position", 3) for frame in kept[3:5]]
+    assert np.isnan(frames.column("ball-2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
     for index in (0, 3, 7, -1, -8):
         assert frames.frame(index).digest == kept[index].digest
     for index in (8, -9):
-        with pytest.raises(IndexError, match=f"frame {index} of 8"):
+        with pytest.raises(IndexError):
             frames.frame(index)
-    with pytest.raises(CaptureError, match=r"no frame has an entity 'bal2', nearest is ball2"):
-        frames.column("bal2", "position", 3)
+    with pytest.raises(CaptureError, match=r"no frame has an entity 'ball2', nearest is ball-2"):
+        frames.column("ball2", "position", 3)
     with pytest.raises(CaptureError, match=r"ball has no field 'positions', nearest is position; it has .*velocity"):
         frames.column("ball", "positions", 3)
 
 
 def test_poses_are_those_of_the_one_forward_kinematics(capture: CaptureData, hub_run: HubRun) -> None:
-    poses = {name: capture.poses(name) for name in ("red.goal/slide", "red.goal/spin", "red.goal", "ball", "ball2")}
+    poses = {name: capture.poses(name) for name in ("red.goal/slide", "red.goal/spin", "red.goal", "ball", "ball-2")}
     assert poses["ball"].ticks.tolist() == [0, 10, 20, 30, 40, 50, 60, 64]
-    assert poses["ball2"].ticks.tolist() == [30, 40]
+    assert poses["ball-2"].ticks.tolist() == [30, 40]
     assert poses["red.goal"].positions.tolist() == poses["red.goal/spin"].positions.tolist()
     for index, tick in enumerate(poses["ball"].ticks):
         frame = hub_run.closings[tick].frame
@@ -197,7 +190,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "/clients": 5,
         "/epochs": 2,
         "/frame": 8,
-        "/layout": 3,
+        "/layout": 1,
         "/log": 3,
         "/packets": account.offered,
         "/recoveries": 3,
@@ -286,6 +279,8 @@ def test_viewers_get_poses_of_all_links(path: Path, hub_run: HubRun) -> None:
         scene = build_scene(hub_run.deployment, frame.layout)
         expected = {}
         for name, body in scene.bodies.items():
+            if frame.layout[name].is_absent(frame.numbers):
+                continue
             for link, at, turned in forward_kinematics(body, frame.layout[name], frame.numbers):
                 expected[link] = (*at, *turned)
         got = {}
@@ -300,16 +295,18 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
     first, added, removed = decoded(path, "/scene")
     scene = build_scene(hub_run.deployment, hub_run.closings[0].frame.layout)
     links = {link.name: link for body in scene.bodies.values() for link in body.links}
-    assert {entity.id for entity in first.entities} == {"scenery", *links}
+    assert {entity.id for entity in first.entities} == {"scenery", *links} - {"ball-2"}
     for entity in first.entities:
         assert entity.frame_locked and entity.frame_id == ("world" if entity.id == "scenery" else entity.id)
         shapes = scene.scenery if entity.id == "scenery" else links[entity.id].shapes
         assert len(entity.cubes) + len(entity.spheres) + len(entity.cylinders) == len(shapes) > 0
     ball = next(entity for entity in first.entities if entity.id == "ball").spheres[0]
     assert (ball.size.x, ball.color.r, ball.color.a) == (2 * table_of(hub_run.deployment).ball.radius, 1.0, 1.0)
-    assert "ball2" in {entity.id for entity in added.entities}
-    assert [deletion.id for deletion in removed.deletions] == ["ball2"]
-    assert not first.deletions and not added.deletions
+    assert "ball-2" in {entity.id for entity in added.entities}
+    assert (
+        [deletion.id for deletion in removed.deletions] == [deletion.id for deletion in first.deletions] == ["ball-2"]
+    )
+    assert not added.deletions
 
 
 def test_viewers_get_the_log(path: Path) -> None:

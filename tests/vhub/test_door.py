@@ -139,7 +139,7 @@ def playing() -> Hub:
     hub = table()
     for name in (RED, BLUE):
         hub.enter(name, 5)
-    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, b""))
     for tick in range(5):
         hub.commit(tick)
         if not tick:

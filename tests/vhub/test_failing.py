@@ -81,7 +81,7 @@ def live(plane: Session, run: HubRun, folder: Path) -> str:
 
     process = Process("vhub")
     hub = HubShell(process, plane, is_busy, HubOptions(folder=folder))
-    build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, run.text, "fast", [])
+    build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, run.text, "fast")
     hub.core.receive(channels.BUILD, "vhub", encode(build), time.monotonic_ns())
     process.inbox.wake()
     process.add(hub)
@@ -163,7 +163,7 @@ def test_a_vhub_that_closes_its_capture_says_meanwhile_how_far_it_is(
     with Session.router("tcp/127.0.0.1:0") as radio:
         hub = HubShell(process, plane, listen, HubOptions(tmp_path / "run.mcap", folder=tmp_path))
         monkeypatch.setattr(hub._wire, "put", put)
-        build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, hub_run.text, "fast", [])
+        build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, hub_run.text, "fast")
         process.inbox.offer((channels.BUILD.key, "vhub", encode(build)))
         process.add(hub)
         assert process.run() == DONE

@@ -87,7 +87,7 @@ def test_they_are_no_more_than_the_supervisor_lets_nodes_go() -> None:
     hub = Hub()
     for name in PERIODS:
         hub.enter(name, 100)
-    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, b""))
     hub.said()
     hub.commit(0)
     hub.done("hand", 0)
@@ -111,7 +111,7 @@ def test_they_end_at_ticks_that_offsets_say_and_where_an_absent_client_may_join(
     for name, period, offset in (("hand", 5, 3), ("knee", 10, 7)):
         hub.say(channels.CLIENT_HELLO, name, ClientHello(name, "one", limits.PROTOCOL_VERSION, "", 0))
         hub.say(channels.UP, name, Join(name, "one", period, [], offset))
-    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, b""))
     hub.said()
     asked, reached = [], []
     for tick in range(20):

@@ -38,7 +38,7 @@ class Waiting(Storm):
 
     def restart(self, machine: str) -> None:
         self.hub = HubCore("boot-2", bytes(32), self.now_ns, machine=machine)
-        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", "run-1", NAME, TEXT, "fast", [])))
+        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", "run-1", NAME, TEXT, "fast")))
         self.hub.begin(recall(DEPLOYMENT, "run-1", self.records, None, limits.DOWNLINK_KEPT_NS), self.now_ns)
 
     def answer(self) -> None:
@@ -62,7 +62,7 @@ class Waiting(Storm):
 
     def begin(self, epoch: int, tick: int) -> None:
         owners = [(robot, "n1") for robot in DEPLOYMENT.robots]
-        message = Epoch(epoch, tick, bytes(32), ["n1"], owners, [], b"")
+        message = Epoch(epoch, tick, bytes(32), ["n1"], owners, b"")
         self.tell(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
     def proceed(self, epoch: int, boot: str = "boot-2") -> None:

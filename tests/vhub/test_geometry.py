@@ -474,9 +474,9 @@ def test_on_the_table_rods_and_figures_stand_between_and_follow_the_frame() -> N
     assert names(*beside) == [], "the figure is up"
 
 
-def test_a_frame_is_looked_at_once_and_a_new_layout_has_its_bodies() -> None:
+def test_a_frame_is_looked_at_once_and_who_is_absent_stands_nowhere() -> None:
     thing = "{shape: cylinder, radius: 1 cm, length: 1 m, z: 70 cm, surface: walls}"
-    deployment = load_deployment(apply_sets(TEXT, "t", [f"scenery={{pole: {thing}}}"]), "t")
+    deployment = load_deployment(apply_sets(TEXT, "t", [f"scenery={{pole: {thing}}}", "table.spare_balls=1"]), "t")
     rays = LineOfSight(deployment)
     layout = build_layout(deployment)
     frame = Frame(0, layout, np.array(initial_numbers(deployment, layout)))
@@ -485,11 +485,11 @@ def test_a_frame_is_looked_at_once_and_a_new_layout_has_its_bodies() -> None:
     (pole,) = sight.between(a, b)
     assert pole[:2] == ("pole", UNKNOWN) and pole.chord_m == pytest.approx(0.02)
     assert rays.at(frame) is sight and sight.between(b, a) is sight.between(a, b)
-    more = build_layout(deployment, [("ball2", "ball")])
-    numbers = initial_numbers(deployment, more)
-    place_ball(numbers, more["ball2"], (0.0, 0.0, 0.3))
-    found = rays.at(Frame(1, more, np.array(numbers))).between(a, b)
-    assert [crossing.name for crossing in found] == ["ball2", "pole"] and found[1] is pole, "scenery stays prepared"
+    numbers = initial_numbers(deployment, layout)
+    numbers[layout["ball-2"].offsets["absent"]] = 0.0
+    place_ball(numbers, layout["ball-2"], (0.0, 0.0, 0.3))
+    found = rays.at(Frame(1, layout, np.array(numbers))).between(a, b)
+    assert [crossing.name for crossing in found] == ["ball-2", "pole"] and found[1] is pole, "scenery stays prepared"
     assert [c.name for c in rays.at(frame).between(a, b)] == ["pole"]
 
 

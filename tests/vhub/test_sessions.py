@@ -57,7 +57,7 @@ OWNERS: Final = [(robot, "n1") for robot in DEPLOYMENT.robots]
 MS: Final = 1_000_000
 PERIODS: Final = {"hand": 5, "knee": 10}
 HELLO: Final = ClientHello("ear", "boot-1", limits.PROTOCOL_VERSION, "", 0)
-BUILD: Final = Build("vhub", "boot", "first", "run", "table.yaml", TEXT, "fast", [])
+BUILD: Final = Build("vhub", "boot", "first", "run", "table.yaml", TEXT, "fast")
 
 
 class Hub:
@@ -91,7 +91,7 @@ class Hub:
     def begin(self) -> Hub:
         for name in PERIODS:
             self.enter(name)
-        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, b""))
         return self
 
     def commit(self, tick: int, last: bool = False) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from foosim.cli.view import open_sources
 from foosim.rehearsal.run import rehearse
-from tests.replay.conftest import TICKS, capture_to
+from tests.replay.conftest import SPARE, TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.conftest import in_process
 from tests.wire.served import served
@@ -161,14 +161,26 @@ def tabs_are_filled(page: Page) -> None:
 
 
 def add_and_move(page: Page) -> None:
-    """A ball more is another layout, whose poses are drawn; a robot is dragged to another node."""
-    bodies, generation = page.get(f"[{STAT}.bodies, {STAT}.generation]")
+    """A spare ball is added where it is wanted, and removed, in the same scene; a robot is dragged to another node."""
+    page.until(f"{STAT}.absent === 1")
+    generation = page.get(f"{STAT}.generation")
     page.click("#tab-world")
-    page.click("#add")
+    page.click(".entities .absent button", "ball-2")
+    page.click("#add-selected")
+    page.until(
+        "document.querySelector('#add-which').value === 'ball-2' && !document.querySelector('#add-node').offsetParent"
+    )
+    page.fill("#add-x", "9")
+    page.click("dialog [type=submit]")
+    page.until("document.querySelector('dialog .wrong').textContent.includes('outside of the table')")
+    page.fill("#add-x", "0.2")
     send(page)
-    page.until(f"{STAT}.bodies === {bodies + 1} && {STAT}.generation > {generation}")
-    page.until("document.querySelector('.entities').textContent.includes('ball2')")
+    page.until(f"{STAT}.absent === 0 && !document.querySelector('.entities .absent')")
     assert page.colours() > SHAPES
+    page.click("#remove")
+    send(page)
+    page.until(f"{STAT}.absent === 1 && document.querySelector('.entities .absent').textContent.includes('ball-2')")
+    assert page.get(f"{STAT}.generation") == generation
     page.click("#tab-machines")
     for _ in range(TRIES):
         (x, y), card = page.place("[data-node=red] .chip", "red.goal"), page.place("[data-node=blue]")
@@ -255,7 +267,7 @@ def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House
     page, player = browser, {**PLAYER, "process": "main"}
     players = f"players={json.dumps({LINK[1]: player})}"
     alone = *in_process("null", "supervisor"), *in_process("main", *NODES)  # it is killed without the vHub
-    up = house.up("--console", "--json", "--engine", "pure", "--set", players, *alone, players=True)
+    up = house.up("--console", "--json", "--engine", "pure", "--set", players, "--set", SPARE, *alone, players=True)
     addresses = addresses_of(house)
     with looking(page, addresses["view"]):
         look_only(page)
@@ -326,7 +338,7 @@ def ghost_and_beside(page: Page) -> None:
 def compare(page: Page, last: int) -> None:
     """The distance to the second capture is told where there is one, and where there is none it is said where it is."""
     page.click("#tab-compare")
-    for entity in ("ball", "ball2"):
+    for entity in ("ball", "ball-2"):
         page.until(f"{COMPARED}.some((row) => /^{entity}0[.][0-9]+ m$/.test(row))")
     assert "nothing here" not in page.get(SUMMARY)
     page.until(f"{INK % '#panel-compare'}[0] > 0")

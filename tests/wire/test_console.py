@@ -44,6 +44,18 @@ async def moment_of(browser: Browser, source: int) -> tuple[tuple[int, ...], np.
             return head, poses
 
 
+async def add_the_spare(browser: Browser, scene: dict[str, Any], poses: np.ndarray[Any, Any]) -> None:
+    """A ball that is absent in a moment is added; a place that it cannot have is refused."""
+    (spare,) = [body for body in scene["bodies"] if body["removable"]]
+    assert spare["name"] == "ball-2" and np.isnan(poses[spare["links"]]).all()
+    outside = await answered(browser, 1, "add", name="ball-2", at={"x": "9 m"})
+    assert not outside["accepted"] and "outside of the table" in outside["text"]
+    added = await answered(browser, 2, "add", name="ball", at={"x": "0.1 m"})
+    assert added["accepted"], added
+    while not np.isfinite((await moment_of(browser, 0))[1]).all():
+        pass
+
+
 async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
     """What a page does while the run goes on."""
     page, _, token = addresses["operate"].partition("#operate=")
@@ -70,18 +82,15 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         assert (await browser.hear("plotted"))["series"][0]["id"] == "x"
         await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("watched"))["drops"] == []
-        added = await answered(browser, 1, "add", position=[0.1, 0.0, 0.05])
-        assert added["accepted"], added
-        scene = await browser.hear("scene")
-        assert [body["name"] for body in scene["bodies"] if body["removable"]] == ["ball2"]
-        assert (await answered(browser, 2, "step", count=0))["accepted"] is False
-        paused = await answered(browser, 3, "pause")
+        await add_the_spare(browser, scene, poses)
+        assert (await answered(browser, 3, "step", count=0))["accepted"] is False
+        paused = await answered(browser, 4, "pause")
         status = await status_with(browser, lambda status: bool(status["state"] == "paused"))
         asked = {entry["verb"]: entry["who"] for entry in status["requests"]}
         assert asked["add"] == asked["pause"] == "browser 1"
         kill("supervisor")
         status = await status_with(browser, lambda status: bool(status["recoveries"]) and status["state"] == "paused")
-        assert (await answered(browser, 4, "resume"))["tick"] == paused["tick"]
+        assert (await answered(browser, 5, "resume"))["tick"] == paused["tick"]
         while (await moment_of(browser, 0))[0][5] <= paused["tick"] + 1:
             pass
         links = await browser.hear("links")
@@ -119,7 +128,8 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     table.write_text("\n".join(["time,entity,x,y,z", *rows]))
     beside = ("--second", "walk.csv", "--offset", "2 s")
     alone = *in_process("null", "supervisor"), *in_process("main", "nodes.red", "nodes.blue")
-    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", *alone)
+    spare = "--set", "table.spare_balls=1"
+    up = house.up("--console", *beside, *spare, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", *alone)
     house.ticking()
     path = house.live().path / "console.json"
     addresses = addresses_of(house)

@@ -14,22 +14,27 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Order
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
+from foosim.world.assembly.world import initial_numbers
+from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits, write, written
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Outbox
+from tests.placing import added_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 SOME: Final[NDArray[np.float64]] = np.random.default_rng(1).normal(size=LAYOUT.size)
 RED_GOAL: Final = LAYOUT["red.goal"].index
+SPARES: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=2"]), TABLE.name)
+WITH_SPARES: Final = build_layout(SPARES)
+AT_START: Final = initial_numbers(SPARES, WITH_SPARES)
 HERE: Final = (0.1, 0.0, 0.02)
 REST: Final = (0.0, 0.0, 0.0)
 
@@ -70,9 +75,7 @@ def test_the_digest_is_the_one_that_the_design_names() -> None:
 
 
 def test_tick_layout_and_outboxes_change_the_digest() -> None:
-    added = build_layout(DEPLOYMENT, [("ball2", "ball")])
-    renamed = build_layout(DEPLOYMENT, [("ball3", "ball")])
-    more = np.zeros(added.size)
+    more = build_layout(SPARES)
     digests = [
         frame().digest,
         frame(tick=6).digest,
@@ -83,8 +86,7 @@ def test_tick_layout_and_outboxes_change_the_digest() -> None:
         frame(red_goal=b"a", blue_goal=b"b").digest,
         frame(red_goal=b"b", blue_goal=b"a").digest,
         frame(red_goal=b"ab", blue_goal=b"").digest,
-        Frame(5, added, more).digest,
-        Frame(5, renamed, more).digest,
+        Frame(5, more, np.zeros(more.size)).digest,
     ]
     assert len(set(digests)) == len(digests)
 
@@ -169,75 +171,85 @@ def test_the_chain_is_over_digests_and_nothing_else() -> None:
     assert chain_next(chain, frame().digest) != chain
 
 
-# --- what an order does to a layout ----------------------------------------------------------------------------------
+# --- what an order does to a frame -----------------------------------------------------------------------------------
 
 
-def added(name: str = "b2", model: str = "ball") -> Add:
-    return Add(name, model, HERE, REST)
+def added(name: str = "ball-2") -> Add:
+    return added_ball(WITH_SPARES, name, HERE)
 
 
-def test_additions_and_removals_change_the_layout() -> None:
-    bigger = layout_after(LAYOUT, [added("b2"), added("a1")])
-    assert set(bigger.names) - set(LAYOUT.names) == {"a1", "b2"}
-    assert bigger.digest == build_layout(DEPLOYMENT, [("a1", "ball"), ("b2", "ball")]).digest
-    assert layout_after(bigger, [Remove("a1"), Remove("b2")]).digest == LAYOUT.digest
-    assert layout_after(LAYOUT, [added("b2"), Remove("b2")]) is LAYOUT
-    assert layout_after(bigger, [Remove("a1"), added("a1")]) is bigger
+def fitting(numbers: list[float], edits: list[Edit]) -> list[Edit]:
+    """Those of some edits that do something, each applied before the next one is looked at."""
+    after, found = [*numbers], []
+    for edit in fitting_edits(WITH_SPARES, after, edits):
+        write(WITH_SPARES, after, edit)
+        found.append(edit)
+    return found
 
 
-def test_what_leaves_the_layout_alone_gives_the_same_one() -> None:
-    for edits in ([], [Push("ball", REST)]):
-        assert layout_after(LAYOUT, edits) is LAYOUT
+def after(edits: list[Edit], numbers: list[float] = AT_START) -> list[float]:
+    return written(WITH_SPARES, numbers, edits)
+
+
+def test_spares_are_absent_until_they_are_added_and_as_they_were_when_they_are_removed() -> None:
+    two = after([added("ball-2"), added("ball-3")])
+    names = [entity.name for entity in WITH_SPARES.present(AT_START)]
+    assert [entity.name for entity in WITH_SPARES.present(two)] == sorted([*names, "ball-2", "ball-3"])
+    assert WITH_SPARES.spares == {"ball-2", "ball-3"} and not WITH_SPARES["ball"].can_leave
+    assert after([Remove("ball-3"), Remove("ball-2")], two) == AT_START
+    assert after([Remove("ball-2"), added("ball-2")], two) == two
+
+
+def test_what_is_absent_is_far_below_and_far_from_the_next_that_is() -> None:
+    places = [Frame(0, WITH_SPARES, np.array(AT_START)).vector(name, "position", 3) for name in ("ball-2", "ball-3")]
+    assert all(z < -1e5 for _, _, z in places) and abs(places[0][0] - places[1][0]) >= 1000.0
 
 
 NOTHING: Final[list[Edit]] = [
     added("ball"),
-    added("world"),
-    added("red.goal"),
-    added("b2", "rod"),
-    added("b2", "world"),
-    added("b2", "dragon"),
+    Add("world", []),
+    Add("red.goal", [0.0]),
+    Add("ball-2", [0.0]),
+    Add("ball2", added().numbers),
     Remove("ball"),
+    Remove("ball-2"),
     Remove("world"),
     Remove("red.goal"),
     Remove("camera"),
     Remove("nobody"),
+    Push("ball-2", HERE),
     Push("red.goal", HERE),
     Push("world", HERE),
     Push("nobody", HERE),
+    Set("ball-2", "position", [*HERE]),
 ]
 
 
 @pytest.mark.parametrize("edit", NOTHING, ids=lambda edit: f"{type(edit).__name__}-{edit.name}")
 def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
-    assert fitting_edits(LAYOUT, [edit]) == []
-    assert layout_after(LAYOUT, [edit]) is LAYOUT
-    assert fitting_edits(LAYOUT, [added("b3"), edit]) == [added("b3")]
+    assert fitting(AT_START, [edit]) == []
+    assert after([edit]) == AT_START
+    assert fitting(AT_START, [added("ball-3"), edit]) == [added("ball-3")]
 
 
 def test_edits_fit_in_their_order() -> None:
-    push = Push("b2", HERE)
-    assert fitting_edits(LAYOUT, [push, added("b2"), push, added("b2"), Remove("b2"), push, Remove("b2")]) == [
-        added("b2"),
-        push,
-        Remove("b2"),
-    ]
+    push = Push("ball-2", HERE)
+    edits: list[Edit] = [push, added(), push, added(), Remove("ball-2"), push, Remove("ball-2")]
+    assert fitting(AT_START, edits) == [added(), push, Remove("ball-2")]
 
 
 @settings(max_examples=200)
 @given(
     edits=st.lists(
-        st.builds(added, st.sampled_from(["b1", "b2", "ball", "red.goal"]), st.sampled_from(["ball", "rod"]))
-        | st.builds(Remove, st.sampled_from(["b1", "b2", "ball", "world"]))
-        | st.builds(Push, st.sampled_from(["b1", "ball", "camera"]), st.just(REST)),
+        st.builds(added, st.sampled_from(["ball", "ball-2", "ball-3"]))
+        | st.builds(Remove, st.sampled_from(["ball", "ball-2", "ball-3", "world"]))
+        | st.builds(Push, st.sampled_from(["ball-2", "ball", "camera"]), st.just(REST)),
         max_size=12,
     ),
     cut=st.integers(0, 12),
 )
 def test_one_order_after_another_is_as_good_as_both_in_one(edits: list[Edit], cut: int) -> None:
-    """So supervisor, nodes and vHub, who see the same edits, never disagree about the layout."""
-    between = layout_after(LAYOUT, edits[:cut])
-    whole = layout_after(LAYOUT, edits)
-    assert layout_after(between, edits[cut:]).digest == whole.digest
-    assert fitting_edits(LAYOUT, edits) == fitting_edits(LAYOUT, edits[:cut]) + fitting_edits(between, edits[cut:])
-    assert set(LAYOUT.names) <= set(whole.names) <= {*LAYOUT.names, "b1", "b2"}
+    """So supervisor, nodes and vHub, who see the same edits, never disagree about who is there."""
+    between = after(edits[:cut])
+    assert after(edits[cut:], between) == after(edits)
+    assert fitting(AT_START, edits) == fitting(AT_START, edits[:cut]) + fitting(between, edits[cut:])

@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-from foosim.common.errors import DeploymentError, Malformed
+from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
 from foosim.world.assembly.initial_state import initial_frame
@@ -65,7 +65,7 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.sensors.echo={kind: battery, rate: 1 Hz}",
          "robots.rover01.sensors: a reserved name, 'echo'"),
         ("robots.base.heading=0 deg",
-         "robots.base: unknown key (there are: model, tags, sensors, actuators, rules, x, y), 'heading'"),
+         "robots.base: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y), 'heading'"),
         ("scenery.goods-1.surface=floor",
          "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"),
         ("hall.rover.radius=9 m", "hall.rover.radius: more than half of the hall's least side, '9 m'"),
@@ -132,17 +132,16 @@ def test_robots_of_a_kit_need_its_section() -> None:
     )
 
 
-def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
+def test_a_hall_has_no_ball_and_no_score_and_rovers_alone_leave_it() -> None:
     layout = build_layout(DEPLOYMENT)
     assert {entity.model for entity in layout.entities} == {"rover", "station"} and "world" not in layout
     assert world_status(DEPLOYMENT, initial_frame(DEPLOYMENT)).keys() == {"commands", "rovers"}
-    with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to this world"):
-        build_layout(DEPLOYMENT, [("b2", "ball")])
-    still = (0.0, 0.0, 0.0)
-    edits: list[Edit] = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still)]
-    fitting: list[Edit] = [Set("rover01", "down", [1.0]), Set("base", "down", [0.0])]
+    assert {entity.model for entity in layout.entities if entity.can_leave} == {"rover"}
+    numbers = initial_numbers(DEPLOYMENT, layout)
+    edits: list[Edit] = [Add("b2", []), Remove("b2"), Remove("base"), Push("rover01", (0.0, 0.0, 0.0))]
+    fitting: list[Edit] = [Set("rover01", "down", [1.0]), Set("base", "down", [0.0]), Remove("rover02")]
     unfit: list[Edit] = [Set("rover01", "charge", [1.0, 2.0]), Set("base", "speed", [1.0]), Set("none", "down", [1.0])]
-    assert fitting_edits(layout, [*edits, *unfit, *fitting]) == fitting
+    assert list(fitting_edits(layout, numbers, [*edits, *unfit, *fitting])) == fitting
 
 
 def test_rovers_start_where_they_are_declared() -> None:
@@ -155,10 +154,13 @@ def test_rovers_start_where_they_are_declared() -> None:
 
 def test_each_rover_is_an_island_that_its_owner_solves() -> None:
     layout, owners = build_layout(DEPLOYMENT), DEPLOYMENT.owners()
-    shares = Assignment(layout, table_reach_of(DEPLOYMENT, layout), ["east", "west"], owners).shares([])
+    assignment = Assignment(layout, table_reach_of(DEPLOYMENT, layout), ["east", "west"], owners)
+    shares = assignment.shares(initial_numbers(DEPLOYMENT, layout))
     for node, share in shares.items():
         mine = [entity for entity in layout.entities if owners[entity.name] == node]
-        assert share.islands == tuple((entity.index,) for entity in mine if entity.model == "rover")
+        assert share.islands == tuple(
+            (entity.index,) for entity in mine if entity.model == "rover" and entity.name not in layout.spares
+        )
         assert share.solved == tuple(entity.index for entity in mine)
 
 

@@ -16,6 +16,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.islands import Assignment, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.forms.forms import ABSENT
 from foosim.world.layout import Layout, build_layout
 from foosim.world.models.rod import RodRobot
 from foosim.world.parameters.table import table_of
@@ -23,8 +24,9 @@ from foosim.world.parameters.table import table_of
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
-THREE: Final = build_layout(DEPLOYMENT, [("a", "ball"), ("c", "ball")])
-"""Balls a, ball and c."""
+SPARES: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=2"]), TABLE.name)
+THREE: Final = build_layout(SPARES)
+"""Three balls, of which two may be absent."""
 AXES: Final = {
     name: table_of(DEPLOYMENT).lines[robot.line].x * (1.0 if robot.team == "red" else -1.0)
     for name, robot in DEPLOYMENT.robots.items()
@@ -43,13 +45,18 @@ positions = st.tuples(xs, st.floats(-0.4, 0.4), st.one_of(st.just(RADIUS), st.fl
 def numbers_with(layout: Layout, balls: Mapping[str, Position], deployment: Deployment = DEPLOYMENT) -> list[float]:
     numbers = initial_numbers(deployment, layout)
     for name, position in balls.items():
-        start = layout[name].offsets["position"]
+        entity = layout[name]
+        start = entity.offsets["position"]
         numbers[start : start + 3] = position
+        if entity.can_leave:
+            numbers[entity.offsets[ABSENT]] = 0.0
     return numbers
 
 
 def islands(layout: Layout, balls: Mapping[str, Position], deployment: Deployment = DEPLOYMENT) -> list[set[str]]:
-    numbers, reach = numbers_with(layout, balls, deployment), table_reach_of(deployment, layout)
+    numbers = numbers_with(layout, balls, deployment)
+    absent = [entity.index for entity in layout.entities if entity.is_absent(numbers)]
+    reach = table_reach_of(deployment, layout).without(absent)
     found = islands_of(numbers, reach, touching_of(numbers, reach))
     return [{layout.entities[index].name for index in island.entities} for island in found]
 
@@ -92,7 +99,7 @@ def by_hand(balls: Mapping[str, Position]) -> list[set[str]]:
 
 
 @settings(max_examples=400)
-@given(balls=st.fixed_dictionaries({"a": positions, "ball": positions, "c": positions}))
+@given(balls=st.fixed_dictionaries(dict.fromkeys(("ball", "ball-2", "ball-3"), positions)))
 def test_islands_are_those_whose_volumes_overlap(balls: dict[str, Position]) -> None:
     assert sorted(map(sorted, islands(THREE, balls))) == sorted(map(sorted, by_hand(balls)))
 
@@ -178,7 +185,7 @@ def test_the_world_and_what_has_no_rod_are_the_first_nodes_and_cameras_their_own
 
 @settings(max_examples=150)
 @given(
-    balls=st.fixed_dictionaries({"a": positions, "ball": positions, "c": positions}),
+    balls=st.fixed_dictionaries(dict.fromkeys(("ball", "ball-2", "ball-3"), positions)),
     owned=st.lists(st.integers(0, 3), min_size=9, max_size=9),
 )
 def test_every_entity_has_one_solver_and_islands_are_never_split(balls: dict[str, Position], owned: list[int]) -> None:
@@ -210,17 +217,17 @@ def test_every_entity_has_one_solver_and_islands_are_never_split(balls: dict[str
 
 def test_balls_that_share_a_rod_are_one_island_with_the_nearest_rod_of_any() -> None:
     x = AXES["red.attack"]
-    far = {"a": (5.0, 0.0, RADIUS)}
-    both = islands(THREE, {**far, "ball": (x - 0.16, -0.3, RADIUS), "c": (x + 0.05, 0.3, RADIUS)})
-    assert {"a"} in both
-    assert {"ball", "c", "red.attack"} <= next(island for island in both if "ball" in island)
-    apart = islands(THREE, {**far, "ball": (-0.55, 0.0, RADIUS), "c": (0.55, 0.0, RADIUS)})
-    assert not any({"ball", "c"} <= island for island in apart)
+    far = {"ball-2": (5.0, 0.0, RADIUS)}
+    both = islands(THREE, {**far, "ball": (x - 0.16, -0.3, RADIUS), "ball-3": (x + 0.05, 0.3, RADIUS)})
+    assert {"ball-2"} in both
+    assert {"ball", "ball-3", "red.attack"} <= next(island for island in both if "ball" in island)
+    apart = islands(THREE, {**far, "ball": (-0.55, 0.0, RADIUS), "ball-3": (0.55, 0.0, RADIUS)})
+    assert not any({"ball", "ball-3"} <= island for island in apart)
 
 
 def test_balls_near_each_other_belong_together_also_off_the_rods() -> None:
-    high = islands(THREE, {"a": (0.0, 0.0, 0.9), "ball": (0.1, 0.1, 1.0), "c": (0.0, 0.0, 1.5)})
-    assert {"a", "ball"} in high and {"c"} in high
+    high = islands(THREE, {"ball-2": (0.0, 0.0, 0.9), "ball": (0.1, 0.1, 1.0), "ball-3": (0.0, 0.0, 1.5)})
+    assert {"ball-2", "ball"} in high and {"ball-3"} in high
 
 
 def test_moving_the_ball_a_little_does_not_make_new_shares() -> None:

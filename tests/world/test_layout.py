@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.world.components.view import Mounting
+from foosim.world.forms.forms import ABSENT
 from foosim.world.forms.registry import find_model, names
 from foosim.world.kits.table import BALL
 from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
@@ -45,7 +45,9 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
         assert (entity.index, entity.start) == (index, position)
         assert entity.start < entity.split <= entity.stop
         its = carried.get(entity.name, NOTHING)
-        assert entity.counts == {**entity.fields, **its.solver, **its.owner}
+        own = {ABSENT: 1} if entity.can_leave else {}
+        assert entity.counts == {**entity.fields, **its.solver, **own, **its.owner}
+        assert entity.can_leave == ("position" in entity.fields and entity.is_solved)
         assert entity.stop - entity.split == sum(its.owner.values())
         assert list(entity.offsets) == list(entity.counts)
         for field, count in entity.counts.items():
@@ -58,17 +60,28 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
     assert again.digest == layout.digest, "the order in which things are named is nothing"
 
 
+def with_spares(count: int) -> Deployment:
+    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [f"table.spare_balls={count}"]), TABLE.name)
+
+
+def test_spares_are_in_the_layout_from_the_start_and_the_ball_never_leaves() -> None:
+    none = build_layout(with_spares(0))
+    assert not none.spares and not any(entity.can_leave for entity in none.entities)
+    assert {*LAYOUT.names} == {*none.names, "ball-2", "ball-3"} and LAYOUT.spares == {"ball-2", "ball-3"}
+    assert [entity.name for entity in LAYOUT.entities if entity.can_leave] == ["ball-2", "ball-3"]
+
+
 def test_the_table_has_its_entities() -> None:
-    assert set(LAYOUT.names) == {BALL, WORLD, *DEPLOYMENT.robots}
+    assert set(LAYOUT.names) == {BALL, *LAYOUT.spares, WORLD, *DEPLOYMENT.robots}
     assert [entity.name for entity in LAYOUT.of("rod")] == sorted(
         name for name in DEPLOYMENT.robots if name != "camera"
     )
     assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
-    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL]
+    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL, "ball-2", "ball-3"]
     assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
     models = [find_model(name) for name in names("model")]
     assert {model.name for model in models if model.is_solved and model.is_robot and model.kit} == {"rod", "rover"}
-    assert LAYOUT.declared.addable == ("ball",) and find_model("ball").can_be_free and not find_model("ball").is_robot
+    assert find_model("ball").can_be_free and not find_model("ball").is_robot
     assert {model.name for model in models if model.actuators and model.kit} == {"rod", "rover"}
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 
@@ -141,9 +154,8 @@ def test_every_difference_has_another_digest() -> None:
     ]
     layouts = [
         LAYOUT,
-        build_layout(DEPLOYMENT, [("ball2", "ball")]),
-        build_layout(DEPLOYMENT, [("ball3", "ball")]),
-        build_layout(DEPLOYMENT, [("ball2", "ball"), ("ball3", "ball")]),
+        build_layout(with_spares(0)),
+        build_layout(with_spares(1)),
         Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.declared),
         *(
             Layout(LAYOUT.models, replace(LAYOUT.declared, carried={**LAYOUT.declared.carried, "red.goal": other}))
@@ -158,25 +170,6 @@ def test_a_layout_does_not_know_who_computes_it() -> None:
     sets = ["nodes={one: {robots: [" + ", ".join(DEPLOYMENT.robots) + "]}}", "seed=9", "tick=5 ms"]
     other = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
     assert build_layout(other).digest == LAYOUT.digest
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        [("ball", "ball")],
-        [("world", "ball")],
-        [("red.goal", "ball")],
-        [("b2", "rod")],
-        [("b2", "camera")],
-        [("b2", "world")],
-        [("b2", "")],
-        [("b2", "ball"), ("b2", "ball")],
-    ],
-    ids=str,
-)
-def test_only_balls_with_free_names_are_added(wrong: list[tuple[str, str]]) -> None:
-    with pytest.raises(Malformed, match=f"{wrong[-1][1]} {wrong[-1][0]} cannot be added"):
-        build_layout(DEPLOYMENT, wrong)
 
 
 def test_a_slot_of_a_rule_is_not_that_of_a_sensor_of_its_name() -> None:

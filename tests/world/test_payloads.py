@@ -42,7 +42,6 @@ from foosim.world.sensors.contact import Touches
 from foosim.world.sensors.encoder import RodPosition
 from foosim.world.sensors.gps import GlobalPosition
 from foosim.world.sensors.imu import Inertial
-from foosim.world.sensors.job import Jobs
 from foosim.world.sensors.joint_state import JointState
 from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.sensors.odometry import WheelTravel
@@ -50,6 +49,7 @@ from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 from foosim.world.sensors.range import Distance
+from foosim.world.sensors.states.job import Jobs
 from foosim.world.sensors.table.ball_state import BallState
 from foosim.world.sensors.table.figure_contact import FigureTouches
 from foosim.world.sensors.table.motor_current import Currents

@@ -28,6 +28,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 NAME: Final = "a name is a lower case letter, then lower case letters, digits, - and _, at most 32 in all"
+ONE: Final = 'Quantity(units.LENGTH, "0 m", "1 m")'
 REFUSED: Final = {
     'sensor("own", ActuatorSettings, Number)': "its settings are a class derived from SensorSettings, not "
     "ActuatorSettings",
@@ -78,6 +79,11 @@ REFUSED: Final = {
     "a list of 1",
     'entity_rule("own", EntityRuleSettings, slots={"a": 1}, settable={"a": 1.0})': "settable: a is set to a Quantity, "
     "which has limits, not to",
+    f'model("own", RobotSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one "
+    "number, and the class has no method set",
+    f'model("own", RobotSettings, slots={{"at": 1}}, settable={{"at": {ONE}}})': "settable: at is set by foosim itself",
+    f'rule("own", RuleSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one "
+    "number, and the class has no method set",
     'rule("own", RuleSettings, slots=lambda settings, on: {})': "slots: they are a mapping",
     'rule("own", RuleSettings, writes="ball")': "writes is a tuple of names, not 'ball': a tuple of one is ('ball',)",
     'rule("own", RuleSettings, each=("rod",))': "each is a mapping of models to slots, not a list of 1",
@@ -91,7 +97,7 @@ REFUSED: Final = {
     "a kind, not 'wheel_speeds'",
     'kit("own", SpecBase, entities=("ball",))': "entities is a mapping of names to models, not a list of 1",
     'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
-    'kit("own", SpecBase, addable="ball")': "addable is a tuple of names, not 'ball'",
+    'kit("own", SpecBase, spares={"ball-2": "ball"})': "spares is a function of the section, not a mapping of 1",
     'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
 }
 """Registrations, and what is said of each."""
@@ -272,9 +278,9 @@ def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) ->
     assert problems("zoo={fence: 1 m}") == [f"unknown key; {why}, 'zoo'"]
     assert problems("capture.zoo=3") == ["capture: unknown key, 'zoo'"]
     assert problems("robots.red.goal.rules={own: {kind: laps}}") == [
-        f"robots.red.goal.rules.own.kind: unknown rule of entities; {why} (there are: battery, or any module:Class), "
-        "'laps'"
+        f"robots.red.goal.rules.own.kind: unknown rule of entities; {why} (there are: battery, burns, or any "
+        "module:Class), 'laps'"
     ]
     assert problems("rules={own: {kind: laps}}") == [
-        f"rules.own.kind: unknown rule of worlds; {why} (there are: football, zone, or any module:Class), 'laps'"
+        f"rules.own.kind: unknown rule of worlds; {why} (there are: football, wind, zone, or any module:Class), 'laps'"
     ]

@@ -26,7 +26,8 @@ TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")
 TABLE: Final = table_of(DEPLOYMENT)
 LAYOUT: Final = build_layout(DEPLOYMENT)
-TWO: Final = build_layout(DEPLOYMENT, [("second", "ball")])
+SPARE: Final = load_deployment(apply_sets(TEXT, "table.yaml", ["table.spare_balls=1"]), "table.yaml")
+TWO: Final = build_layout(SPARE)
 BALL: Final = LAYOUT["ball"]
 RADIUS: Final = TABLE.ball.radius
 LINE_X: Final = TABLE.field.length / 2 + RADIUS
@@ -115,7 +116,7 @@ def test_a_goal_is_where_the_pocket_is(x: float, y: float, z: float) -> None:
 
 def test_any_ball_scores_and_the_others_play_on() -> None:
     numbers = in_play((LINE_X + 0.01, 0.0, RADIUS), layout=TWO)
-    second = TWO["second"]
+    second = TWO["ball-2"]
     before = field(numbers, "position", 3, second)
     apply(numbers, layout=TWO)
     assert score(numbers, TWO) == [1.0, 0.0]
@@ -445,14 +446,18 @@ def test_a_match_ends_with_its_goals() -> None:
 
 
 def test_balls_rest_apart_when_a_match_is_over() -> None:
-    short = with_rules("match={goals: 1}")
-    layout = build_layout(short, [("second", "ball"), ("third", "ball")])
+    sets = ["table.rules.match={goals: 1}", "table.spare_balls=3"]
+    short = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    layout = build_layout(short)
     numbers = initial_numbers(short, layout)
-    for ball in layout.of("ball"):
+    *balls, absent = layout.of("ball")
+    for ball in balls:
         place_ball(numbers, ball, (LINE_X + 0.01, 0.0, RADIUS), ROLLING)
+    below = numbers[absent.start : absent.stop]
     apply(numbers, layout=layout, deployment=short)
-    places = sorted(field(numbers, "position", 3, ball)[1] for ball in layout.of("ball"))
+    places = sorted(field(numbers, "position", 3, ball)[1] for ball in balls)
     assert places == pytest.approx([-4 * RADIUS, 0.0, 4 * RADIUS])
+    assert numbers[absent.start : absent.stop] == below, "one that is absent is not laid down"
 
 
 def test_without_a_match_play_has_no_end() -> None:

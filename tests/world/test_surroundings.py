@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.edited_frame import edit, moved_reference
+from foosim.node.edited_frame import edit
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import View
-from foosim.world.edits import Add, Remove
+from foosim.world.edits import Remove
 from foosim.world.forms.forms import ENTITY, NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.layout import Declared, Layout, build_layout
+from foosim.world.layout import Layout, build_layout
 from foosim.world.parameters.table import table_of
+from tests.placing import added_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(
-    apply_sets(TABLE.read_text(), TABLE.name, ["robots.red.goal.tags=[keeper]", "robots.blue.goal.tags=[keeper]"]),
-    TABLE.name,
-)
+SETS: Final = ("robots.red.goal.tags=[keeper]", "robots.blue.goal.tags=[keeper]", "table.spare_balls=1")
+DEPLOYMENT: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 AROUND: Final = Surroundings(DEPLOYMENT, LAYOUT)
 STILL: Final = (0.0, 0.0, 0.0)
@@ -62,28 +61,25 @@ def referring() -> Layout:
     """The table, with two slots on each ball: a reference to an entity, and a plain number."""
     declared = LAYOUT.declared
     memory = {**declared.memory, "ball": {**declared.memory["ball"], "own.target": ENTITY, "own.index": 1}}
-    return Layout(LAYOUT.models, Declared(declared.names, declared.carried, memory, declared.addable))
+    return Layout(LAYOUT.models, replace(declared, memory=memory))
 
 
-def test_a_reference_follows_its_entity_and_is_none_when_that_is_gone() -> None:
+def test_a_reference_is_none_when_its_entity_leaves_and_stays_so() -> None:
     layout = referring()
     assert layout.digest != LAYOUT.digest
     numbers = initial_numbers(DEPLOYMENT, layout)
     target, index = (layout["ball"].offsets[f"own.{slot}"] for slot in ("target", "index"))
-    own = layout["ball"].offsets["football.touched_by"]
-    assert layout.references == (own, target) and numbers[target] == NO_ENTITY and numbers[index] == 0.0
-    numbers[target] = numbers[index] = float(layout["red.goal"].index)
-    frame = Frame(0, layout, np.array(numbers))
-    more, added = edit(frame, [Add("a1", "ball", (0.1, 0.0, 0.02), STILL)], DEPLOYMENT)
-    ball = more["ball"].offsets
-    assert added[ball["own.target"]] == more["red.goal"].index == layout["red.goal"].index + 1
-    assert added[ball["own.index"]] == layout["red.goal"].index, "a plain number now means another entity"
-    assert added[more["a1"].offsets["own.target"]] == NO_ENTITY
-    added[ball["own.target"]] = float(more["a1"].index)
-    less, left = edit(Frame(1, more, np.array(added)), [Remove("a1")], DEPLOYMENT)
-    assert left[less["ball"].offsets["own.target"]] == NO_ENTITY
-
-
-@pytest.mark.parametrize("reference", [-1.0, -5.0, 1e6])
-def test_what_refers_to_nobody_stays_so(reference: float) -> None:
-    assert moved_reference(reference, LAYOUT, LAYOUT, set()) == NO_ENTITY
+    spare = layout["ball-2"]
+    its = spare.offsets["own.target"]
+    own = [layout[name].offsets["football.touched_by"] for name in ("ball", "ball-2")]
+    assert layout.references == (own[0], target, own[1], its)
+    assert numbers[target] == numbers[its] == NO_ENTITY and numbers[index] == 0.0
+    coming = added_ball(layout, "ball-2", (0.1, 0.0, 0.02))
+    added, moved = edit(Frame(0, layout, np.array(numbers)), [coming], DEPLOYMENT)
+    assert moved == [spare] and added[its] == NO_ENTITY
+    added[target] = added[index] = added[its] = float(spare.index)
+    left, moved = edit(Frame(1, layout, np.array(added)), [Remove("ball-2")], DEPLOYMENT)
+    assert moved == [spare] and left[target] == left[its] == NO_ENTITY
+    assert left[index] == spare.index, "a plain number means what it meant"
+    back, _ = edit(Frame(2, layout, np.array(left)), [coming], DEPLOYMENT)
+    assert back[target] == NO_ENTITY

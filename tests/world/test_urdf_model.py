@@ -161,7 +161,7 @@ def test_the_state_follows_from_the_file(deployment: Deployment) -> None:
     assert cart.fields == {**BODY, **dict.fromkeys(JOINTS, 1), **own} and cart.is_free
     assert cart in layout.free and arm not in layout.free
     push = [Push(name, (1.0, 0.0, 0.0)) for name in ("arm", "cart")]
-    assert fitting_edits(layout, push) == push[1:]
+    assert list(fitting_edits(layout, initial_numbers(deployment, layout), push)) == push[1:]
     again = build_layout(deployment)
     assert layout.digest == again.digest
     other = deployment.model_copy(update={"robots": {**deployment.robots, "cart": deployment.robots["arm"]}})

@@ -251,6 +251,7 @@ class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_f
     offset: int = 0
     arrivals: tuple[tuple[str, str], ...] = ()
     called_tick: int = -1
+    since: int = 0
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

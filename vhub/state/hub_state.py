@@ -25,6 +25,7 @@ from foosim.vhub.network.memory import Age, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL
 from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
+from foosim.vhub.state.existence import Existence
 from foosim.vhub.state.members import Here, Member
 from foosim.vhub.state.send_order import SendOrder
 from foosim.world.edits import Disrupt, Edit
@@ -73,6 +74,7 @@ class HubState:
         self._robots = frozenset(deployment.robots)
         self._transit = InFlightLimit(len(self._endpoints))
         self._here = Here(deployment, self.sampling.speaking)
+        self.existence = Existence(deployment)
 
     # --- joining -----------------------------------------------------------------------------------------------------
 
@@ -81,9 +83,10 @@ class HubState:
         known = self.members.get(joining.name)
         member = self.members[joining.name] = Member.of(joining, tick)
         if known is not None:
-            member.sequence, member.downlink = known.sequence, known.downlink
+            member.sequence, member.downlink, member.since = known.sequence, known.downlink, known.since
         self.ages.joins(joining.name, member.subscriptions)
         self._here.renew(self.members)
+        self.existence.look_again()
 
     def leave(self, name: str) -> None:
         """Deactivate a client: no packet is offered to it."""
@@ -115,6 +118,9 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
+        for name in self.existence.turn_to(frame, self.members):
+            if self.members[name].active:
+                self.ages.joins(name, self.members[name].subscriptions)
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)
@@ -244,7 +250,7 @@ class HubState:
             return 0
         for following in range(limits.RELEASE_AHEAD):
             sent, arrival = tick + 1 + following, tick + 2 + following
-            if self.sampling.is_due(sent) or any(member.may_be_due(sent) for member in members):
+            if self.sampling.is_due(sent) or any(member.may_be_due(sent, tick) for member in members):
                 return following
             if self._here.on_arrival and any(map(self._here.calls, self._flights.get(sent, ()))):
                 return following
@@ -405,15 +411,15 @@ class HubState:
         if turns:  # packets that make clients act are judged first: the others of the tick are delivered with them
             arriving.sort(key=self._here.calls, reverse=True)
         for flight in arriving:
-            member = self.members.get(flight.destination)
-            if member is not None and member.active and member.release_tick(tick) != tick:
+            member = self._receiver(flight)
+            if member is not None and member.release_tick(tick) != tick:
                 self._put(flight, member.release_tick(tick))
                 continue
             is_call = flight.destination in turns and self._here.calls(flight)
-            if flight.destination in turns and not is_call and turns[flight.destination].called_tick != tick:
+            if member is not None and member.arrivals and not is_call and member.called_tick != tick:
                 self._put(flight, tick + 1)
                 continue
-            down = member is None or not member.active or world.is_down(flight.destination)
+            down = member is None or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
             if self._arrive(flight, hindered):
                 released.setdefault(flight.destination, []).append(flight)
@@ -427,6 +433,12 @@ class HubState:
                 flights.sort(key=order_of)
         fates += judged
         return released
+
+    def _receiver(self, flight: Flight) -> Member | None:
+        """Return the client that a packet is for, if it takes part and exists, and has since the packet was due."""
+        member = self.members.get(flight.destination)
+        is_here = member is not None and member.active and member.has_existed_at(flight.due_ns, self.tick_ns)
+        return member if is_here else None
 
     def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
         deliveries: list[Delivered] = []

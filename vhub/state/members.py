@@ -40,6 +40,8 @@ class Member:
         self.arrivals = state.arrivals
         self.called_tick = state.called_tick
         """For a client that acts at arrival: the last tick at which it was called, -1 before the first."""
+        self.since = state.since
+        """The tick of the frame from which on it exists (`existence`); 0 from the start, -1 while it does not."""
 
     @classmethod
     def of(cls, joining: Joining, tick: int) -> Member:
@@ -52,19 +54,35 @@ class Member:
         """Return its part of a snapshot."""
         return convert(self, MemberState, from_attributes=True)
 
+    @property
+    def exists(self) -> bool:
+        """Whether it exists in the newest frame: one that does not takes part, and is neither called nor awaited."""
+        return self.since >= 0
+
+    def has_existed_at(self, time_ns: int, tick_ns: int) -> bool:
+        """Whether it exists, and has since this time: what was due before has reached nobody, or another one."""
+        return 0 <= self.since * tick_ns <= time_ns
+
     def is_due(self, tick: int) -> bool:
         """Whether it is due at a tick. For a client that acts at arrival, the tick's packets must be there."""
         if self.arrivals:
             return self.active and tick == self.called_tick
+        return self.active and self.exists and self.period > 0 and tick % self.period == self.offset
+
+    def may_be_due(self, tick: int, closed: int) -> bool:
+        """Whether it may be due at a tick after those that are closed, regardless of arrivals: in each of the frames
+        between it may exist again."""
+        if self.arrivals:
+            return self._is_over(tick, self.since if self.exists else closed + 1)
         return self.active and self.period > 0 and tick % self.period == self.offset
 
-    def may_be_due(self, tick: int) -> bool:
-        """Whether it is due at a later tick, regardless of arrivals."""
-        return self.is_over(tick) if self.arrivals else self.is_due(tick)
-
     def is_over(self, tick: int) -> bool:
-        """Whether a client that acts at arrival has waited for a period since its last call, or its join."""
-        return self.active and tick >= max(self.called_tick, self.joined_tick) + self.period
+        """Whether a client that acts at arrival has waited for a period since its last call, its join, or since it
+        exists."""
+        return self.exists and self._is_over(tick, self.since)
+
+    def _is_over(self, tick: int, since: int) -> bool:
+        return self.active and tick >= max(self.called_tick, self.joined_tick, since) + self.period
 
     def release_tick(self, tick: int) -> int:
         """Return the first tick, from `tick` on, at which its period allows a release to the client."""

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.world.events import Value, WorldEvent
-from foosim.world.layout import kits_named, spares_of
+from foosim.world.layout import WORLD, find_rule, kits_named, spares_of, world_rules
 from foosim.world.spec import WorldSpec
 
 
@@ -48,8 +48,10 @@ def done_to(name: str, event: WorldEvent) -> list[Scheduled]:
 
 
 def matched(spec: WorldSpec, selector: str) -> list[str]:
-    """Return the robots, objects and what kits bring that a selector matches, in name order."""
+    """Return the robots, objects and what kits bring that a selector matches, in name order; `world` is the world."""
     brought = [name for kit in kits_named(spec) for name in (*kit.entities, *spares_of(spec, kit))]
+    if selector == WORLD and any(find_rule(one).settable for one in world_rules(spec).values()):
+        return [WORLD]
     return [name for name in sorted((*spec.robots, *spec.objects, *brought)) if fnmatchcase(name, selector)]
 
 

@@ -29,7 +29,7 @@ MARGIN_M = 0.001
 class Reach:
     """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
     with one half width and one band of z; `balls` are (index, start of the position); `alone` are (index, name) of what
-    touches nobody."""
+    touches nobody, without a name of what is no robot."""
 
     ball_m: float
     rods: tuple[tuple[int, str, float], ...]
@@ -75,7 +75,9 @@ def reach_of(spec: WorldSpec, layout: Layout) -> Reach | Volumes:
 
 def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
     """Return the bounding volumes of rods and balls, and who moves alone."""
-    alone = tuple((entity.index, entity.name) for entity in layout.entities if entity.kind.motion)
+    alone = tuple(
+        (entity.index, entity.name if entity.is_robot else "") for entity in layout.entities if entity.kind.motion
+    )
     if TABLE not in spec.kits:
         return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
     table = table_of(spec)

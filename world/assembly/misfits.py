@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName
+from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName, show
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
-from foosim.common.names import nearest_name
+from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
 from foosim.world.components.view import Misfit, Mounting
 from foosim.world.forms import registry
+from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     ROBOTS,
     Component,
@@ -37,8 +38,10 @@ from foosim.world.layout import (
     kits_named,
     of_motion,
     slot_that_speaks,
+    spares_of,
     world_rules,
 )
+from foosim.world.rules.wind import WindSettings
 from foosim.world.spec import WorldSpec
 
 REACHED: Final = ("rod", "ball")
@@ -159,18 +162,36 @@ def rule_problems(rule: WorldRule) -> Iterator[str]:
                 yield f"{word_of('rule')} that {word} {model}: {error}"
 
 
-def kit_problems(
-    name: str, entities: Mapping[str, str], kits: Mapping[str, Kit], reserved: Sequence[str]
-) -> Iterator[str]:
-    """Yield what a kit puts into a world with these kits that cannot be there: `entities`, models by name.
+def checked_spares(spec: WorldSpec, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
+    """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
+    try:
+        found: object = spares_of(spec, kit)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # SystemExit, too: a kit may do anything
+        if kit.is_own:
+            raise
+        return {}, [f"spares fails: {failure_of(error, kit.module)}"]
+    if not isinstance(found, Mapping) or not all(isinstance(text, str) for one in found.items() for text in one):
+        return {}, [f"spares returns a mapping of names to models, not {show(found)}"]
+    wrong = [name for name in found if not is_robot_name(name)]
+    if wrong:
+        return {}, [f"spares returns the entity {show(wrong[0])}: {NAME_RULE}"]
+    return found, []
 
-    `reserved` are names that no entity can have.
+
+def kit_problems(
+    name: str, entities: Mapping[str, Mapping[str, str]], kits: Collection[str], reserved: Sequence[str]
+) -> Iterator[str]:
+    """Yield what a kit puts into a world with these kits that cannot be there.
+
+    `entities` are those of each kit, models by name, `reserved` names that no entity can have.
     """
-    for entity, model in entities.items():
+    for entity, model in entities[name].items():
         if entity in reserved:
             yield f"its entity {entity} has a reserved name"
         for other in kits:
-            if other < name and entity in kits[other].entities:
+            if other < name and entity in entities[other]:
                 yield f"its entity {entity} has a name that is also one of the kit {other}'s"
         for problem in _not_there(model, kits):
             yield f"its entity {entity} is {problem}"
@@ -293,6 +314,22 @@ def _doubled(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
                 yield Finding(one.location, what, slot.partition(".")[2], at="key")
 
 
+def lasting_spares(spec: WorldSpec) -> Iterator[Finding]:
+    """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
+    named: dict[str, Location] = {name: ("objects", name, "spare") for name, one in spec.objects.items() if one.spare}
+    named |= {name: ("robots", name, "spare") for name, one in spec.robots.items() if one.spare}
+    named |= {name: (kit.name,) for kit in kits_named(spec) for name in spares_of(spec, kit)}
+    layout = build_layout(spec) if named else None
+    for name, location in named.items():
+        assert layout is not None
+        if not layout[name].can_leave:
+            what = f"a spare that could not be absent: {with_article(layout[name].model)} without a place of its own"
+            if len(location) > 1:
+                yield Finding(location, what)
+            else:
+                yield Finding(location, f"kit {location[0]}: {name}, {what}", at="key")
+
+
 # --- engines ---------------------------------------------------------------------------------------------------------
 
 
@@ -304,9 +341,15 @@ class _Rigid(NamedTuple):
 
 
 def engine_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Rigid bodies that the engine does not have, and those of which no engine has both."""
+    """Rigid bodies that the engine does not have, those of which no engine has both, and wind that it does not have."""
     engine = registry.find("engine", spec.engine)
     assert isinstance(engine, Engine), engine
+    winds = [name for name, settings in spec.rules.items() if isinstance(settings, WindSettings)]
+    if winds and not engine.islands:
+        what = f"the engine has no air, and the world has the rule {winds[0]}, which is wind"
+        yield Finding(("engine",), what, engine.name, "'mujoco'")
+    for name in winds[1:]:
+        yield Finding(("rules", name), f"a second wind beside {winds[0]}", name, at="key")
     body, rod = next(rigid_bodies(spec), None), next(_rods(spec), None)
     if body is not None and rod is not None:
         for one, other in ((body, rod), (rod, body)):

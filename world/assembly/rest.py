@@ -16,7 +16,7 @@ from foosim.world.components.drives import Drives
 from foosim.world.edits import Edit, Remove, Set
 from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.scene import conjugate, multiply
 from foosim.world.spec import WorldSpec
 
@@ -48,6 +48,13 @@ class Rest:
                 return False
         return not movers or not any(moves(mover, start) for mover in movers)
 
+    def wake(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
+        """Begin to count anew: what one of them holds, or is held by, is another."""
+        for entity in bodies:
+            at = self._slots.get(entity.index)
+            if at is not None:
+                numbers[at] = 0.0
+
     def keep(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
         """Leave bodies at rest as they are; what they touch they have touched before."""
         for entity in bodies:
@@ -72,9 +79,12 @@ class Rest:
 
 def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> None:
     """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order puts
-    something elsewhere, or takes it away: they may have leaned on it."""
+    something elsewhere, or takes it away, since they may have leaned on it, or sets something of the world, as wind."""
     old = before.numbers
-    if any(isinstance(edit, Remove) or (isinstance(edit, Set) and edit.field == "position") for edit in edits):
+    if any(
+        isinstance(edit, Remove) or (isinstance(edit, Set) and (edit.field == "position" or edit.name == WORLD))
+        for edit in edits
+    ):
         for entity in before.layout.resting:
             numbers[entity.offsets[STILL_TICKS]] = 0.0
     for entity in before.layout.resting:

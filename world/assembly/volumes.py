@@ -2,7 +2,8 @@
 
 The volume of a body is the box around its shapes, grown by its declared speed limit x tick, or by twice its present
 speed x tick where that is more; that of a body on a fixed
-base is the box around all that its joints let it reach. Bodies whose volumes overlap are an island. Movers (bodies that
+base is the box around all that its joints let it reach. The volume of a robot with a gripper has the reach of that,
+too. Bodies whose volumes overlap are an island, and so are what holds and what is held. Movers (bodies that
 go on by a motion) are in no island: each island has those in whose way it is. Everything follows from the frame; only
 + - x / sqrt and comparisons, element by element, so that all CPUs agree.
 """
@@ -20,6 +21,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.world.assembly.grippers import Gripper, grippers_of, reaching
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.world import build_scene
 from foosim.world.layout import Entity, Layout
@@ -117,7 +119,12 @@ class Volumes:
             if entity.is_solved and entity.name in bodies and is_felt(bodies[entity.name], physics)
         ]
         self._layout, self._tick_s = layout, tick_s
-        self._all = [_felt_of(entity, body) for entity, body in felt]
+        grippers: dict[int, list[Gripper]] = {}
+        for one in grippers_of(spec, layout):
+            grippers.setdefault(one.robot, []).append(one)
+        self._grippers = [(index, one.held) for index, its in grippers.items() for one in its]
+        """Of each gripper its robot, and the place of the reference to what it holds."""
+        self._all = [_felt_of(entity, reaching(body, grippers.get(entity.index, ()))) for entity, body in felt]
         self._all_alone = [
             (entity.index, entity.name if entity.is_robot else "")
             for entity in layout.entities
@@ -173,12 +180,23 @@ class Volumes:
         ones, others = self._near.ones, self._near.others
         meet = ((boxes[others, 0] <= boxes[ones, 1]) & (boxes[others, 1] >= boxes[ones, 0])).all(axis=1)
         pairs = list(zip(ones[meet].tolist(), others[meet].tolist(), strict=True))
+        if self._grippers:
+            pairs += self._held(numbers)
         if self._found is None or pairs != self._found[0]:
             self._found = pairs, self._islands_of(pairs)
         found = [self._with_nearest(island, numbers) for island in self._found[1]] if self._has_choice else None
         if found is not None and found != self._found[1]:
             self._found = pairs, found
         return self._found[1]
+
+    def _held(self, numbers: Sequence[float]) -> list[tuple[int, int]]:
+        """Return the rows of those who hold, and of what they hold, whether their volumes overlap or not."""
+        rows, found = self.rows, []
+        for robot, at in self._grippers:
+            held = int(numbers[at])
+            if held in rows and robot in rows:
+                found.append((rows[robot], rows[held]))
+        return found
 
     def _with_nearest(self, island: BodyIsland, numbers: Sequence[float]) -> BodyIsland:
         if len(island.entities) <= 2:  # two robots or more, and an object, leave a choice

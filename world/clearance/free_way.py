@@ -34,7 +34,7 @@ from foosim.world.components.entities import MotionMounting
 from foosim.world.components.view import Slot, SolvingView
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity
-from foosim.world.moving.upright import made_model, upright_of
+from foosim.world.moving.upright import is_upright, made_model, upright_of
 from foosim.world.scene import Body, Shape, place, swept_box
 
 Flags: TypeAlias = NDArray[np.bool_]
@@ -49,7 +49,8 @@ ROUNDING: Final = 1.000001
 
 
 class _Rigid(NamedTuple):
-    """A body that an engine moves, or nobody: its place is that of the frame, or fixed; its parts are in a radius."""
+    """A body that an engine moves, or nobody, or a leaf: its place is that of the frame, or fixed; its parts are in a
+    radius."""
 
     entity: Entity
     body: Body
@@ -71,15 +72,15 @@ class FreeWay:
                 continue
             model = made_model(at.spec, at.layout, entity)
             body: Body | None = model.body()
-            if body is None:
+            if body is None or not body.is_solid:
                 continue
-            if entity.kind.motion and "position" in entity.offsets:
+            if entity.kind.motion and "position" in entity.offsets and is_upright(model):
                 its = upright_of(model)
                 movers.append((entity, (its.radius, its.low, its.high, body.speed_limit)))
             elif entity.is_rigid or body.is_free:
                 self._rigid.append(_rigid(entity, body))
             else:
-                standing += [solid(shape) for shape in _placed(body, entity, nothing)]
+                standing += [solid(shape) for shape in placed_shapes(body, entity, nothing)]
         self._rows = {entity.index: row for row, (entity, _) in enumerate(movers)}
         about = np.array([numbers for _, numbers in movers])
         self._radius, self._low, self._high, speed = about.T.copy()
@@ -174,7 +175,9 @@ class FreeWay:
         near = np.flatnonzero(dx * dx + dy * dy <= least * least)
         who, other = who[near], other[near]
         rows_of: dict[int, list[tuple[float, ...]]] = {
-            number: [solid(shape) for shape in _placed(self._rigid[number].body, self._rigid[number].entity, numbers)]
+            number: [
+                solid(shape) for shape in placed_shapes(self._rigid[number].body, self._rigid[number].entity, numbers)
+            ]
             for number in sorted(set(other.tolist()))
         }
         met = [
@@ -350,7 +353,7 @@ def _middle(one: _Rigid, numbers: Sequence[float]) -> tuple[float, float]:
     return numbers[at], numbers[at + 1]
 
 
-def _placed(body: Body, entity: Entity, numbers: Sequence[float]) -> list[Shape]:
+def placed_shapes(body: Body, entity: Entity, numbers: Sequence[float]) -> list[Shape]:
     """Return the shapes of a body in the world."""
     shapes = []
     for link, (_, position, orientation) in zip(body.links, forward_kinematics(body, entity, numbers), strict=True):

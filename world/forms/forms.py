@@ -123,9 +123,14 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
 
 ABSENT: Final = "absent"
 """The slot of each entity that has a place: 1 of one that is not in the world, 0 of one that is."""
+INACTIVE: Final = "inactive"
+"""The slot of each robot with components that says which are switched off: a bit for each of its sensors and actuators,
+the lowest for the first by name."""
 DOWN: Final = "down"
 OF_ROBOTS: Final = (DOWN, "refused", "clamped")
 """Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
+SET_BY_FOOSIM: Final = ("at", DOWN)
+"""What can be set of entities without a word of their model."""
 OF_SOLVED: Final = ("quarantined",)
 """Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
 
@@ -244,7 +249,7 @@ class Model(Form):
     sends and receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a
     deployment. `units` are those of its fields' numbers, the last one standing for all behind it; fields that every
     model calls the same need none. `variants` are what it is instead where its setting `dynamics` has one of these
-    values.
+    values. `settable` is what can be set of it, as of a rule of entities (`EntityRule`): fields of its state.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -261,6 +266,7 @@ class Model(Form):
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
     variants: Mapping[str, Model] = field(default_factory=dict)
 
     def variant(self, dynamics: object) -> Model:
@@ -327,12 +333,13 @@ class WorldRule(Form):
 
     `slots` are what it remembers, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world;
     `each` are what it remembers of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the
-    models whose state it may change.
+    models whose state it may change. `settable` is what can be set of it, as of a rule of entities (`EntityRule`).
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
     each: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     writes: tuple[str, ...] = ()
+    settable: Mapping[str, Quantity] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -366,11 +373,13 @@ class Engine(Form):
     """What computes rigid bodies.
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table.
+    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table. `grasps` says that
+    it holds two bodies together as `Island.welds` say.
     """
 
     meshes: bool = False
     islands: bool = False
+    grasps: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

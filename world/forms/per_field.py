@@ -27,7 +27,7 @@ DIMENSIONS: Final[Mapping[str, Dimension]] = {
     dimension.base: dimension
     for dimension in (
         *(units.LENGTH, units.MASS, units.ANGLE, units.SPEED, units.SPIN, units.ACCELERATION, units.FORCE),
-        *(units.TORQUE, units.ENERGY, units.POWER, units.VOLTAGE, units.CURRENT),
+        *(units.TORQUE, units.ENERGY, units.POWER, units.VOLTAGE, units.CURRENT, units.TEMPERATURE),
     )
 }
 """By the unit of a field."""

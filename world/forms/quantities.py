@@ -15,10 +15,12 @@ NewtonMetres: TypeAlias = Annotated[float, Meta(extra={"unit": "N m"})]
 Degrees: TypeAlias = Annotated[float, Meta(extra={"unit": "deg"})]
 Amperes: TypeAlias = Annotated[float, Meta(extra={"unit": "A"})]
 Volts: TypeAlias = Annotated[float, Meta(extra={"unit": "V"})]
+DegreesCelsius: TypeAlias = Annotated[float, Meta(extra={"unit": "degC"})]
 Watts: TypeAlias = Annotated[float, Meta(extra={"unit": "W"})]
 Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """Of a whole: 0 to 1."""
 Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
+Kilograms: TypeAlias = Annotated[float, Meta(extra={"unit": "kg"})]
 JobNumber: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 """The last field of a command that may be a job (`forms.jobs`)."""
 QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]

@@ -15,7 +15,7 @@ from foosim.common.errors import Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, Model, slots_problem, with_article, word_of
+from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, SET_BY_FOOSIM, Model, slots_problem, with_article, word_of
 from foosim.world.forms.jobs import JOB
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
@@ -137,7 +137,9 @@ def _settable(found: Any, key: str) -> Iterator[str]:
             yield f"settable: {show(name)}: {NAME_RULE}"
         elif not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif not hasattr(found.made, "set") and found.slots.get(name) != 1:
+        elif isinstance(found, Model) and name in SET_BY_FOOSIM:
+            yield f"settable: {name} is set by foosim itself"
+        elif not hasattr(found.made, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"
 
 
@@ -170,6 +172,11 @@ def _entities(found: Any, key: str) -> Iterator[str]:
             yield f"the model of the entity {name} is a name, not {show(model)}"
 
 
+def _spares(found: Any, key: str) -> Iterator[str]:
+    if found.spares is not None and not callable(found.spares):
+        yield f"spares is a function of the section, not {_shown(found.spares)}"
+
+
 def _kinds(found: Any, key: str) -> Iterator[str]:
     """Yield what is wrong with settings by name, each with its kind."""
     for name, its in getattr(found, key).items():
@@ -196,6 +203,7 @@ OF_FIELD: Final[Mapping[str, Callable[[Any, str], Iterator[str]]]] = {
     "variants": _variants,
     "each": _each,
     "entities": _entities,
+    "spares": _spares,
     "actuators": _kinds,
     "rules": _kinds,
 }

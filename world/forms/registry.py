@@ -206,11 +206,17 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Cal
     return _registering(lambda made: Scene(form="scene", name=name, made=made, settings=settings, kit=kit))
 
 
-def engine(name: str, *, meshes: bool, islands: bool = False) -> Callable[[Made], Made]:
+def engine(name: str, *, meshes: bool, islands: bool = False, grasps: bool = False) -> Callable[[Made], Made]:
     """Register an engine: a class with the methods of `node.physics.interface.EngineKind`."""
     return _registering(
         lambda made: Engine(
-            form="engine", name=name, made=made, settings=ComponentSettings, meshes=meshes, islands=islands
+            form="engine",
+            name=name,
+            made=made,
+            settings=ComponentSettings,
+            meshes=meshes,
+            islands=islands,
+            grasps=grasps,
         )
     )
 

@@ -17,6 +17,7 @@ from foosim.world.spec import WorldSpec
 
 if TYPE_CHECKING:
     from foosim.world.frame import Frame
+    from foosim.world.layout import Entity
 
 
 @kit(HALL, Hall)
@@ -40,7 +41,7 @@ class HallKit:
     def strays(self, frame: Frame) -> list[str]:
         """Return which rovers are in an obstacle, or in one another."""
         radius, obstacles = self._hall.rover.radius, obstacles_of(self._spec)
-        rovers = [rover.name for rover in frame.layout.of("rover")]
+        rovers = [rover.name for rover in _present(frame)]
         places = [(name, frame.at(name, "position"), frame.at(name, "position", 1)) for name in rovers]
         found: list[str] = []
         for number, (name, x, y) in enumerate(places):
@@ -57,7 +58,7 @@ class HallKit:
 
     def status(self, frame: Frame) -> dict[str, Any]:
         """Return how many rovers there are and drive, and which has the least charge (a share)."""
-        rovers = frame.layout.of("rover")
+        rovers = _present(frame)
         if not rovers:
             return {}
         capacity = self._hall.rover.battery.capacity
@@ -73,3 +74,8 @@ class HallKit:
         rovers = status["rovers"]
         count, drive, least, charge = (rovers[key] for key in ("count", "drive", "least", "charge"))
         return f"{count} rovers, {drive} drive, {least} has {charge:.0%} of its charge"
+
+
+def _present(frame: Frame) -> list[Entity]:
+    """Return the rovers that are in the world."""
+    return [rover for rover in frame.layout.of("rover") if not rover.is_absent(frame.numbers)]

@@ -74,6 +74,8 @@ def _material(**keys: Any) -> RadioMaterial:
 
 UNKNOWN: Final = _material(loss="5 dB")
 """A body of which nothing is known: the loss of an internal wall in ns-3 (`InternalWallLoss`, building models)."""
+OPEN: Final = _material(loss="0 dB")
+"""What waves pass as if it were not there."""
 CONCRETE: Final = _material(**{"is": "concrete"})
 METAL: Final = _material(**{"is": "metal"})
 WOOD: Final = _material(**{"is": "wood"})

@@ -44,7 +44,7 @@ class Physics:
     reduction of contacts (`contact_erp`).
 
     `surfaces` and `between_free` are for engines of spheres alone: what a free body feels of each surface, and of
-    another free body.
+    another free body. `density` (kg/m3) and `viscosity` (Pa s) are those of what bodies are in, 0 of nothing.
     """
 
     gravity: float
@@ -53,6 +53,8 @@ class Physics:
     solver_iterations: int
     contact_erp: float
     sides: Mapping[str, Side] = field(default_factory=dict)
+    density: float = 0.0
+    viscosity: float = 0.0
 
 
 RollingLength = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]

@@ -40,6 +40,11 @@ def stands_upright(settings: EntitySettings) -> bool:
     )
 
 
+def is_upright(model: Any) -> bool:
+    """Whether a model that moves is a cylinder to obstacles; one whose `is_upright` is False is what its shapes are."""
+    return bool(getattr(model, "is_upright", True))
+
+
 def upright_of(model: Any) -> Upright:
     """Return the cylinder of a model of an entity that has a body."""
     if hasattr(model, "upright"):

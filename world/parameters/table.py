@@ -241,7 +241,7 @@ class Table(SpecBase):
     strips: Strips | None = None
     surfaces: Surfaces
     ball: Ball
-    spare_balls: Annotated[int, Field(ge=0, le=15)] = 0
+    spare_balls: Annotated[int, Field(ge=0, le=63)] = 0
     """Balls beside the first that a run can add."""
     rod: Rod
     lines: dict[LineName, Line]

@@ -45,7 +45,7 @@ class Caster:
         self._free: list[tuple[Entity, Link]] = []
         self._jointed: list[tuple[Entity, Body]] = []
         meshes = Meshes()
-        bodies = [(layout[name], body) for name, body in sorted(scene.bodies.items())]
+        bodies = [(layout[name], body) for name, body in sorted(scene.bodies.items()) if body.is_solid]
         for entity, body in bodies:
             if body.joints:
                 continue

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from operator import itemgetter
 from typing import Final
 
-from foosim.common.errors import Refused, UnknownName, show
+from foosim.common.errors import Refused, UnknownName
 from foosim.world.layout import Entity, Layout
 
 _NUMBERED: Final = re.compile(r"(?P<fleet>.+)-(?P<number>[0-9]+)")
@@ -30,8 +30,7 @@ def absent_named(layout: Layout, numbers: Sequence[float], name: str) -> Entity:
         stems = {found["fleet"] for entity in layout.entities if (found := _NUMBERED.fullmatch(entity.name))}
         known = [entity.name for entity in layout.entities if entity.can_leave]
         raise Refused(UnknownName("nothing to add", name, [*known, *sorted(stems)]).what)
-    why = "is in the world already" if layout[name].can_leave else "has no place of its own: it is always there"
-    raise Refused(f"{name} {why}")
+    raise Refused(f"{name} is in the world already" if layout[name].can_leave else _always(name))
 
 
 def _numbered(layout: Layout, name: str) -> list[tuple[int, Entity]]:
@@ -45,6 +44,10 @@ def check_present(layout: Layout, numbers: Sequence[float], name: str) -> None:
         known = [entity.name for entity in layout.entities if entity.can_leave and not entity.is_absent(numbers)]
         raise Refused(UnknownName("nothing to remove", name, known).what)
     if not layout[name].can_leave:
-        raise Refused(f"{show(name)} cannot be removed: it has no place of its own")
+        raise Refused(_always(name))
     if layout[name].is_absent(numbers):
-        raise Refused(f"{show(name)} is absent already")
+        raise Refused(f"{name} is absent already")
+
+
+def _always(name: str) -> str:
+    return f"{name} is always in the world: what is fixed, or belongs to a kit, neither comes nor goes"

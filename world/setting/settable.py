@@ -1,5 +1,6 @@
-"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, what its rules
-declare; and the edits that set it, and that add an entity.
+"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, which of its
+components are switched off, what its model and its rules declare; of the world what the rules of the world declare; and
+the edits that set it, and that add an entity.
 
 A pose is set as the deployment would place it: the model places it at tick 0, elsewhere.
 """
@@ -15,15 +16,23 @@ from pydantic_core import PydanticCustomError
 
 from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
-from foosim.common.units import Quantity
-from foosim.world.assembly.world import body_of, entity_rules_of, model_of
+from foosim.common.units import PROBABILITY, Quantity
+from foosim.world.assembly.world import body_of, entity_rules_of, model_of, rules_of
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
 from foosim.world.forms.failures import WrongResult
-from foosim.world.forms.forms import DOWN, NO_ENTITY
+from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Entity, Layout, find_entity_rule
+from foosim.world.layout import (
+    WORLD,
+    Entity,
+    Layout,
+    find_entity_rule,
+    find_rule,
+    switches_of,
+    world_rules,
+)
 from foosim.world.parameters.vehicles import leaning
 from foosim.world.placing import At, is_placed
 from foosim.world.scene import Quaternion, Vector
@@ -31,10 +40,13 @@ from foosim.world.setting.occupied import occupied_by
 from foosim.world.spec import WorldSpec
 
 AT: Final = "at"
+ACTIVE: Final = "active"
 PLACED: Final = ("position", "orientation", "heading")
 STOPPED: Final = ("linear_velocity", "angular_velocity", "base_velocity", "wheel_speeds", "joint_velocities")
 """The fields of a state that are 0 in an entity that was put elsewhere."""
 QUARANTINED: Final = "quarantined"
+FLAGS: Final = ("0", "1")
+"""Shares that need no unit: nothing and all."""
 WITH_A_PLACE: Final = frozenset((*PLACED[1:], *STOPPED, QUARANTINED))
 """What is set with a position."""
 
@@ -64,9 +76,22 @@ def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
         found[DOWN] = "true or false"
     if _is_placed(spec, entity):
         found[AT] = "X,Y or X,Y,Z in m, or keys of x, y, z, roll, pitch, yaw"
+    if INACTIVE in entity.offsets:
+        found |= dict.fromkeys([f"{name}.{ACTIVE}" for name in switches_of(spec.robots[entity.name])], "true or false")
     for label, _, quantities in _declared(spec, layout, entity):
-        found |= {f"{label}.{name}": f"{one.low} to {one.high}" for name, one in quantities.items()}
+        found |= {_field(label, name): valid(one) for name, one in quantities.items()}
     return found
+
+
+def valid(quantity: Quantity) -> str:
+    """Return in words which values of a quantity can be set."""
+    flag = ", or true or false" if quantity.dimension is PROBABILITY else ""
+    return f"{quantity.low} to {quantity.high}{flag}"
+
+
+def _field(label: str, name: str) -> str:
+    """Return what the field of a rule of this name is called; that of a model, which has no name, is called so."""
+    return f"{label}.{name}" if label else name
 
 
 def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
@@ -101,20 +126,33 @@ def set_edits(
         if is_checked:
             check_place(spec, layout, written(layout, numbers, edits), entity)
         return edits
-    label, _, name = field.partition(".")
+    label, _, name = field.rpartition(".")
+    if name == ACTIVE and INACTIVE in entity.offsets and label in (bits := switches_of(spec.robots[entity.name])):
+        if not isinstance(value, bool):
+            raise BadValue("neither true nor false", value)
+        others = int(numbers[entity.offsets[INACTIVE]]) & ~bits[label]
+        return [Set(entity.name, INACTIVE, [float(others if value else others | bits[label])])]
     found = [(made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label and name in its]
     if not found:
         fields = settable(spec, layout, entity)
         there = f"settable are {', '.join(fields)}" if fields else "nothing is"
         raise BadValue(f"not settable on {entity.name}: {there}", field, nearest_name(field, fields))
     made, quantity = found[0]
-    try:
-        number = float(quantity.read(value))
-    except PydanticCustomError as error:
-        raise BadValue(str(error), value) from None
+    number = _number(quantity, value)
     if not hasattr(made, "set"):
         return [Set(entity.name, field, [number])]
-    return called(label, entity.name, 0, _of_component, entity, label, made.set, name, number)
+    what = label or f"model {entity.model}"
+    return called(what, entity.name, 0, _of_component, entity, label, made.set, name, number)
+
+
+def _number(quantity: Quantity, value: object) -> float:
+    """Return the number of a value, of a share 1 for true and 0 for false. Raises BadValue."""
+    if quantity.dimension is PROBABILITY and (isinstance(value, bool) or value in FLAGS):
+        return float(value)
+    try:
+        return float(quantity.read(value))
+    except PydanticCustomError as error:
+        raise BadValue(str(error), value) from None
 
 
 def _of_component(
@@ -123,7 +161,7 @@ def _of_component(
     """Return what a component says that its slots become: its own, else those that are fields of the entity."""
     found = []
     for slot, numbers in ask(name, number).items():
-        field = f"{label}.{slot}" if f"{label}.{slot}" in entity.offsets else slot
+        field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
             raise WrongResult(ask, "finite numbers by slot, as many as each has,", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
@@ -131,10 +169,16 @@ def _of_component(
 
 
 def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple[str, Any, Mapping[str, Quantity]]]:
-    """Yield the rules of a robot: name, rule, and what can be set of it."""
-    if not entity.is_robot:
+    """Yield what has something that can be set: the model, without a name, and the rules; each with what that is."""
+    if entity.name == WORLD:
+        settings = world_rules(spec)
+        yield from (
+            (label, made, find_rule(settings[label]).settable) for label, made in rules_of(spec, layout).items()
+        )
         return
-    for label, rule in entity_rules_of(spec, layout, entity):
+    if entity.kind.settable:
+        yield "", model_of(spec, layout, entity), entity.kind.settable
+    for label, rule in () if not entity.is_robot else entity_rules_of(spec, layout, entity):
         yield label, rule, find_entity_rule(spec.robots[entity.name].rules[label]).settable
 
 

@@ -1,5 +1,6 @@
 // The tab "World": what the rules say, the bodies, and what can be done with the one that is selected.
 
+import { askAdd } from "./adding.js";
 import { dialog, vector } from "./dialogs.js";
 import { counted, time } from "./text.js";
 import { button, byId, field, h, keyed, select, setText } from "./ui.js";
@@ -21,13 +22,13 @@ export class Entities {
     this.list = h("ul", { class: "entities", "aria-label": "Entities" });
     const heads = h("div", { class: "heads" }, ...["Entity", "Model", "Computed by"].map((name) => h("span", {}, name)));
     this.detail = h("section", { class: "detail", "aria-label": "Selected entity" });
-    this.add = button("Add …", () => this.askAdd(), { id: "add" });
+    this.add = button("Add …", () => void this.askAdd(), { id: "add", title: "Add an entity that is absent" });
     byId("panel-world").append(
       h("section", {}, h("h2", {}, "State"), this.facts),
       h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Entities"), this.filter, this.add), heads, this.list),
       this.detail,
     );
-    for (const name of ["scene", "status", "selected", "sources", "connected"]) store.on(name, () => this.draw());
+    for (const name of ["scene", "status", "selected", "absent", "sources", "connected"]) store.on(name, () => this.draw());
     this.draw();
   }
 
@@ -37,9 +38,10 @@ export class Entities {
     this._draw_facts(source);
     const wanted = this.filter.value.trim().toLowerCase();
     const bodies = (source.scene?.bodies ?? []).filter(({ name, model }) => `${name} ${model}`.toLowerCase().includes(wanted));
+    const isAbsent = (/** @type {SceneBody} */ { name }) => source.absent.has(name);
     keyed(
       this.list,
-      bodies.slice(0, ROWS_MAX),
+      [...bodies.filter((body) => !isAbsent(body)), ...bodies.filter(isAbsent)].slice(0, ROWS_MAX),
       (body) => `${body.name} ${body.model}`,
       (body) => {
         const choose = h("button", { type: "button", onclick: () => this.store.select(this.store.selected === body.name ? "" : body.name) });
@@ -49,11 +51,12 @@ export class Entities {
       (row, body) => {
         const choose = /** @type {HTMLElement} */ (row.firstElementChild);
         choose.setAttribute("aria-pressed", String(body.name === this.store.selected));
-        setText(/** @type {Element} */ (choose.lastElementChild), source.ownerOf(body.name));
+        row.classList.toggle("absent", isAbsent(body));
+        setText(/** @type {Element} */ (choose.lastElementChild), isAbsent(body) ? "absent" : source.ownerOf(body.name));
       },
     );
-    this.add.hidden = !source.may("add") || !source.scene?.addable.length;
-    this.add.disabled = !this.desk.may("add");
+    this.add.hidden = !source.may("add") || !source.scene?.bodies.some(({ removable }) => removable);
+    this.add.disabled = !this.desk.may("add") || !source.absent.size;
     this._draw_detail(source);
   }
 
@@ -70,7 +73,7 @@ export class Entities {
     if (status?.reason) facts.push(["Ended", status.reason]);
     const { span } = source.info;
     if (span) facts.push(["Span", `${time(source.seconds(span.first))} to ${time(source.seconds(span.last))}`]);
-    if (source.scene) facts.push(["Scene", `${counted(source.scene.bodies.length, "entity", "entities")}, ${counted(source.scene.links.length, "link")}`]);
+    if (source.scene) facts.push(["Scene", [counted(source.scene.bodies.length, "entity", "entities"), counted(source.scene.links.length, "link"), source.absent.size ? `${source.absent.size} absent` : ""].filter(Boolean).join(", ")]);
     keyed(this.facts, facts, ([name]) => name, ([name]) => h("div", {}, h("dt", {}, name), h("dd")), (row, [, text]) => setText(/** @type {Element} */ (row.lastElementChild), text));
   }
 
@@ -79,52 +82,33 @@ export class Entities {
     const body = source.scene?.bodies.find(({ name }) => name === this.store.selected);
     this.detail.hidden = !body;
     if (!body) return;
-    const owner = source.ownerOf(body.name);
-    const key = [body.name, owner, body.pushable, body.removable, source.info.verbs, this.desk.connection.connected].join(" ");
+    const isAbsent = source.absent.has(body.name);
+    const owner = isAbsent ? "" : source.ownerOf(body.name);
+    const key = [body.name, owner, isAbsent, body.pushable, body.removable, source.info.verbs, this.desk.connection.connected].join(" ");
     if (this.detail.dataset.drawn === key) return;
     this.detail.dataset.drawn = key;
     const may = (/** @type {string} */ verb) => this.desk.may(verb);
     const owned = Object.values(source.status?.nodes ?? {}).some((/** @type {any} */ node) => node.owned?.includes(body.name));
-    const actions = [
+    const plot = button("Plot …", () => this.actions.plot(body.name));
+    const add = body.removable && source.may("add") ? button("Add …", () => void this.askAdd(), { disabled: !may("add"), id: "add-selected" }) : null;
+    const actions = (isAbsent ? [plot, add] : [
       button("Follow", this.actions.follow, { title: "Keep the view on it (F)" }),
-      button("Plot …", () => this.actions.plot(body.name)),
+      plot,
       body.pushable && source.may("push") ? button("Push …", () => this.askPush(body.name), { disabled: !may("push"), id: "push" }) : null,
       Object.keys(body.settable).length && source.may("set") ? button("Set …", () => this.askSet(body.name, body.settable), { disabled: !may("set"), id: "set" }) : null,
       owned && source.may("move") ? button("Move …", () => this.askMove(body.name), { disabled: !may("move"), id: "move" }) : null,
       body.removable && source.may("remove") ? button("Remove …", () => this.askRemove(body.name), { disabled: !may("remove"), id: "remove", class: "danger" }) : null,
-    ].filter((one) => one !== null);
+    ]).filter((one) => one !== null);
     this.detail.replaceChildren(
       h("h2", {}, body.name),
-      h("p", {}, `${body.model}, ${counted(body.links.length, "link")}${owner ? `, computed by ${owner}` : ""}`),
+      h("p", {}, `${body.model}, ${counted(body.links.length, "link")}${owner ? `, computed by ${owner}` : ""}${isAbsent ? ", absent" : ""}`),
       h("div", { class: "row" }, ...actions),
     );
   }
 
-  async askAdd() {
-    const addable = this.store.main?.scene?.addable ?? [];
-    const model = select(addable.map((one) => [one.model, one.model]), addable[0]?.model ?? "");
-    const name = h("input", { placeholder: "chosen for you", maxlength: 64 });
-    const position = h("input", { value: "", required: true });
-    const velocity = h("input", { value: "", required: true });
-    const usual = () => {
-      const one = addable.find((one) => one.model === model.value);
-      position.value = (one?.position ?? [0, 0, 0]).join(" ");
-      velocity.value = (one?.velocity ?? [0, 0, 0]).join(" ");
-    };
-    model.addEventListener("change", usual);
-    usual();
-    const models = addable.length > 1 ? [field("Model", model)] : [];
-    const content = [...models, field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
-    await dialog(addable.length > 1 ? "Add an entity" : `Add: ${model.value}`, content, {
-      action: "Add",
-      send: () => {
-        const at = vector(position.value, "Position");
-        const speed = vector(velocity.value, "Velocity");
-        if (typeof at === "string") return at;
-        if (typeof speed === "string") return speed;
-        return this.desk.ask("add", { model: model.value, ...(name.value ? { name: name.value } : {}), position: at, velocity: speed });
-      },
-    });
+  askAdd() {
+    const source = this.store.main;
+    return source ? askAdd(source, this.desk, this.store.selected) : undefined;
   }
 
   /** @param {string} name */
@@ -174,7 +158,7 @@ export class Entities {
 
   /** @param {string} name */
   async askRemove(name) {
-    await dialog(`Remove ${name}?`, [h("p", {}, `${name} leaves the world at the next tick.`)], {
+    await dialog(`Remove ${name}?`, [h("p", {}, `${name} leaves the world at the next tick. It can be added again.`)], {
       action: "Remove",
       danger: true,
       send: () => this.desk.ask("remove", { name }),

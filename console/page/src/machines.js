@@ -110,12 +110,13 @@ export class Machines {
     toggle.disabled = !this.desk.may(gone ? "start" : "stop") || (shared && !gone);
     toggle.title = shared && !gone ? `${name} shares process ${shared}, so it cannot be stopped alone` : "";
     const busy = process?.busy ?? 0;
+    const owned = node.owned.filter((/** @type {string} */ robot) => !this.store.main?.absent.has(robot));
     load.style.setProperty("--share", String(Math.min(1, busy)));
-    setText(load.children[1], `load ${percent(busy, 0)}, ${counted(node.owned.length, "robot")}${shared ? `, process ${shared}` : ""}${process?.host ? `, on ${process.host}` : ""}`);
+    setText(load.children[1], `load ${percent(busy, 0)}, ${counted(owned.length, "robot")}${shared ? `, process ${shared}` : ""}${process?.host ? `, on ${process.host}` : ""}`);
     const mayMove = this.desk.may("move");
-    keyed(robots, node.owned.slice(0, ROBOTS_SHOWN_MAX), (/** @type {string} */ robot) => robot, (/** @type {string} */ robot) => this._chip(robot), (chip) => chip.classList.toggle("movable", mayMove));
-    const hidden = node.owned.length - ROBOTS_SHOWN_MAX;
-    setText(more, hidden > 0 ? `and ${hidden} more` : node.owned.length ? "" : "owns no robot");
+    keyed(robots, owned.slice(0, ROBOTS_SHOWN_MAX), (/** @type {string} */ robot) => robot, (/** @type {string} */ robot) => this._chip(robot), (chip) => chip.classList.toggle("movable", mayMove));
+    const hidden = owned.length - ROBOTS_SHOWN_MAX;
+    setText(more, hidden > 0 ? `and ${hidden} more` : owned.length ? "" : "owns no robot");
   }
 
   /** A robot, to be dragged to another node, or moved by its button. @param {string} robot */

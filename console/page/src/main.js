@@ -25,7 +25,7 @@ const HZ = 50;
 
 /** @type {Stat} */
 const stat = {
-  frames: 0, tick: -1, generation: -1, connected: false, errors: 0, messages: 0, poses: 0, links: 0, bodies: 0, drawn: -1,
+  frames: 0, tick: -1, generation: -1, connected: false, errors: 0, messages: 0, poses: 0, links: 0, bodies: 0, absent: 0, drawn: -1,
   role: "", paused: false, marks: 0, contacts: 0, rays: 0, radio: 0, flashes: 0, flashing: 0, view: "",
 };
 window.foosim = { stat };
@@ -147,6 +147,7 @@ store.on("poses", (source) => {
   if (source.info.id !== 0) return;
   stat.tick = source.tick;
   stat.paused = source.paused;
+  stat.absent = source.absent.size;
 });
 store.on("scene", (source) => {
   if (source.info.id !== 0) return;

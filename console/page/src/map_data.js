@@ -1,6 +1,6 @@
 // A scene and its poses as data of a map: shapes as seen from above.
 
-import { decodeMesh, FLOATS_PER_LINK } from "./messages.js";
+import { decodeMesh, FLOATS_PER_LINK, isPlaced } from "./messages.js";
 
 /** Corners of a mesh that its outline is made of; of a mesh with more the outermost ones in so many directions. */
 const CORNERS_MAX = 400;
@@ -135,7 +135,7 @@ export function mapOf(scene, poses) {
     const [x, y, z, qx, qy, qz, qw] = poses.subarray(link * FLOATS_PER_LINK, (link + 1) * FLOATS_PER_LINK);
     return { position: /** @type {Vec3} */ ([x, y, z]), orientation: /** @type {Quat} */ ([qx, qy, qz, qw]) };
   };
-  const bodies = scene.bodies.filter((body) => body.links.length).map((body) => {
+  const bodies = scene.bodies.filter(({ links }) => links.length && isPlaced(poses, links[links.length - 1])).map((body) => {
     const { position } = poseOf(body.links[body.links.length - 1]);
     const shapes = body.links.flatMap((link) => {
       const pose = poseOf(link);

@@ -6,6 +6,11 @@ const JUMP = 1;
 const PAUSED = 2;
 export const FLOATS_PER_LINK = 7;
 
+/** Whether a link has a pose: what is absent has none. @param {Float32Array} poses @param {number} link */
+export function isPlaced(poses, link) {
+  return !Number.isNaN(poses[link * FLOATS_PER_LINK]);
+}
+
 /**
  * Decode a binary message: a header of 24 bytes, seven float32 for each link, one for each value that is plotted.
  * The arrays are views of the buffer. Throws where the length is not what the header says.

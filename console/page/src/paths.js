@@ -2,7 +2,7 @@
 
 import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Group, LineBasicMaterial, LineSegments } from "three";
 import { paletteColour } from "./colours.js";
-import { FLOATS_PER_LINK } from "./messages.js";
+import { FLOATS_PER_LINK, isPlaced } from "./messages.js";
 
 const SEGMENTS = 1024;
 const BODIES_MAX = 256;
@@ -30,6 +30,10 @@ class Path {
 
   /** @param {Float32Array} poses @param {number} tick @param {number} tick_s @param {boolean} cut */
   add(poses, tick, tick_s, cut) {
+    if (!isPlaced(poses, this.link)) {
+      this.last = null;
+      return;
+    }
     const start = this.link * FLOATS_PER_LINK;
     const [x, y, z] = [poses[start], poses[start + 1], poses[start + 2]];
     const last = this.last;

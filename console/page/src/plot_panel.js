@@ -157,7 +157,7 @@ export class PlotPanel {
     this.send({ type: "plot", source: 0, series, generation });
   }
 
-  /** The places of numbers differ in another layout: they are found again by name. @param {import("./store.js").Source} source */
+  /** A page may come to another run, whose numbers are in other places: they are found again by name. @param {import("./store.js").Source} source */
   _scene(source) {
     const choices = choicesOf(source);
     for (const line of this.lines) {
@@ -184,7 +184,7 @@ export class PlotPanel {
     const fields = this.lines.filter(({ request }) => request.field !== undefined);
     // After a change, poses that were on their way have the values of before.
     if (!poses || !fields.length || poses.values.length !== fields.length) return;
-    fields.forEach(({ ring }, index) => ring.push(poses.tick, poses.values[index]));
+    fields.forEach(({ ring }, index) => ring.push(poses.tick, Number.isNaN(poses.values[index]) ? null : poses.values[index]));
   }
 
   /** @param {{id: string, points: [number, number][]}[]} series */

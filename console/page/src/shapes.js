@@ -4,7 +4,7 @@ import {
   BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, CylinderGeometry, DynamicDrawUsage, InstancedMesh, Matrix4,
   MeshLambertMaterial, Quaternion, SphereGeometry, Vector3,
 } from "three";
-import { FLOATS_PER_LINK, decodeMesh } from "./messages.js";
+import { FLOATS_PER_LINK, decodeMesh, isPlaced } from "./messages.js";
 
 /** @typedef {{shape: Shape, link: number}} Placed a shape and its link; -1: it never moves */
 
@@ -14,9 +14,10 @@ const one = new Vector3(1, 1, 1);
 const whole = new Matrix4();
 
 /**
- * The matrix of a link from the poses of all. @param {Float32Array} poses @param {number} link @param {Matrix4} into
+ * The matrix of a link from the poses of all; of one that is absent it leaves nothing to see. @param {Float32Array} poses @param {number} link @param {Matrix4} into
  */
 export function linkMatrix(poses, link, into) {
+  if (!isPlaced(poses, link)) return into.makeScale(0, 0, 0);
   const start = link * FLOATS_PER_LINK;
   at.set(poses[start], poses[start + 1], poses[start + 2]);
   turn.set(poses[start + 3], poses[start + 4], poses[start + 5], poses[start + 6]);

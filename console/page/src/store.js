@@ -1,7 +1,14 @@
 // What the page knows of its sources. Modules listen by name; what is drawn reads the newest state when it draws.
 
+import { isPlaced } from "./messages.js";
+
 const MARKS_MAX = 5000;
 const NOTES_MAX = 300;
+
+/** The bodies of a scene that are absent in poses. @param {SceneMessage} scene @param {Poses} poses */
+function absentIn(scene, poses) {
+  return new Set(scene.bodies.filter(({ links }) => links.length > 0 && !isPlaced(poses.links, links[0])).map(({ name }) => name));
+}
 
 /** One thing that the page looks at: a run, a capture, a replay, recorded poses. */
 export class Source {
@@ -12,6 +19,8 @@ export class Source {
     this.scene = null;
     /** @type {Poses | null} */
     this.poses = null;
+    /** @type {Set<string>} the bodies that are absent in these poses */
+    this.absent = new Set();
     /** @type {Status | null} */
     this.status = null;
     /** @type {LinkWindow[]} */
@@ -128,7 +137,11 @@ export class Store {
     const source = this.sources.get(poses.source);
     if (!source?.scene || source.scene.generation !== poses.generation) return;
     source.poses = poses;
+    const absent = absentIn(source.scene, poses);
+    const others = absent.size !== source.absent.size || [...absent].some((name) => !source.absent.has(name));
+    source.absent = absent;
     this.emit("poses", source);
+    if (others) this.emit("absent", source);
   }
 
   /** @param {any} message */
@@ -174,6 +187,7 @@ export class Store {
       case "scene":
         source.scene = message;
         source.poses = null;
+        source.absent = new Set();
         source.overlay = null;
         break;
       case "status":

@@ -17,13 +17,12 @@ interface Shape {
 }
 
 interface SceneLink { name: string; body: string; shapes: Shape[] }
-interface SceneBody { name: string; model: string; links: number[]; removable: boolean; pushable: boolean; settable: Record<string, string> }
+interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string> }
 interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
 interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
 interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
 /** A kind of marks that a rule of the world brings; with `cut` something is put elsewhere then. */
 interface SceneMark { look: string; text: string; cut: boolean }
-interface Addable { model: string; position: Vec3; velocity: Vec3 }
 
 interface SceneMessage {
   type: "scene";
@@ -38,14 +37,16 @@ interface SceneMessage {
   sensors: SceneSensor[];
   meshes: Record<string, { vertices: string; triangles: string }>;
   bounds: [Vec3, Vec3];
-  addable: Addable[];
   /** The kinds of marks that the rules of the world bring. */
   marks: Record<string, SceneMark>;
   /** Ids of the link rules that can be set, and all endpoints; absent where there is no deployment. */
   network?: {rules: string[], endpoints: string[]};
 }
 
-/** Poses of all links: 7 numbers each (x, y, z in m; quaternion x, y, z, w); behind them the values that are plotted. */
+/**
+ * Poses of all links: 7 numbers each (x, y, z in m; quaternion x, y, z, w); behind them the values that are plotted. Of what
+ * is absent they are not a number.
+ */
 interface Poses {
   source: number;
   jump: boolean;
@@ -142,6 +143,7 @@ interface Stat {
   poses: number;
   links: number;
   bodies: number;
+  absent: number;
   drawn: number;
   role: string;
   paused: boolean;

@@ -2,7 +2,7 @@
 
 import { Color, Group, Matrix4 } from "three";
 import { coloursOf } from "./colours.js";
-import { FLOATS_PER_LINK } from "./messages.js";
+import { FLOATS_PER_LINK, isPlaced } from "./messages.js";
 import { Paths } from "./paths.js";
 import { batchesOf, linkMatrix } from "./shapes.js";
 
@@ -91,7 +91,7 @@ export class World {
     return true;
   }
 
-  /** Where a body is: the place of its last link, which moves most. @param {SceneBody} body @param {import("three").Vector3} into */
+  /** Where a body is: the place of its last link, which moves most; null where it is absent. @param {SceneBody} body @param {import("three").Vector3} into */
   placeOf(body, into) {
     const poses = this.source.poses;
     if (!poses || !body.links.length) return null;
@@ -101,7 +101,7 @@ export class World {
   /** @param {number} link @param {import("three").Vector3} into */
   placeOfLink(link, into) {
     const poses = this.source.poses;
-    if (!poses || (link + 1) * FLOATS_PER_LINK > poses.links.length) return null;
+    if (!poses || (link + 1) * FLOATS_PER_LINK > poses.links.length || !isPlaced(poses.links, link)) return null;
     const start = link * FLOATS_PER_LINK;
     return into.set(poses.links[start], poses.links[start + 1], poses.links[start + 2]);
   }

@@ -3,6 +3,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
+import { Matrix4 } from "three";
+import { addableOf, placeOf } from "../src/adding.js";
 import { choiceOf, choicesOf } from "../src/choices.js";
 import { curveVariable, lossColour } from "../src/colours.js";
 import { Connection, tokenOf } from "../src/connection.js";
@@ -13,7 +15,7 @@ import { decodePoses } from "../src/messages.js";
 import { bannerOf, stateOf } from "../src/presence.js";
 import { moreText, oldText } from "../src/network.js";
 import { Ring } from "../src/ring.js";
-import { batchesOf } from "../src/shapes.js";
+import { batchesOf, linkMatrix } from "../src/shapes.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
 
@@ -48,6 +50,32 @@ test("poses of another scene than the page has are dropped", () => {
   assert.equal(store.main.poses, null);
   store.takePoses(decodePoses(posesMessage({ generation: 2 })));
   assert.equal(store.main.tick, 5);
+});
+
+test("what has no pose is absent, and who listens is told when that changes", () => {
+  const store = new Store();
+  store.take({ type: "welcome", role: "viewer", version: "1", sources: [INFO] });
+  const bodies = [{ name: "a", links: [0] }, { name: "b", links: [1] }, { name: "bare", links: [] }];
+  store.take({ type: "scene", source: 0, generation: 1, links: [], bodies });
+  const told = [];
+  store.on("absent", (source) => told.push([...source.absent]));
+  const there = decodePoses(posesMessage({ links: 2 }));
+  const gone = decodePoses(posesMessage({ links: 2 }));
+  gone.links.fill(NaN, 7);
+  for (const poses of [there, gone, gone, there]) store.takePoses(poses);
+  assert.deepEqual(told, [["b"], []]);
+  assert.deepEqual(linkMatrix(gone.links, 1, new Matrix4()).elements.slice(0, 15), new Array(15).fill(0));
+  assert.deepEqual(linkMatrix(there.links, 0, new Matrix4()).elements.slice(12, 15), [0, 1, 2]);
+});
+
+test("what can be added are entities and fleets that are absent, at a place with units", () => {
+  const bodies = ["ball", "ball-2", "ball-3", "crate", "rod"].map((name) => ({ name, removable: name !== "ball" && name !== "rod" }));
+  const names = (absent) => addableOf(bodies, new Set(absent)).map(([name]) => name);
+  assert.deepEqual(names(["ball-2", "ball-3", "rod"]), ["ball-2", "ball-3", "ball"]);
+  assert.deepEqual(names(["ball-3", "crate"]), ["ball-3", "crate"]);
+  assert.deepEqual(names([]), []);
+  assert.deepEqual(placeOf({ x: " 0.5", y: "20 cm", z: "", yaw: "-90" }), { x: "0.5 m", y: "20 cm", yaw: "-90 deg" });
+  assert.equal(placeOf({ x: "", y: " " }), undefined);
 });
 
 test("one listener that fails is reported, and the others are told", () => {

@@ -1,0 +1,1 @@
+"""Models of what robots have to get along with: fires, doors."""

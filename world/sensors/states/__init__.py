@@ -1,0 +1,1 @@
+"""Sensors of what a robot knows of itself."""
