@@ -28,7 +28,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 9)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 111)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))

@@ -53,6 +53,7 @@ from foosim.world.sensors.states.job import Jobs
 from foosim.world.sensors.table.ball_state import BallState
 from foosim.world.sensors.table.figure_contact import FigureTouches
 from foosim.world.sensors.table.motor_current import Currents
+from foosim.world.sensors.thermometer import Temperature
 from foosim.world.sensors.velocity import Velocity
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -95,6 +96,7 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     ),
     "wheel_speeds": (Drive(-0.5, 1.2), [-0.5, 1.2], ["m/s", "m/s"]),
     "contact": (Touches(2.0, 0.125, -1.0), [2.0, 0.125, -1.0], ["", "N s", ""]),
+    "thermometer": (Temperature(26.5), [26.5], ["degC"]),
     "gps": (GlobalPosition(52.5, -13.25, 1 / 3), [52.5, -13.25, 1 / 3], ["deg", "deg", "m"]),
     "imu": (Inertial(0.1, -0.2, 9.81, 1.0, 2.0, 1 / 3), [0.1, -0.2, 9.81, 1.0, 2.0, 1 / 3],
             ["m/s2"] * 3 + ["rad/s"] * 3),
@@ -110,7 +112,7 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 """A value of each kind, its numbers, and the units of its fields."""
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 SIZES |= {"rod_force": 16, "rod_velocity": 16, "rod_voltage": 16, "ball_state": 72, "motor_current": 16}
-SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8}
+SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8, "thermometer": 8}
 SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "go_to": 16, "velocity": 48}
 """In bytes, of the kinds that have as many numbers always."""
 SEVERAL = {
