@@ -7,15 +7,18 @@ from pathlib import Path
 from runpy import run_path
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 from foosim.client.commands import CommandEncoder
 from foosim.client.jobs import Job, Jobs
 from foosim.client.player import Sample
+from foosim.client.vectors import CommandVector
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.go_to import Place
 from foosim.world.forms.jobs import JobState
+from foosim.world.forms.per_field import codec_of
 from foosim.world.sensors.states.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
@@ -171,3 +174,11 @@ def test_the_guides_simulation_comes_to_its_place(
     assert [name for name, _ in blocks] == ["scout.yaml", "send.py", "walk.py"]
     run_path("walk.py")
     assert re.fullmatch(r"there at [2-6]\.\d s\n", capsys.readouterr().out)
+
+
+def test_what_learns_gives_plain_commands() -> None:
+    """The number of a job is neither a column of an action nor in the packet."""
+    vector = CommandVector(DEPLOYMENT, ["scout"])
+    assert [column.field for column in vector.columns] == ["x", "y"]
+    (packet,) = vector.packets(np.array([1.0, 2.0]))
+    assert codec_of("go_to", "actuator").decode(packet.payload) == Place(1.0, 2.0)
