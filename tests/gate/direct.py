@@ -179,7 +179,7 @@ DIRECT: Final = (
     DirectMutant(
         "epochs are volatile",
         "a restarted supervisor continues with a greater epoch",
-        "tests/laws/test_recovery_law.py::test_robots_go_back_also_when_the_supervisor_ends_amid_an_epoch[1-2]",
+        "tests/supervisor/test_take_over.py::test_after_a_take_over_epochs_are_above_those_of_the_journal",
         _volatile,
     ),
     DirectMutant(

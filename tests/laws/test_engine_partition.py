@@ -383,5 +383,5 @@ class StillAsleep(BulletEngine):
     ],
 )
 def test_a_broken_rule_is_seen(broken: Callable[[Deployment, Layout], Engine], sets: Sequence[str], pile: bool) -> None:
-    outcome = compare(broken, PILE_TICKS if pile else 3 * TICKS, sets, pile, until_it_differs=True)
+    outcome = compare(broken, 2 * PILE_TICKS if pile else 3 * TICKS, sets, pile, until_it_differs=True)
     assert outcome.differing, outcome
