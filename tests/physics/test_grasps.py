@@ -17,7 +17,7 @@ from foosim.world.components.grasping import grasp_of
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
-from foosim.world.sensors.gripper import GripperState
+from foosim.world.sensors.rigid.gripper import GripperState
 from tests.forms.worlds import DEPLOY
 from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, folder, porter, world
 

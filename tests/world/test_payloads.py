@@ -38,7 +38,6 @@ from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
-from foosim.world.sensors.contact import Touches
 from foosim.world.sensors.encoder import RodPosition
 from foosim.world.sensors.gps import GlobalPosition
 from foosim.world.sensors.imu import Inertial
@@ -50,6 +49,7 @@ from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 from foosim.world.sensors.range import Distance
+from foosim.world.sensors.rigid.contact import Touches
 from foosim.world.sensors.table.ball_state import BallState
 from foosim.world.sensors.table.figure_contact import FigureTouches
 from foosim.world.sensors.table.motor_current import Currents
