@@ -23,8 +23,8 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.world.forms.jobs import JOB, JobState
 from foosim.world.forms.registry import find_component
-from foosim.world.sensors.states.job import Jobs as Reading
-from foosim.world.sensors.states.job import JobSettings
+from foosim.world.sensors.job import Jobs as Reading
+from foosim.world.sensors.job import JobSettings
 
 REPEAT_NS: Final = 100_000_000
 """Simulated time after which a command is sent again that is not known to have been taken."""

@@ -111,7 +111,7 @@ def crane(x: float, *, y: float = 0.0, yaw_deg: float = 0.0, **gripper: Any) -> 
             "joints": {"kind": "joint_position", "gain": "5 Hz"},
         },
         "sensors": {
-            "grip": {"kind": "gripper", "rate": "50 Hz"},
+            "grip": {"kind": "gripper_state", "rate": "50 Hz"},
             "state": {"kind": "joint_state", "rate": "50 Hz"},
         },
     }
@@ -130,7 +130,7 @@ def porter(x: float, **more: Any) -> dict[str, Any]:
             "lift": {"kind": "joint_position", "joints": ["fork"], "gain": "5 Hz"},
             "wheels": {"kind": "joint_velocity", "joints": list(WHEELS)},
         },
-        "sensors": {"grip": {"kind": "gripper", "rate": "50 Hz"}},
+        "sensors": {"grip": {"kind": "gripper_state", "rate": "50 Hz"}},
         **more,
     }
 

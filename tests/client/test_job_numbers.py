@@ -19,7 +19,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.go_to import Place
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
-from foosim.world.sensors.states.job import Jobs as Reading
+from foosim.world.sensors.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
 GUIDE: Final = Path(__file__).parents[2] / "docs" / "how-to" / "give_jobs.md"

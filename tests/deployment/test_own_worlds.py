@@ -236,7 +236,7 @@ KITS: Final = {
     "spares=lambda section: {'Leo': 'ball'}": [f"spares returns the entity 'Leo': {NAME_RULE}"],
     "spares=lambda section: ['ball']": ["spares returns a mapping of names to models, not a list of 1"],
     "spares=lambda section: 1 // 0": ["spares fails: ZeroDivisionError: integer division or modulo by zero "
-                                      "(own_form.py:70)"],
+                                      "(own_form.py:72)"],
 }  # fmt: skip
 """Kits, and what is said of a table with each."""
 

@@ -370,7 +370,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("sensor", "motor_current"): sensor(TABLE, RODS, "motor_current", slide="9 N/A", spin="0.2 N m/A"),
     ("sensor", "gps"): sensor(EARTH, ROVERS, "gps", at={"x": "10 cm", "z": "50 cm"}),
     ("sensor", "imu"): sensor(TABLE, RODS, "imu", at={"link": "spin", "x": "5 cm", "y": "20 cm"}),
-    ("sensor", "gripper"): sensor(GRIPS, ("one", "two"), "gripper"),
+    ("sensor", "gripper_state"): sensor(GRIPS, ("one", "two"), "gripper_state"),
     ("sensor", "joint_state"): sensor(
         TABLE, RODS, "joint_state", modifiers=[{"kind": "gaussian_noise", "std": {"motion": 0.001, "efforts": 0.5}}]
     ),

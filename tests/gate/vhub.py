@@ -123,7 +123,7 @@ def _go_once(planting: Planting) -> None:
     planting.swap(Sessions, "repeat", repeat)
 
 
-@register("any Done will do", "Done(k) answers Go(k)", 8)
+@register("any Done will do", "Done(k) answers Go(k)", 24)
 def _any_done(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
         session = self._session(done)

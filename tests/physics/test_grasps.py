@@ -17,7 +17,7 @@ from foosim.world.components.grasping import grasp_of
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
-from foosim.world.sensors.gripper import GripperState
+from foosim.world.sensors.rigid.gripper_state import GripperState
 from tests.forms.worlds import DEPLOY
 from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, folder, porter, world
 
@@ -419,7 +419,7 @@ BASE: Final = {"model": "holonomic", "actuators": {"grip": {"kind": "gripper"}}}
         ),
         ({"a": crane(0.0, at={"link": "gripp"})}, {}, ["robots.a.actuators.gripper.at.link", "no such link", "grip"]),
         (
-            {"a": crane(0.0) | {"sensors": {"g": {"kind": "gripper", "rate": "1 Hz", "gripper": "griper"}}}},
+            {"a": crane(0.0) | {"sensors": {"g": {"kind": "gripper_state", "rate": "1 Hz", "gripper": "griper"}}}},
             {},
             ["robots.a.sensors.g.gripper", "has no such gripper; there are gripper"],
         ),

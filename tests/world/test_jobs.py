@@ -22,7 +22,7 @@ from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.quantities import JobNumber, Metres
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.sensors.states.job import Jobs
+from foosim.world.sensors.job import Jobs
 from tests.kinematic_yard import yard_text
 
 NAME: Final = "yard.yaml"

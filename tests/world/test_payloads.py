@@ -21,6 +21,7 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.force import Push
 from foosim.world.actuators.go_to import Place
+from foosim.world.actuators.gripper import Grip
 from foosim.world.actuators.joint_position import JointPositions
 from foosim.world.actuators.joint_torque import JointEfforts
 from foosim.world.actuators.joint_velocity import JointVelocities
@@ -38,10 +39,10 @@ from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
-from foosim.world.sensors.contact import Touches
 from foosim.world.sensors.encoder import RodPosition
 from foosim.world.sensors.gps import GlobalPosition
 from foosim.world.sensors.imu import Inertial
+from foosim.world.sensors.job import Jobs
 from foosim.world.sensors.joint_state import JointState
 from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.sensors.odometry import WheelTravel
@@ -49,7 +50,8 @@ from foosim.world.sensors.pose import Pose
 from foosim.world.sensors.pose_3d import Pose3d
 from foosim.world.sensors.proximity import Ranges
 from foosim.world.sensors.range import Distance
-from foosim.world.sensors.states.job import Jobs
+from foosim.world.sensors.rigid.contact import Touches
+from foosim.world.sensors.rigid.gripper_state import GripperState
 from foosim.world.sensors.table.ball_state import BallState
 from foosim.world.sensors.table.figure_contact import FigureTouches
 from foosim.world.sensors.table.motor_current import Currents
@@ -87,6 +89,8 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "v_w": (Motion(0.5, -1.2), [0.5, -1.2], ["m/s", "rad/s"]),
     "x_y_w": (Base(0.5, -1.2, 0.1), [0.5, -1.2, 0.1], ["m/s", "m/s", "rad/s"]),
     "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3, 7.0), [0.5, -1.2, 9.0, 1 / 3, 7.0], ["m", "m", "m", "rad", ""]),
+    "gripper": (Grip(1.0), [1.0], [""]),
+    "gripper_state": (GripperState(1.0, 1.0, 2.5), [1.0, 1.0, 2.5], ["", "", "kg"]),
     "go_to": (Place(0.5, -1.2, -7.0), [0.5, -1.2, -7.0], ["m", "m", ""]),
     "job": (Jobs(1.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 3.0, 0.0, 2.0, 0.0], [""] * 3),
     "velocity": (
@@ -113,7 +117,16 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
 SIZES = {"encoder": 16, "ball": 24, "rod_position": 16, "pose": 24, "odometry": 16, "battery": 16, "wheel_speeds": 16}
 SIZES |= {"rod_force": 16, "rod_velocity": 16, "rod_voltage": 16, "ball_state": 72, "motor_current": 16}
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8, "thermometer": 8}
-SIZES |= {"force": 48, "v_w": 16, "x_y_w": 24, "waypoint": 32, "go_to": 16, "velocity": 48}
+SIZES |= {
+    "gripper": 8,
+    "gripper_state": 24,
+    "force": 48,
+    "v_w": 16,
+    "x_y_w": 24,
+    "waypoint": 32,
+    "go_to": 16,
+    "velocity": 48,
+}
 """In bytes, of the kinds that have as many numbers always."""
 SEVERAL = {
     "figure_contact",

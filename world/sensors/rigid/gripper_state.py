@@ -27,7 +27,7 @@ class GripperState(Struct, frozen=True):
     mass: Kilograms
 
 
-@sensor("gripper", GripperStateSettings, GripperState)
+@sensor("gripper_state", GripperStateSettings, GripperState)
 class GripperSensor:
     """Whether a gripper is told to close, whether it holds something, and the mass of that."""
 

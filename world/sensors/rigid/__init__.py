@@ -1,0 +1,1 @@
+"""Sensors of rigid bodies: what they touch and hold."""

@@ -1,1 +1,0 @@
-"""Sensors of what a robot knows of itself."""
