@@ -122,7 +122,7 @@ def test_the_order_in_which_components_are_named_is_nothing() -> None:
     )
     assert one.digest == other.digest
     assert one.components("red.goal") == ["alpha", "one", "zeta"]
-    assert list(one["red.goal"].offsets)[-3:] == ["one.set_point", "alpha.samples", "zeta.samples"]
+    assert list(one["red.goal"].offsets)[-4:] == ["one.set_point", "inactive", "alpha.samples", "zeta.samples"]
 
 
 def test_a_robot_without_actuators_has_its_models_and_one_that_names_them_has_those() -> None:
