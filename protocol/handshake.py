@@ -78,6 +78,8 @@ class Member:
         self._not_valid: str | None = None
         """The deployment of which that is said; another one may still be good."""
         self.build: Build | None = None
+        self._known: Build | None = None
+        """The build of the world that is here, also while it takes part in nothing."""
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
         """The layout of the world at the build."""
@@ -108,9 +110,9 @@ class Member:
         if build.boot != self.boot or (isinstance(build, Build) and build.deployment == self._not_valid):
             return False
         if self.build is not None:
-            return isinstance(build, Build) and self._take_again(self.build, build)
+            return isinstance(build, Build) and self._take_again(build)
         if isinstance(build, Build):
-            if self._coming is None:
+            if self._coming is None and self._is_of_this_run(build):
                 self._begin_build(build)
         elif self._coming is not None and self._coming[2].take(build):
             self.deadline_ns = 0  # the next one follows at once
@@ -141,7 +143,8 @@ class Member:
         except AssetError as error:
             raise self._invalid(build, f"a file of the deployment is not valid on its machine: {error}") from None
         self.deployment, self.layout = deployment, build_layout(deployment)
-        self.build, self.problem = build, ""
+        self.build = self._known = build
+        self.problem = ""
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
 
@@ -164,13 +167,19 @@ class Member:
         """The tick of the run's first frame."""
         return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
 
-    def _take_again(self, known: Build, build: Build) -> bool:
+    def _is_of_this_run(self, build: Build) -> bool:
+        """Whether a build is of the run that this process has built the world of, or the first one."""
+        if self._known is None or (build.run, build.deployment) == (self._known.run, self._known.deployment):
+            return True
+        self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {self._known.run}"
+        self._actions.append(Log("error", self.refusal))
+        return False
+
+    def _take_again(self, build: Build) -> bool:
         """Accept the answer of the supervisor that has recalled this process, if it is of the same run."""
         if not self._recalled_by or self.deployment is None:
             return False
-        if (build.run, build.deployment) != (known.run, known.deployment):
-            self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {known.run}"
-            self._actions.append(Log("error", self.refusal))
+        if not self._is_of_this_run(build):
             return False
         self._recalled_by = ""
         self.build = build
