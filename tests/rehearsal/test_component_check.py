@@ -438,14 +438,14 @@ def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) ->
         os.close(theirs)
         with os.fdopen(ours, "rb", buffering=0) as terminal:
             shown = b""
-            while b"rehearsal 1 of 8: on one node\r\n" not in shown:
+            while b"rehearsal 1 of 10: on one node\r\n" not in shown:
                 shown += terminal.read(4096)
             process.send_signal(signal.SIGINT)
             with suppress(OSError):  # the other end is closed
                 while more := terminal.read(4096):
                     shown += more
         assert process.wait() == 130
-    first = "rehearsal 1 of 8: on one node"
+    first = "rehearsal 1 of 10: on one node"
     assert shown.decode().splitlines() == [first, f"sensor own: interrupted, {first}"]
 
 
