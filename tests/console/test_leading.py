@@ -136,7 +136,7 @@ def test_what_has_nothing_of_the_run_is_refused_with_the_names_of_both(tmp_path:
         with pytest.raises((BadValue, BadPoses), match=said):
             open_follower(csv, leader, table())
     csv.write_text("time,entity,x,y\n0,tiger,1,2\n0,ball,1,2\n0,ball-2,1,2\n")
-    assert open_follower(csv, leader, table())[1] == ["ball"]
+    assert open_follower(csv, leader, table())[1] == ["ball", "ball-2"]
     assert open_follower(csv, leader, table_with_spares())[1] == ["ball", "ball-2"]
     for path in bad_files[:1]:
         with pytest.raises(CaptureError, match="absent: cannot be read"):

@@ -33,12 +33,12 @@ def test_a_browser_gets_scene_and_moment_at_once_and_its_numbers_behind_the_pose
             assert welcome["role"] == "operator"
             assert welcome["sources"][0]["verbs"] == ["pause", "push"]
             scene = await browser.hear("scene")
-            assert len(scene["links"]) == 17
+            assert len(scene["links"]) == 19
             assert scene["generation"] == 1
             head, poses, values = await browser.moment()
             assert head[0] == 1
             assert (head[4], head[5]) == (1, 5.0)
-            assert len(poses) == 17
+            assert len(poses) == 19
             assert len(values) == 0
             ball = next(run for run in scene["fields"] if run["entity"] == "ball" and run["field"] == "position")
             await browser.say(type="plot", series=[{"id": "z", "field": ball["index"] + 2}], generation=1)

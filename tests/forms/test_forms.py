@@ -33,8 +33,11 @@ OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque")]
 """What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has these."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
-ALONE: Final = {("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")}
-"""What no mixed world has: each has one engine and one scene."""
+ALONE: Final = {
+    *(("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")),
+    *(("actuator", "go_to"), ("actuator", "gripper"), ("sensor", "gripper_state"), ("sensor", "job")),
+}
+"""What no mixed world has: each has one engine and one scene, and none has grippers and jobs."""
 EACH_ALONE: Final = pytest.mark.parametrize(
     "key", [pytest.param(key, marks=() if key in ALONE else pytest.mark.campaign) for key in ALL], ids="-".join
 )

@@ -275,7 +275,7 @@ def still(deployment: Deployment, frames: Sequence[Frame]) -> set[str]:
     changed = changed_slots(frames[0], frames[-1])
     moving = {
         entity.name: {f"{entity.name} {slot}" for slot in MOTIONS if slot in entity.offsets}
-        for entity in frames[0].layout.entities
+        for entity in frames[0].layout.present(frames[0].numbers)
     }
     measuring = {
         f"{robot} {channel}": {f"{robot} {channel}.{SAMPLES}"}

@@ -101,7 +101,7 @@ def test_reach_from_present_speed_is_caught() -> None:
     declared = table_reach_of(stepper.deployment, stepper.layout)
     present = replace(declared, ball_m=table_of(stepper.deployment).ball.radius)
     together = list(numbers)
-    bodies = tuple(entity for entity in stepper.layout.entities if entity.is_solved)
+    bodies = tuple(entity for entity in stepper.layout.present(numbers) if entity.is_solved)
     work = Work(0, stepper.layout, (bodies,), tuple(body.index for body in bodies), together, {})
     stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
     for name in ("red.midfield", "blue.midfield"):

@@ -185,4 +185,4 @@ def test_every_entity_has_one_solver_and_ticks_and_epochs_grow() -> None:
     trace = trace_of(nodes=3, moves=True)
     epochs = {decode(Epoch, traced.payload).epoch for traced in trace if traced.channel == channels.EPOCH.name}
     assert len(epochs) == 5
-    assert two_solvers(trace, entities=11) == []
+    assert two_solvers(trace, entities=13) == []
