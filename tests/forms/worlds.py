@@ -255,7 +255,7 @@ def _going() -> dict[str, Any]:
     data: dict[str, Any] = json.loads(json.dumps(_yard()))
     for name in ("one", "two", "base"):
         data["robots"][name]["actuators"] = {"go": {"kind": "go_to", "feelers": "60 cm", "patience": "0.3 s"}}
-        data["robots"][name]["sensors"] = {"sensed": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
+        data["robots"][name]["sensors"] = {"own": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
     flight = {"flight": data["players"]["flight"]}
     return data | {"players": driver(("one", "two", "base"), "go_to", (2.0, 2.0), "5 Hz") | flight}
 
@@ -400,7 +400,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "quadrotor"): SOLIDS,
     ("model", "sphere"): SOLIDS,
     ("actuator", "go_to"): JOBS,
-    ("sensor", "job"): World(JOBS.data, ("robots", "one", "sensors", "sensed")),
+    ("sensor", "job"): World(JOBS.data, ("robots", "one", "sensors", "own")),
     ("actuator", "v_w"): YARD,
     ("actuator", "waypoint"): YARD,
     ("actuator", "x_y_w"): YARD,
