@@ -16,6 +16,7 @@ from typing import Any, Final
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.rehearsal.check.changes import changed, with_comings
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
@@ -28,7 +29,7 @@ from foosim.world.components.watching import ReadOnly
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Form
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout, build_layout
 
 NODES: Final = (1, 2, 3)
 MOVES: Final = 12
@@ -116,7 +117,7 @@ class ComponentCheck:
         try:
             for frame in alone:
                 found.measure(fitted.due(frame), frame)
-                for actuators in fitted.together(frame.layout):
+                for actuators in fitted.together:
                     found.ask(actuators, frame)
         except ComponentError as error:
             self.has_failed = True
@@ -201,24 +202,22 @@ def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
 
 
 class _Fitted:
-    """What measures in a deployment, and what can be asked together, fitted to the layouts of its frames.
+    """What measures in a deployment, and what can be asked together.
 
     `count` is how many sensors there are.
     """
 
     def __init__(self, text: str, name: str, files: Mapping[str, bytes]) -> None:
         self._deployment = load_deployment(text, name).with_assets(files)
-        self._sensors: dict[bytes, list[FittedSensor]] = {}
-        self._together: dict[bytes, list[list[FittedActuator]]] = {}
+        layout = build_layout(self._deployment)
+        self._sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
+        self.together = _together(self._deployment, layout)
+        """The actuators that can be asked together, by motion and class, in the order of their robots."""
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
 
     def due(self, frame: Frame) -> list[FittedSensor]:
         """Return the sensors that measure a frame."""
-        layout = frame.layout
-        if layout.digest not in self._sensors:
-            sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
-            self._sensors[layout.digest] = sensors
-        return [one for one in self._sensors[layout.digest] if one.is_due(frame.tick, frame.numbers)]
+        return [one for one in self._sensors if one.is_due(frame.tick, frame.numbers)]
 
     def readings(self, frame: Frame) -> dict[tuple[str, str], object]:
         """Return what is measured at a frame, by robot and channel."""
@@ -226,18 +225,16 @@ class _Fitted:
         payloads = Sensing().sample(due, SensingView(frame.tick, frame.numbers, frame.values))
         return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}
 
-    def together(self, layout: Layout) -> list[list[FittedActuator]]:
-        """Return the actuators that can be asked together, by motion and class, in the order of their robots."""
-        if layout.digest not in self._together:
-            found: dict[tuple[str, str], list[FittedActuator]] = {}
-            for index, actuators in sorted(World(self._deployment, layout).actuators.items()):
-                motion = layout.entities[index].kind.motion
-                for one in actuators:
-                    kind = type(one.actuator)
-                    if motion and has_together(kind, "command"):
-                        found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
-            self._together[layout.digest] = list(found.values())
-        return self._together[layout.digest]
+
+def _together(deployment: Deployment, layout: Layout) -> list[list[FittedActuator]]:
+    found: dict[tuple[str, str], list[FittedActuator]] = {}
+    for index, actuators in sorted(World(deployment, layout).actuators.items()):
+        motion = layout.entities[index].kind.motion
+        for one in actuators:
+            kind = type(one.actuator)
+            if motion and has_together(kind, "command"):
+                found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
+    return list(found.values())
 
 
 @dataclass

@@ -19,7 +19,6 @@ from foosim.painting.overhead import OverheadPainter
 from foosim.rehearsal.env.reward import Nothing, Reward, RewardFactory
 from foosim.rehearsal.simulation import Agent, Simulation, read_for_stepping
 from foosim.world.frame import Frame
-from foosim.world.layout import Layout
 from foosim.world.start import Start
 
 PIXELS: Final = (320, 180)
@@ -92,7 +91,7 @@ class Episodes:
         self._seed: int | None = None
         self._episode = self._steps = 0
         self._pixels = pixels
-        self._painters: dict[bytes, OverheadPainter] = {}
+        self._painter: OverheadPainter | None = None
         self.is_running = False
 
     def columns(self, agent: str) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
@@ -175,11 +174,9 @@ class Episodes:
     def paint(self) -> NDArray[np.uint8]:
         """Return the present frame from above, an array of uint8 of the shape (height, width, 3)."""
         simulation = self.simulation
-        layout: Layout = simulation.frame.layout
-        painter = self._painters.get(layout.digest)
-        if painter is None:
-            painter = self._painters[layout.digest] = OverheadPainter(simulation.scene, layout, self._pixels)
-        return painter.paint(simulation.frame)
+        if self._painter is None:
+            self._painter = OverheadPainter(simulation.scene, simulation.frame.layout, self._pixels)
+        return self._painter.paint(simulation.frame)
 
     def close(self) -> None:
         """Free the engines."""

@@ -166,7 +166,7 @@ class _Looking:
 
     def commit(self, frame: Frame) -> None:
         """Look at the frames in their order."""
-        if self._marks is None or self._marks.layout is not frame.layout:
+        if self._marks is None:
             self._marks = WorldMarks(self._deployment, frame.layout)
         elif self._before is not None:
             self.away += sum(kind in self._kinds for _, kind, _ in self._marks.between(self._before, frame))

@@ -191,10 +191,9 @@ def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
 
 
 class WorldMarks:
-    """What the rules of a world did between frames, of which the later ones have this layout."""
+    """What the rules of a world did between frames."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
-        self.layout = layout
         self._rules: dict[tuple[str, str], Any] = {
             (WORLD, label): rule for label, rule in rules_of(spec, layout).items() if hasattr(rule, "marks")
         }
