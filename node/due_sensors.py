@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import Final, NamedTuple
 
 from foosim.world.components.fitted import FittedSensor
@@ -49,15 +50,18 @@ class DueSensors:
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._turns: dict[tuple[bool, ...], Turn] = {}
         """Of those who are in service now."""
-        self._out = [0.0] * (2 * len(robots))
-        """Who was out of service, and what was switched off, when they were made."""
+        places = [*self._down, *self._inactive]
+        self._state: Callable[[Sequence[float]], object] = itemgetter(*places) if places else lambda numbers: ()
+        """Returns who is out of service, and what is switched off."""
+        self._out: object = None
+        """The same when the turns were made."""
 
     def at(self, tick: int, numbers: Sequence[float]) -> Turn:
         """Return who measures at a tick, at whose start the numbers of the frame are these."""
         value = numbers.__getitem__
         if any(map(value, self._speaks)):
             return self._turn(tick, numbers)
-        out = [*map(value, self._down), *map(value, self._inactive)]
+        out = self._state(numbers)
         if out != self._out:
             self._turns, self._out = {}, out
         due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])

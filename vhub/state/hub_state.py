@@ -411,7 +411,9 @@ class HubState:
         if turns:  # packets that make clients act are judged first: the others of the tick are delivered with them
             arriving.sort(key=self._here.calls, reverse=True)
         for flight in arriving:
-            member = self._receiver(flight)
+            found = self.members.get(flight.destination)
+            is_usual = found is None or (found.active and not found.since)
+            member = found if is_usual else self._receiver(flight)
             if member is not None and member.release_tick(tick) != tick:
                 self._put(flight, member.release_tick(tick))
                 continue
@@ -436,9 +438,8 @@ class HubState:
 
     def _receiver(self, flight: Flight) -> Member | None:
         """Return the client that a packet is for, if it takes part and exists, and has since the packet was due."""
-        member = self.members.get(flight.destination)
-        is_here = member is not None and member.active and member.has_existed_at(flight.due_ns, self.tick_ns)
-        return member if is_here else None
+        member = self.members[flight.destination]
+        return member if member.active and member.has_existed_at(flight.due_ns, self.tick_ns) else None
 
     def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
         deliveries: list[Delivered] = []
