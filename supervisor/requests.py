@@ -195,8 +195,8 @@ class Requests:
         state, place = self._state, arguments.get("at")
         layout, numbers = state.frame.layout, state.coming_numbers()
         entity = absent_named(layout, numbers, _name(arguments, "name"))
-        owners = state.owners
-        if arguments.get("node") is not None:
+        owners, has_node = state.owners, arguments.get("node") is not None
+        if has_node:
             node = chosen("node", _name(arguments, "node"), state.members)
             if not entity.is_robot:
                 raise Refused(f"{entity.name} is no robot: it has no node")
@@ -209,8 +209,9 @@ class Requests:
         except BadValue as bad:
             raise Refused(f"at of {entity.name}: {bad}") from bad
         answer = self._accept(request, tick, f"{entity.name} added at tick {tick}", [edit], owners)
-        if owners != state.owners:
+        if has_node:
             self._node_loss.moved(entity.name)
+        if owners != state.owners:
             state.account.moves += 1
             self._open_epoch(owners, now_ns)
         return answer

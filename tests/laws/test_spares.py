@@ -238,6 +238,29 @@ def test_requests_are_in_the_capture_and_a_run_begins_right_behind_one(nodes: in
     assert all(str(number) == "nan" for row in absent.tolist() for number in row)
 
 
+def test_a_robot_that_is_added_on_a_node_stays_there_when_its_own_is_back() -> None:
+    """It was adopted by that node already, when its own was lost."""
+    owners: list[str] = []
+
+    def begin(system: System) -> None:
+        owners.append(system.supervisor.state.owners["k-3"])
+        system.kill(owners[0])
+
+    def add(system: System) -> None:
+        (other,) = system.supervisor.state.members
+        asked.append(system.request("add", name="k-3", node=other))
+
+    def prepare(system: System) -> None:
+        for tick, do in ((20, begin), (40, add), (80, lambda system: system.start(owners[0]))):
+            system.at_tick(tick, partial(do, system))
+        system.at_tick(160, lambda: owners.append(system.supervisor.state.owners["k-3"]))
+
+    asked: list[str] = []
+    run = rehearse(text([]), NAME, 200, 2, prepare=prepare)
+    assert run.answers[asked[0]].accepted and sorted(owners) == ["n1", "n2"]
+    assert [entry["what"] for entry in run.json["recoveries"]] == ["node", "join"]
+
+
 def test_a_simulation_adds_what_an_event_adds(tmp_path: Path) -> None:
     events: list[dict[str, Any]] = [
         {"at": "0.5 s", "entity": "k-3", "add": "3,6"},
