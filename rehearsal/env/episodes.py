@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.capture.start_frame import read_branch
+from foosim.client.jobs import Jobs
+from foosim.client.player import Packet
 from foosim.client.vectors import EVERYTHING, Column, CommandVector, ReadingVector, Vector, chosen
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
@@ -88,6 +90,8 @@ class Episodes:
         except BaseException:
             simulation.close()
             raise
+        self._jobs: dict[tuple[str, str], tuple[str, Jobs]] = {}
+        """Of each (robot, actuator) whose jobs were asked for: the agent that gives them, and the jobs."""
         self._seed: int | None = None
         self._episode = self._steps = 0
         self._pixels = pixels
@@ -98,6 +102,37 @@ class Episodes:
         """Return the columns of an agent's observations and of its actions."""
         readings, commands = self.vectors[agent]
         return readings.columns, commands.columns
+
+    def jobs(self, robot: str, actuator: str) -> Jobs:
+        """Return the jobs of an actuator in this episode, which the first agent gives that commands its robot.
+
+        Their commands go with the steps. As long as a job has not ended, actions do not command that actuator. Raises
+        UnknownName for a robot that no agent commands, and as `Jobs` does.
+        """
+        if (robot, actuator) not in self._jobs:
+            agents = self.simulation.agents
+            owner = next((name for name, agent in agents.items() if robot in agent.robots), None)
+            if owner is None:
+                raise UnknownName("no robot of an agent", robot, [one for its in agents.values() for one in its.robots])
+            self._jobs[robot, actuator] = owner, Jobs(self.simulation.declared, owner, robot, actuator)
+            self._hear()
+        return self._jobs[robot, actuator][1]
+
+    def _with_jobs(self, packets: dict[str, list[Packet]]) -> None:
+        """Put the commands of jobs in the place of those of actions."""
+        for pair, (agent, jobs) in self._jobs.items():
+            if jobs.job is None or jobs.job.state.has_ended or not self.simulation.agents[agent].exists:
+                continue
+            payload = jobs.payload(self.simulation.tick)
+            kept = [one for one in packets.get(agent, ()) if (one.destination, one.channel) != pair]
+            packets[agent] = kept if payload is None else [*kept, Packet(*pair, payload)]
+
+    def _hear(self) -> None:
+        """Let jobs hear of how they stand."""
+        if self._jobs:
+            readings = self.simulation.readings
+            for _, jobs in self._jobs.values():
+                jobs.hear(readings)
 
     def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Vector]:
         """Begin an episode; return the observations.
@@ -122,6 +157,7 @@ class Episodes:
         frame = simulation.start_frame(start, used)
         simulation.reset(self._reward.begin(frame, simulation.declared.seed if used is None else used), used)
         self._steps, self.is_running = 0, True
+        self._jobs = {}
         return self._observe()
 
     def _seed_of_episode(self, *, is_captured: bool) -> int | None:
@@ -150,7 +186,9 @@ class Episodes:
             for name, action in actions.items()
             if simulation.agents[name].exists
         }
+        self._with_jobs(packets)
         simulation.advance(packets, self.ticks)
+        self._hear()
         after = simulation.frame
         self._steps += 1
         rewards = dict(self._reward.rate(before, after))

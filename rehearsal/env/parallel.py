@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
+from foosim.client.jobs import Jobs
 from foosim.client.vectors import Column
 from foosim.common.errors import UnknownName
 from foosim.deployment.schema import Deployment
@@ -72,6 +73,10 @@ class FoosimParallelEnv(ParallelEnv[str, NDArray[np.float64], NDArray[np.float64
     def action_space(self, agent: str) -> spaces.Box:
         """Return the space of an agent's actions."""
         return self.action_spaces[agent]
+
+    def jobs(self, robot: str, actuator: str) -> Jobs:
+        """Return the jobs of an actuator in this episode: see `Episodes.jobs`."""
+        return self._episodes.jobs(robot, actuator)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from foosim.client.jobs import Jobs
 from foosim.client.vectors import Column
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
@@ -64,6 +65,10 @@ class FoosimEnv(gymnasium.Env[NDArray[np.float64], NDArray[np.float64]]):
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """What the numbers of observations and actions are."""
         return self._episodes.columns(self._agent)
+
+    def jobs(self, robot: str, actuator: str) -> Jobs:
+        """Return the jobs of an actuator in this episode: see `Episodes.jobs`."""
+        return self._episodes.jobs(robot, actuator)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from functools import partial
@@ -16,12 +17,14 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from foosim.capture.start_frame import BadBranch
 from foosim.common.errors import BadValue, UnknownName
+from foosim.deployment.loader import load_deployment
 from foosim.players.learning.exercises import ENVIRONMENTS
 from foosim.players.learning.table_rewards import DefendShot, Goals, score_of, with_ball
 from foosim.rehearsal.env import FoosimEnv, FoosimParallelEnv, parallel_env
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.simulation import Simulation, read_for_stepping
 from foosim.world.frame import Frame
+from tests.kinematic_yard import yard_text
 from tests.waving import PERFECT, PERIOD, PLAYERS, waved
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
@@ -291,4 +294,45 @@ def test_any_deployment_is_an_environment(name: str, agent: str, robot: str) -> 
     assert env.observation_space(agent).contains(seen[agent]) and (seen[agent] != first).any()
     assert rewards == {agent: 0.0}
     assert env.render() is not None
+    env.close()
+
+
+def way(env: FoosimEnv) -> float:
+    """How far the scout is from the place that its job is about."""
+    return math.dist(env.simulation.frame.vector("scout", "position", 2), (1.0, 0.5))
+
+
+@pytest.mark.parametrize("network", [False, True])
+def test_a_job_goes_with_the_steps_and_actions_wait_for_its_end(network: bool) -> None:
+    deployment = load_deployment(
+        yard_text(
+            {
+                "scout": {
+                    "model": "holonomic",
+                    "actuators": {"drive": {"kind": "go_to", "tolerance": "2 cm"}},
+                    "sensors": {"jobs": {"kind": "job", "actuator": "drive", "rate": "5 Hz"}},
+                }
+            }
+        ),
+        "yard.yaml",
+    )
+    env = FoosimEnv(deployment, rate_hz=10.0, network=network)
+    env.reset()
+    before = env.jobs("scout", "drive").call(x=-1.0, y=0.0)
+    env.reset()
+    jobs = env.jobs("scout", "drive")
+    assert jobs is env.jobs("scout", "drive") and jobs.job is None, "another episode"
+    job = jobs.call(x=1.0, y=0.5)
+    elsewhere = np.array([-5.0, -5.0])
+    steps = 0
+    while not job.check():
+        env.step(elsewhere)
+        steps += 1
+        assert steps < 100
+    assert way(env) < 0.02 and before.number is None
+    for _ in range(30):
+        env.step(elsewhere)
+    assert way(env) > 1.0, "actions command again"
+    with pytest.raises(UnknownName, match="no robot of an agent"):
+        env.jobs("scuot", "drive")
     env.close()
