@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
@@ -153,7 +153,7 @@ class Actuator:
         """The numbers of its commands, in their order, with their units."""
         return tuple(self._client._encoder.actuator(self._robot, self._channel).fields)
 
-    def set(self, *numbers: float, **named: float) -> None:
+    def set(self, *numbers: Any, **named: Any) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
 
         What the numbers of its kind mean `foosim components actuator KIND` says. In lockstep a command is
@@ -165,7 +165,7 @@ class Actuator:
             raise taker.wrong("numbers are given by name or in their order, not both")
         self._client._command(self._robot, self._channel, taker.pack(named or numbers))
 
-    def call(self, *numbers: float, **named: float) -> CalledJob:
+    def call(self, *numbers: Any, **named: Any) -> CalledJob:
         """Give the actuator a job, by the numbers of a command as for `set`: `call(x=3.0, y=1.0).result(60.0)`.
 
         The command is sent again until the job sensor of the robot, to which the client has subscribed, tells that it

@@ -108,7 +108,7 @@ class Jobs:
 
     # --- what one asks for -------------------------------------------------------------------------------------------
 
-    def call(self, *numbers: float, **named: Any) -> Job:
+    def call(self, *numbers: Any, **named: Any) -> Job:
         """Begin a job, by the numbers of a command in their order or by name; it is sent by `commands`.
 
         Raises BadValue for names and numbers that are none of a command.
@@ -187,13 +187,8 @@ class Jobs:
         if number == self._sent and tick < self._due_tick:
             return None
         self._sent, self._due_tick = number, tick + self._repeat_ticks
-        command = self._nothing() if job.command is None else job.command
+        command = self._taker.codec.nothing() if job.command is None else job.command
         return msgspec.structs.replace(command, **{JOB: float(number)})
-
-    def _nothing(self) -> Any:
-        """Return a command to cancel a job with of which nobody knows what it asks for."""
-        codec = self._taker.codec
-        return codec.from_numbers([0.0] * len(codec.fields))
 
     def commands(self, tick: int) -> Commands:
         """Return what is `due` as a player returns it, and `Simulation.step` takes it."""

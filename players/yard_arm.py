@@ -14,7 +14,7 @@ from foosim.client.player import Player, Samples, Turn
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.yard_reports import Heard
-from foosim.world.actuators.joint_position import JointPositions
+from foosim.world.actuators.joints.joint_position import JointPositions
 from foosim.world.models.urdf import UrdfRobot
 from foosim.world.sensors.joint_state import JointState
 

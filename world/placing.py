@@ -12,6 +12,8 @@ from foosim.common.units import Quantity
 from foosim.world.scene import Quaternion, Vector, from_rpy
 
 LinkName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=64)]
+FAR_M: Final = 100_000.0
+"""How far from the origin anything is put at most, in each coordinate."""
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 

@@ -203,6 +203,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
+def dot(a: Vector, b: Vector) -> float:
+    """Return the inner product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the rotation `b` followed by `a`."""
     ax, ay, az, aw = a

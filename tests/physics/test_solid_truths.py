@@ -343,7 +343,7 @@ PARTS: Final = "".join(
     for x, name in enumerate(("left", "reach", "right", "spare"))
 )
 OWN_SPIN: Final = """
-from foosim.world.actuators.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
+from foosim.world.actuators.joints.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.joints import set_points
 

@@ -22,9 +22,12 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.force import Push
 from foosim.world.actuators.go_to import Place
 from foosim.world.actuators.gripper import Grip
-from foosim.world.actuators.joint_position import JointPositions
-from foosim.world.actuators.joint_torque import JointEfforts
-from foosim.world.actuators.joint_velocity import JointVelocities
+from foosim.world.actuators.joints.joint_position import JointPositions
+from foosim.world.actuators.joints.joint_torque import JointEfforts
+from foosim.world.actuators.joints.joint_trajectory import Trajectory
+from foosim.world.actuators.joints.joint_velocity import JointVelocities
+from foosim.world.actuators.joints.look_at import Sight
+from foosim.world.actuators.joints.pan_tilt import PanTiltAngles
 from foosim.world.actuators.rod_force import RodForce
 from foosim.world.actuators.rod_position import Command
 from foosim.world.actuators.rod_velocity import RodVelocity
@@ -92,6 +95,9 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "gripper": (Grip(1.0), [1.0], [""]),
     "gripper_state": (GripperState(1.0, 1.0, 2.5), [1.0, 1.0, 2.5], ["", "", "kg"]),
     "go_to": (Place(0.5, -1.2, -7.0), [0.5, -1.2, -7.0], ["m", "m", ""]),
+    "look_at": (Sight(0.5, -1.2, 1 / 3, -7.0), [0.5, -1.2, 1 / 3, -7.0], ["m", "m", "m", ""]),
+    "pan_tilt": (PanTiltAngles(0.5, 1 / 3, 7.0), [0.5, 1 / 3, 7.0], ["rad", "rad", ""]),
+    "joint_trajectory": (Trajectory((0.5, 1.0), ((0.1, 1 / 3), (0.0, -1.0)), 7.0), [], ["s", "m or rad", ""]),
     "job": (Jobs(1.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 3.0, 0.0, 2.0, 0.0], [""] * 3),
     "velocity": (
         Velocity(0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0),
@@ -125,6 +131,8 @@ SIZES |= {
     "x_y_w": 24,
     "waypoint": 32,
     "go_to": 16,
+    "look_at": 24,
+    "pan_tilt": 16,
     "velocity": 48,
 }
 """In bytes, of the kinds that have as many numbers always."""
@@ -139,6 +147,8 @@ SEVERAL = {
     "proximity",
     "rotor_speeds",
 }
+PLAIN = {"joint_trajectory"}
+"""Kinds that are MessagePack."""
 SINGLE = {"figure_contact": 1, "job": 1}
 """Fields of one number before those of several."""
 
@@ -149,7 +159,7 @@ def codec(kind: str) -> PayloadCodec:
 
 def test_every_kind_is_tested() -> None:
     assert sorted(VALUES) == sorted([*names("sensor"), *names("actuator")])
-    assert {*SIZES, *SEVERAL} == {*VALUES}
+    assert {*SIZES, *SEVERAL, *PLAIN} == {*VALUES}
 
 
 @pytest.mark.parametrize("kind", VALUES)
@@ -159,7 +169,7 @@ def test_a_value_comes_back_as_it_was(kind: str) -> None:
     assert (again, type(again)) == (value, type(value))
 
 
-@pytest.mark.parametrize("kind", VALUES)
+@pytest.mark.parametrize("kind", sorted({*VALUES} - PLAIN))
 def test_numbers_are_little_endian_float64_in_order(kind: str) -> None:
     value, numbers, _ = VALUES[kind]
     assert np.frombuffer(codec(kind).encode(value), "<f8").tolist() == numbers == codec(kind).numbers(value)
@@ -172,8 +182,9 @@ def test_each_field_has_its_name_and_its_unit(kind: str) -> None:
     assert [field.name for field in fields] == list(structs.asdict(value))
     assert [field.unit for field in fields] == units
     single = SINGLE.get(kind, 0 if kind in SEVERAL else len(fields))
-    assert [field.is_number for field in fields] == [place < single for place in range(len(fields))]
-    assert [field.is_several for field in fields] == [place >= single for place in range(len(fields))]
+    if kind not in PLAIN:
+        assert [field.is_number for field in fields] == [place < single for place in range(len(fields))]
+        assert [field.is_several for field in fields] == [place >= single for place in range(len(fields))]
 
 
 @given(st.sampled_from(sorted(SIZES)), st.binary(max_size=64))
@@ -399,6 +410,50 @@ def test_a_wrong_command_of_an_arm_names_actuators_and_joints(arm: CommandEncode
 
 
 YARD = yard()
+
+
+@pytest.fixture(scope="module")
+def planned() -> CommandEncoder:
+    """An arm that takes positions at times."""
+    return yard("robots.arm.actuators={go: {kind: joint_trajectory}}")
+
+
+@given(st.integers(1, 16), st.integers(1, 7), st.integers(-9, 9))
+def test_positions_at_times_come_back_however_they_are_written(
+    planned: CommandEncoder, points: int, joints: int, job: int
+) -> None:
+    """Their number of a job, that of a cancellation, and a cancellation by whoever does not know the points, too."""
+    times, rows = np.arange(1, points + 1) / 3.0, np.arange(points * joints).reshape(points, joints)
+    value = Trajectory(tuple(times.tolist()), tuple(map(tuple, (rows / 1.0).tolist())), float(job))
+    its = codec("joint_trajectory")
+    for one in (value, Trajectory(times, rows, job)):  # type: ignore[arg-type]
+        assert its.decode_finite(its.encode_checked(one)) == value
+    assert its.decode_finite(its.encode_checked(its.nothing())) == its.nothing() == Trajectory((), ())
+    plain = structs.replace(value, job=0.0)
+    written: list[Any] = [{"times": times, "positions": rows}, (times, rows.tolist()), plain]
+    for command in written:
+        ((channel, payload),) = planned.encode("arm", {"go": command})
+        assert (channel, its.decode(payload)) == ("go", plain)
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ({"times": [1.0]}, "positions is missing"),
+        ({"times": [1.0], "position": [[0.0]]}, "no such name, 'position', nearest is 'positions'"),
+        ({"times": [0.0], "positions": [[0.0]]}, "Expected `float` > 0.0 - at `$.times[0]`"),
+        ({"times": [1.0], "positions": [0.0]}, "Expected `array`, got `float` - at `$.positions[0]`"),
+        ({"times": [1.0], "positions": [[]]}, "Expected `array` of length >= 1 - at `$.positions[0]`"),
+        ({"times": [1.0], "positions": [["up"]]}, "Expected `float`, got `str` - at `$.positions[0][0]`"),
+        ({"times": [1.0], "positions": [[nan]]}, "joint_trajectory with numbers that are not finite"),
+        ({"times": 1.0, "positions": [[0.0]]}, "Expected `array`, got `float` - at `$.times`"),
+        (([1.0],), "1 number given"),
+    ],
+)
+def test_what_are_no_positions_at_times_says_why(planned: CommandEncoder, command: Any, text: str) -> None:
+    with pytest.raises(BadValue) as error:
+        planned.encode("arm", {"go": command})
+    assert str(error.value).startswith(f"arm/go takes times (s), positions (m or rad): {text}")
 
 
 @pytest.mark.parametrize("robot", ["camera", "ball", "red.gaol"])

@@ -3,8 +3,6 @@ there."""
 
 from __future__ import annotations
 
-from typing import Final
-
 from msgspec import Struct
 
 from foosim.common.exact_math import atan2, cos, hypot, sin
@@ -20,9 +18,7 @@ from foosim.world.moving.progress import SLOTS, Patience, Progress
 from foosim.world.moving.steering import AHEAD_RAD, NOTHING_FELT, Feelers, Steering, shorter, steered
 from foosim.world.moving.upright import made_model
 from foosim.world.moving.wheels import wheels_of
-
-FAR_M: Final = 100_000.0
-"""How far from the origin a place is at most, in x and in y; as far as anything is put in a deployment."""
+from foosim.world.placing import FAR_M
 
 
 class GoToSettings(ActuatorSettings):

@@ -18,9 +18,8 @@ from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.models.rotorcraft import RotorcraftRobot
 from foosim.world.moving.progress import SLOTS, Patience, Progress
 from foosim.world.moving.steering import shorter
+from foosim.world.placing import FAR_M
 
-FAR_M: Final = 100_000.0
-"""How far from the origin a waypoint is at most, in x and in y; as far as anything is put in a deployment."""
 YAW_RAD_MAX: Final = 2.0 * PI
 
 

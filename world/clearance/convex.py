@@ -28,6 +28,7 @@ from foosim.world.scene import (
     Vector,
     conjugate,
     cross,
+    dot,
     moved,
     rotate,
 )
@@ -41,11 +42,6 @@ FLAT: Final = 1e-9
 """The sine of the angle between two edges of a face, below which it has no direction."""
 AXES: Final[tuple[Vector, ...]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 Geometry: TypeAlias = Box | Sphere | Cylinder | Capsule
-
-
-def dot(a: Vector, b: Vector) -> float:
-    """Return the inner product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 class Solid:

@@ -173,13 +173,17 @@ class FittedActuator:
 
         Modifiers may change it before. Raises ComponentError.
         """
+        problem, why = getattr(self.actuator, "problem", None), ""
         try:
-            found = self.bounds.clamp(self.codec.decode_finite(payload))
+            command = self.codec.decode_finite(payload)
+            found = self.bounds.clamp(command)
+            if problem is not None and (self.jobs is None or command.job >= 0.0):
+                why = problem(command)
         except Malformed as error:
             return str(error), ()
         except BaseException as error:
             raise self.failed(0, error) from error
-        return ("", found[1]) if found is not None else (f"{self.codec.name} of another length", ())
+        return (why, found[1]) if found is not None else (f"{self.codec.name} of another length", ())
 
     def _go_on(self, place: int, values: list[float], view: WritableView) -> bool:
         """Take a command that has come to this place among the modifiers; dropping or delaying one is no refusal."""

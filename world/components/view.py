@@ -330,14 +330,15 @@ class Actuator(Protocol):
     `steady = True` of a class says that what it asks follows from the state and its slots alone, whatever the tick is:
     a rod that such actuators have left as it was stays so, unsolved.
 
-    A class may have six more methods: `wrench(view)`, which returns a force (N) at the centre of mass of a free rigid
+    A class may have seven more methods: `wrench(view)`, which returns a force (N) at the centre of mass of a free rigid
     base and a torque (N m), both in its principal axes; `bounds()`, which returns the least and the greatest value of
     each number of a command, where that is numbers whose fields have several each; `within(command)`, which returns the
     command that is carried out instead, where limits are of several numbers together; `names()`, what the numbers of a
-    command are called; `unpowered()`, which returns what is asked of the motors of a robot without power; where there
-    is none, that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns
-    an object whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape
-    (actuators, motors, 2), with the same bits.
+    command are called; `problem(command)`, why `accept` refuses a command in every state, empty if it does not, for a
+    warning; `unpowered()`, which returns what is asked of the motors of a robot without power; where there is none,
+    that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns an object
+    whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape (actuators,
+    motors, 2), with the same bits.
     """
 
     def accept(self, command: Any, view: WritableView) -> bool:

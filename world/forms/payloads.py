@@ -2,8 +2,9 @@
 
 A reading or command is a msgspec struct that its component brings. One of numbers is packed: each a little-endian
 float64 in SI units, a tuple of numbers at the end as many of them as there are; several tuples at the end are of one
-length. The number of a job is left out where it is 0, that of a plain command. Any other is MessagePack, a map of its
-fields. `echo`, and what players and clients send each other, is any bytes.
+length. The number of a job is left out where it is 0, that of a plain command. Any other, as a command with tuples
+before the number of its job, is MessagePack, a map of its fields. `echo`, and what players and clients send each other,
+is any bytes.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ class PayloadCodec:
         assert isinstance(value, self.kind), f"{self.name} is a {self.kind.__name__}, not a {type(value).__name__}"
         if not self.is_packed:
             try:
-                return msgspec.msgpack.encode(value, enc_hook=as_float)
+                return msgspec.msgpack.encode(value, enc_hook=_as_plain)
             except (TypeError, ValueError, OverflowError) as error:
                 raise BadValue(f"{self.name}: {error}", value) from None
         numbers = self.numbers(value)
@@ -144,7 +145,7 @@ class PayloadCodec:
                 self._other.decode(payload)
             except msgspec.DecodeError as error:
                 raise BadValue(f"{self.name}: {error}", value) from None
-            if not _is_finite(msgspec.to_builtins(value, enc_hook=as_float)):
+            if not _is_finite(msgspec.to_builtins(value, enc_hook=_as_plain)):
                 raise NotFinite(f"{self.name} with numbers that are not finite")
         return payload
 
@@ -164,6 +165,10 @@ class PayloadCodec:
         more = (len(numbers) - count) // self._many
         starts = range(count, count + self._many * more, more) if more else [count] * self._many
         return self.kind(*numbers[:count], *(tuple(numbers[start : start + more]) for start in starts))
+
+    def nothing(self) -> Any:
+        """Return a value of zeros and empty tuples: what cancels a job of which it is not known what it asks for."""
+        return self.kind(*[0.0 if field.is_number else () for field in self.fields])
 
     def _check(self, field: str, number: Any) -> None:
         try:
@@ -198,6 +203,11 @@ def as_float(value: Any) -> float:
     if not hasattr(value, "__float__"):
         raise TypeError(f"a {type(value).__name__} is not a number")
     return float(value)
+
+
+def _as_plain(value: Any) -> Any:
+    """Return a number as a float and an array as a list of what is in it; raises as `as_float`."""
+    return [*value] if _is_array(value) and value.ndim else as_float(value)
 
 
 def as_floats(values: Sequence[Any]) -> list[float] | None:
@@ -247,15 +257,13 @@ def _info(kind: type[Struct]) -> inspect.StructType:
 
 
 def _field(field: inspect.Field) -> Field:
-    unit = ""
-    found = field.type
-    is_several = isinstance(plain_type(found), inspect.VarTupleType)
-    if is_several:
-        found = plain_type(found).item_type  # type: ignore[attr-defined]
+    unit, found, depth = "", field.type, 0
+    while isinstance(several := plain_type(found), inspect.VarTupleType):
+        found, depth = several.item_type, depth + 1
     if isinstance(found, inspect.Metadata):
         unit = str((found.extra or {}).get("unit", ""))
     is_number = isinstance(plain_type(found), inspect.FloatType)
-    return Field(field.name, unit, is_number and not is_several, is_several and is_number)
+    return Field(field.name, unit, is_number and depth == 0, is_number and depth == 1)
 
 
 def _bounds(kind: inspect.Type) -> tuple[int, int]:

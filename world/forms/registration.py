@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from msgspec import Struct
 
-from foosim.common.errors import Refused, show
+from foosim.common.errors import BadValue, Refused, show
 from foosim.common.names import NAME_RULE, is_name, is_robot_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
@@ -95,12 +95,22 @@ def _jobs(found: Any, key: str) -> Iterator[str]:
     """Yield what is wrong with the commands of an actuator that are jobs, and with its own slots."""
     if not found.jobs:
         return
-    fields = PayloadCodec(found.value, found.name).fields
-    value = found.value.__name__
+    codec = PayloadCodec(found.value, found.name)
+    fields, value = codec.fields, found.value.__name__
     if not (fields[-1].name == JOB and fields[-1].is_number and found.value.__struct_defaults__[-1:] == (0.0,)):
         yield f"its command {value} may be a job, and its last field is not `{JOB}: JobNumber = 0.0`"
+    elif not _is_encodable(codec, codec.nothing()):
+        yield f"its command {value} may be a job, and has fields that are neither numbers nor tuples which may be empty"
     if not hasattr(found.made, "progress"):
         yield f"its commands may be jobs, and {found.made.__name__} has no method progress"
+
+
+def _is_encodable(codec: PayloadCodec, value: Any) -> bool:
+    try:
+        codec.encode_checked(value)
+    except BadValue:
+        return False
+    return True
 
 
 def _shown_as(found: Any, key: str) -> Iterator[str]:

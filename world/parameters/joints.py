@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Annotated, Final
 
 from msgspec import Meta
 from pydantic import Field
 
+from foosim.common import units
 from foosim.common.errors import BadValue
-from foosim.common.spec_base import Name
+from foosim.common.spec_base import Name, default
+from foosim.common.units import Quantity
+from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, joint_indices
 from foosim.world.components.view import Mounting, Slot, View
 from foosim.world.forms.forms import JOINTS_MAX, Carrier
@@ -22,6 +25,7 @@ FORCE_MAX: Final = 1e6
 SPEED_MAX: Final = 1e3
 """How fast a joint without a limit of its speed is driven at most (m/s or rad/s)."""
 
+Gain = Annotated[float, Quantity(units.FREQUENCY, "0.001 Hz", "100 kHz")]
 _EACH: Final = Meta(min_length=1, max_length=JOINTS_MAX)
 """A number for each joint."""
 Positions = Annotated[tuple[Annotated[float, Meta(extra={"unit": "m or rad"})], ...], _EACH]
@@ -35,6 +39,15 @@ class JointSettings(ActuatorSettings):
     joints: Annotated[list[Name], Field(min_length=1, max_length=JOINTS_MAX)] | None = None
 
 
+class JointLoopSettings(JointSettings):
+    """Those of a proportional loop: the speed of each joint is `gain` times its error, at most that of the joint.
+
+    The loop runs once a tick, so the gain is at most the inverse of a tick: a greater one overshoots.
+    """
+
+    gain: Gain = default("20 Hz")
+
+
 def set_points(settings: JointSettings, carrier: Carrier) -> Mapping[str, int]:
     """Return the slots of an actuator of joints: a set-point for each. Raises BadValue for a robot without joints."""
     if carrier.joints == 0:
@@ -44,6 +57,14 @@ def set_points(settings: JointSettings, carrier: Carrier) -> Mapping[str, int]:
     if len(settings.joints) > carrier.joints or len(set(settings.joints)) < len(settings.joints):
         raise BadValue(f"{carrier.joints} joints, each once, are valid", settings.joints)
     return {"set_point": len(settings.joints)}
+
+
+def loop_points(settings: JointLoopSettings, carrier: Carrier) -> Mapping[str, int]:
+    """Return the slots of a loop: as `set_points`. Raises BadValue for a gain that overshoots, too."""
+    most = 1e9 / carrier.period_ns
+    if settings.gain > most:
+        raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
+    return set_points(settings, carrier)
 
 
 class JointGroup:
@@ -69,3 +90,8 @@ class JointGroup:
     def positions(self, view: View) -> list[float]:
         """Return where the joints are (m or rad)."""
         return [view.numbers[at] for at in self._positions]
+
+    def towards(self, wanted: Sequence[float], view: View, gain: float) -> Motors:
+        """Return speed and greatest force of each motor: gain x (wanted - position), at most the speed of the joint."""
+        drives = zip(wanted, self.positions(view), self.speeds, self.forces, strict=True)
+        return tuple([(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated
-
 from msgspec import Struct
 
-from foosim.common import units
-from foosim.common.errors import BadValue
-from foosim.common.spec_base import default
-from foosim.common.units import Quantity
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.forms import Carrier
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.joints import JointGroup, JointSettings, Positions, set_points
-
-Gain = Annotated[float, Quantity(units.FREQUENCY, "0.001 Hz", "100 kHz")]
+from foosim.world.parameters.joints import JointGroup, JointLoopSettings, Positions, loop_points
 
 
-class JointPositionSettings(JointSettings):
+class JointPositionSettings(JointLoopSettings):
     """Moves joints to positions: the speed of each is `gain` times its error, at most that of the joint.
 
     The loop runs once a tick, so the gain is at most the inverse of a tick: a greater one overshoots.
     """
-
-    gain: Gain = default("20 Hz")
 
 
 class JointPositions(Struct, frozen=True):
@@ -35,15 +23,13 @@ class JointPositions(Struct, frozen=True):
     positions: Positions
 
 
-def _slots(settings: JointPositionSettings, carrier: Carrier) -> Mapping[str, int]:
-    most = 1e9 / carrier.period_ns
-    if settings.gain > most:
-        raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
-    return set_points(settings, carrier)
-
-
 @actuator(
-    "joint_position", JointPositionSettings, JointPositions, slots=_slots, needs=("joint_positions",), joints="joints"
+    "joint_position",
+    JointPositionSettings,
+    JointPositions,
+    slots=loop_points,
+    needs=("joint_positions",),
+    joints="joints",
 )
 class JointPositionActuator:
     """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
@@ -84,7 +70,4 @@ class JointPositionActuator:
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor."""
-        group, gain = self._group, self._gain
-        wanted = view.read(group.set_point)
-        drives = zip(wanted, group.positions(view), group.speeds, group.forces, strict=True)
-        return tuple([(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])
+        return self._group.towards(view.read(self._group.set_point), view, self._gain)

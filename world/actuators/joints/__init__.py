@@ -1,0 +1,1 @@
+"""Actuators of the joints of a robot."""
