@@ -29,8 +29,11 @@ from tests.frames import Frames, broken_laws
 Key = tuple[str, ...]
 TICKS: Final = 100
 NAME: Final = "world.yaml"
-OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque")]
-"""What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has these."""
+OF_FILES: Final = [
+    *(("model", "urdf"), ("actuator", "joint_torque"), ("actuator", "look_at"), ("actuator", "pan_tilt")),
+]
+"""What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py and test_jobs.py have
+these."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
 ALONE: Final = {

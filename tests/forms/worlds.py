@@ -52,7 +52,7 @@ class Driver(Player):
             limits = next((found for one in its if (found := one.actuator.limits())), {})
             most = [max(map(abs, limits[name])) if name in limits else inf for name in names]
             self._bounds[robot] = list(map(min, bounds, most))
-        self._has_jobs = kind.jobs
+        self._has_jobs, self._in_time = kind.jobs, kind.name == "joint_trajectory"
         self._least = 0.0 if kind.name == "rotor_speeds" else -1.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
@@ -64,6 +64,8 @@ class Driver(Player):
         more = draw_words(draw_key(4, "driver", robot), tick)
         shares = [self._least + (1.0 - self._least) * word / 2.0**64 for word in (*words, *more)]
         numbers = [bound * share for bound, share in zip(self._bounds[robot], shares, strict=False)]
+        if self._in_time:
+            return self._value((0.2, 0.5), (numbers, numbers[::-1]), 0.0 if tick % 3 == 2 else tick + 1.0)
         if self._has_jobs:
             numbers.append(0.0 if tick % 3 == 2 else tick + 1.0)
         return self._value(tuple(numbers)) if self._is_several else self._value(*numbers)
@@ -387,6 +389,7 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("actuator", "force"): _pushed(),
     ("actuator", "gripper"): GRIPS,
     ("actuator", "joint_position"): _jointed("joint_position", (0.1, 2.0)),
+    ("actuator", "joint_trajectory"): _jointed("joint_trajectory", (0.1, 0.1)),
     ("actuator", "joint_velocity"): _jointed("joint_velocity", (0.5, 20.0)),
     ("actuator", "rod_force"): _driven("rod_force", (40.0, 0.5)),
     ("actuator", "rod_position"): TABLE,
