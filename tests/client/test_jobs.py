@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Final, Literal
 
+import numpy as np
 import pytest
 
 from foosim.client.client import Client
@@ -15,10 +17,11 @@ from foosim.rehearsal.system import Settings
 from foosim.world.forms.jobs import JobState
 from foosim.world.frame import Frame
 from tests.client.scripted import Program, refused
+from tests.heads import folder, head
 from tests.kinematic_yard import yard_text
 
 NAME: Final = "yard.yaml"
-SCOUT: Final = {
+SCOUT: Final[dict[str, Any]] = {
     "model": "holonomic",
     "actuators": {"drive": {"kind": "go_to", "patience": "1 s"}},
     "sensors": {"jobs": {"kind": "job", "actuator": "drive", "rate": "5 Hz"}},
@@ -27,15 +30,20 @@ LOSSY: Final = {"links": [{"id": "all", "from": "*", "to": "*", "loss": "50 %", 
 
 
 def run(
-    ticks: int, programs: dict[str, Program], pace: Literal["fast", "realtime"] = "fast", **sections: Any
+    ticks: int,
+    programs: dict[str, Program],
+    pace: Literal["fast", "realtime"] = "fast",
+    scout: Mapping[str, Any] = SCOUT,
+    **sections: Any,
 ) -> list[Frame]:
     """Rehearse a scout and these clients, which are in lockstep if the pace is fast; return the frames."""
     waited: dict[str, Any] = {"lockstep": True, "rate": "100 Hz"} if pace == "fast" else {}
     clients = {"other": {}, **dict.fromkeys(programs, waited)}
     frames: list[Frame] = []
-    text = yard_text({"scout": SCOUT}, clients=clients, **sections)
+    text = yard_text({"scout": scout}, clients=clients, **sections)
     settings = Settings(clients=programs, on_commit=frames.append)
-    assert not rehearse(text, NAME, ticks, 1, settings=settings, pace=Pace(pace)).json["failed"]
+    found = rehearse(text, NAME, ticks, 1, settings=settings, pace=Pace(pace), folder=folder())
+    assert not found.json["failed"], found.json["reason"]
     assert all(program.is_over for program in programs.values()), "the programs have come to their ends"
     return frames
 
@@ -198,6 +206,41 @@ def test_who_was_restarted_cancels_what_it_did_not_call() -> None:
 
     frames = run(200, {"hand": Program(first, second)})
     assert frames[-1].vector("scout", "linear_velocity", 3) == [0.0, 0.0, 0.0]
+
+
+def test_an_arm_is_given_positions_at_times() -> None:
+    """As lists or arrays; who was restarted cancels what it does not know the points of."""
+    said: list[str] = []
+
+    def first(client: Client) -> None:
+        client.subscribe("scout", "jobs")
+        for _ in client.lockstep(100):
+            drive = client.robots["scout"].actuators["drive"]
+            drive.call(times=[0.5, 1.0], positions=[[0.5, 0.2], [0.3, 0.1]]).result()
+            said.append(refused(partial(drive.call, times=[1.0], positions=[0.5])))
+            with pytest.raises(JobFailed, match=r"scout/drive: job \d+ has failed"):
+                drive.call(times=[1.0, 0.5], positions=[[0.5, 0.2], [0.3, 0.1]]).result()
+            with pytest.raises(JobUnfinished):
+                drive.call(np.array([2.0]), np.array([[1.0, 0.5]])).result(0.5)
+            break
+
+    def second(client: Client) -> None:
+        client.subscribe("scout", "jobs")
+        for _ in client.lockstep(100):
+            job = client.robots["scout"].actuators["drive"].job
+            if job is not None:
+                job.cancel()
+                with pytest.raises(JobCancelled):
+                    job.result()
+                return
+
+    arm = {**head("joint_trajectory", {}), "sensors": SCOUT["sensors"]}
+    arm["actuators"] = {"drive": arm["actuators"]["go"]}
+    frames = run(300, {"hand": Program(first, second)}, scout=arm, network=LOSSY, engine="mujoco", assets="models")
+    takes = "scout/drive takes times (s), positions (m or rad)"
+    assert said[0].startswith(f"BadValue: {takes}: Expected `array`, got `float` - at `$.positions[0]`")
+    assert max(frame.vector("scout", "joint_positions", 2)[0] for frame in frames) > 0.49
+    assert frames[-1].at("scout", "drive.count") == 0.0
 
 
 def test_a_run_that_ends_ends_the_waiting() -> None:

@@ -19,8 +19,10 @@ Tolerance = Annotated[float, Quantity(units.ANGLE, "0.001 deg", "90 deg")]
 
 
 class PanTiltSettings(JointLoopSettings):
-    """Two of `joints`: pan, and tilt, which hangs on it. A job is done within `tolerance`, of each joint or of the
-    direction; it has failed when that has come no nearer for `patience`."""
+    """Turns two of `joints`, pan and tilt, which hangs on it, to angles.
+
+    A job is done when each is within `tolerance` of its angle. It has failed when they come no nearer for `patience`.
+    """
 
     tolerance: Tolerance = default("1 deg")
     patience_ns: Patience = default("2 s", "patience")

@@ -32,7 +32,7 @@ class JointTrajectorySettings(JointLoopSettings):
     """
 
     points: Annotated[int, Field(ge=1, le=POINTS_MAX)] = 16
-    tolerance: Annotated[float, Field(gt=0.0, le=10.0)] = 0.01
+    tolerance: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.01
     patience_ns: Patience = default("2 s", "patience")
 
 

@@ -27,7 +27,11 @@ ROUND: Final = 2.0 * pi
 
 
 class LookAtSettings(PanTiltSettings):
-    """Looks along the x axis of `at`, a place on the link of the tilt joint where it names no other link."""
+    """Turns two of `joints`, pan and tilt, which hangs on it, so that the x axis of `at` points at a place.
+
+    `at` is on the link of the tilt joint where it names none. A job is done when the place is within `tolerance` of
+    that axis. It has failed when the place comes no nearer to the axis for `patience`.
+    """
 
     at: MountedAt = FIRST_LINK
 
