@@ -39,10 +39,11 @@ HEAD: Final = f"""<robot name="head">
 
 @cache
 def folder() -> Path:
-    """Return a folder with the file of the head in its folder `models`."""
+    """Return a folder with the file of the head in its folder `models`, and of one whose tilt looks up."""
     made = Path(mkdtemp())
     (made / "models").mkdir()
     (made / "models" / "head.urdf").write_text(HEAD)
+    (made / "models" / "upward.urdf").write_text(HEAD.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>'))
     return made
 
 

@@ -47,13 +47,15 @@ def deployment(robots: dict[str, Any], where: Any = None, **sections: Any) -> De
 
 @cache
 def heads() -> Deployment:
-    """A head for each kind of actuator; the last one is on its side."""
+    """A head for each kind of actuator; the last one is on its side, and its tilt the other way round."""
+    at = {"link": "skull", "x": f"{EYE_M[0]} m", "z": f"{EYE_M[1]} m"}
+    side = head("look_at", {"y": "15 m", "z": "2 m", "roll": "90 deg"}, at=at)
     return deployment(
         {
             "arm": head("joint_trajectory", {}, points=3, tolerance=1e-3),
             "eye": head("look_at", {"y": "5 m", "yaw": "70 deg"}, at={"link": "eye"}, patience="1 s"),
             "head": head("pan_tilt", {"y": "10 m"}, patience="1 s"),
-            "side": head("look_at", {"y": "15 m", "z": "2 m", "roll": "90 deg"}, at={"link": "eye"}),
+            "side": {**side, "file": "upward.urdf"},
         }
     )
 
@@ -222,6 +224,7 @@ def test_what_is_in_the_way_of_a_head_fails_its_job(kind: str, command: Any, fai
 def looked(frame: Any, robot: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the place of an eye (m) and where it looks, from its joints."""
     pan, tilt = frame.vector(robot, "joint_positions", 2)
+    tilt = -tilt if robot == "side" else tilt
     ahead = np.array([cos(pan) * cos(tilt), sin(pan) * cos(tilt), -sin(tilt)])
     above = np.array([cos(pan) * sin(tilt), sin(pan) * sin(tilt), cos(tilt)])
     place = np.array([0.05 * cos(pan), 0.05 * sin(pan), TILT_M]) + EYE_M[0] * ahead + EYE_M[1] * above
@@ -251,6 +254,15 @@ def test_an_eye_looks_at_a_place(its: Simulation, robot: str, way: tuple[float, 
     to = (target - place) / np.linalg.norm(target - place)
     assert asin(min(1.0, float(np.linalg.norm(np.cross(ahead, to))))) < 1e-3
     assert ahead @ to > 0.0
+
+
+def test_an_eye_turns_the_other_way_round_where_it_must(its: Simulation) -> None:
+    """From a place behind it on one side to one on the other, across the limits of pan."""
+    for job, side in enumerate((2.8, -2.8), 1):
+        angle = 70.0 * pi / 180.0 + side
+        sight = value("look_at", 3.0 * cos(angle), 5.0 + 3.0 * sin(angle), 0.6, float(job))
+        assert tell(its, "eye", sight, 250) == JobState.DONE
+        assert its.frame.vector("eye", "joint_positions", 2)[0] == pytest.approx(side, abs=0.01)
 
 
 def test_what_an_eye_cannot_see_fails_its_job(its: Simulation) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise, permutations
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import pytest
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from foosim.client.player import Packet, Player
 from foosim.common.errors import DeploymentError, Refused
@@ -292,9 +292,25 @@ class Numbered(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
+class Named(Struct, frozen=True):
+    """A command that is not numbers."""
+
+    place: str
+    job: JobNumber = 0.0
+
+
+class Several(Struct, frozen=True):
+    """A command of two numbers at least."""
+
+    places: Annotated[tuple[Metres, ...], Meta(min_length=2)]
+    job: JobNumber = 0.0
+
+
 @pytest.mark.parametrize(
     ("command", "methods", "text"),
     [
+        (Named, ("progress",), "has fields that are neither numbers nor tuples which may be empty"),
+        (Several, ("progress",), "has fields that are neither numbers nor tuples which may be empty"),
         (Bare, ("progress",), "its last field is not `job: JobNumber = 0.0`"),
         (Numbered, (), "has no method progress"),
     ],

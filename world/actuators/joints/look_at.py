@@ -30,7 +30,7 @@ class LookAtSettings(PanTiltSettings):
     """Turns two of `joints`, pan and tilt, which hangs on it, so that the x axis of `at` points at a place.
 
     `at` is on the link of the tilt joint where it names none. A job is done when the place is within `tolerance` of
-    that axis. It has failed when the place comes no nearer to the axis for `patience`.
+    that axis. It has failed when the joints come no nearer to that for `patience`.
     """
 
     at: MountedAt = FIRST_LINK
@@ -95,11 +95,12 @@ class LookAt:
         view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it looks at the place."""
+        """Return whether it looks at the place; what is left is the way of both joints (rad), maybe the long one."""
         _, ahead, way = self._sight(view)
-        aside = cross(ahead, way)
-        left = atan2(sqrt(dot(aside, aside)), dot(ahead, way))
-        return self._progress.judge(view, left, is_there=left <= self._settings.tolerance)
+        aside, angles = cross(ahead, way), self._group.positions(view)
+        angle = atan2(sqrt(dot(aside, aside)), dot(ahead, way))
+        left = sum([abs(to - at) for to, at in zip(self._wanted(view), angles, strict=True)])
+        return self._progress.judge(view, left, is_there=angle <= self._settings.tolerance)
 
     def _sight(self, view: View) -> tuple[list[Pose], Vector, Vector]:
         """Return the poses of the links, where it looks (of length 1) and the way to the place (m): world frame."""
@@ -111,20 +112,19 @@ class LookAt:
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of both motors."""
-        wanted = view.read(self._group.set_point)
-        if view.numbers[self._given.at]:
-            turns, angles = self._turns(view), self._group.positions(view)
-            ends = zip(angles, turns, self._group.lows, self._group.highs, strict=True)
-            wanted = [_within(angle + more, low, high) for angle, more, low, high in ends]
+        is_given = view.numbers[self._given.at] != 0.0
+        wanted = self._wanted(view) if is_given else view.read(self._group.set_point)
         return self._group.towards(wanted, view, self._settings.gain)
 
-    def _turns(self, view: View) -> tuple[float, float]:
-        """Return by how much to turn pan and tilt (rad)."""
+    def _wanted(self, view: View) -> list[float]:
+        """Return the angles of both joints with which it looks at the place, or nearest to it (rad)."""
         poses, ahead, way = self._sight(view)
         pan, tilt = (rotate(poses[link][2], self._body.links[link].axis) for link in (self._pan, self._tilt))
         side = atan2(dot(cross(ahead, way), pan), dot(ahead, way) - dot(ahead, pan) * dot(way, pan))
         up = _height(way, pan) - _height(ahead, pan)
-        return side, copysign(up, up * dot(cross(tilt, ahead), pan))
+        turns = side, copysign(up, up * dot(cross(tilt, ahead), pan))
+        ends = zip(self._group.positions(view), turns, self._group.lows, self._group.highs, strict=True)
+        return [_within(angle + more, low, high) for angle, more, low, high in ends]
 
 
 def _height(way: Vector, axis: Vector) -> float:
