@@ -106,7 +106,7 @@ class Foreman(Player):
         self, robot: str, actuator: str, numbers: tuple[float, ...], samples: Samples, now_s: float
     ) -> bool:
         if actuator == "gripper":
-            return robot in self._running and self._is_done(robot, samples, now_s)
+            return robot in self._running and self._is_done(robot, now_s)
         if actuator == "wheels":
             place = self._place(numbers, samples)
             return place is not None and abs(place[0]) < THERE_M and abs(place[2]) < THERE_RAD
@@ -117,13 +117,12 @@ class Foreman(Player):
             and all(abs(to - at) < THERE_M for to, at in zip(numbers, sample.value.positions, strict=True))
         )
 
-    def _is_done(self, robot: str, samples: Samples, now_s: float) -> bool:
+    def _is_done(self, robot: str, now_s: float) -> bool:
         """Return whether the job of a gripper is done; one that ended otherwise is given again after a while."""
         try:
             return self._running[robot].check()
         except JobError as error:
-            told = samples.get((robot, "grip"))
-            print(f"{now_s:.2f} s: {error}: {getattr(told and told.value, 'why', '')}")
+            print(f"{now_s:.2f} s: {error}")
             del self._running[robot]
             self._again_s = now_s + AGAIN_S
             return False

@@ -42,7 +42,9 @@ def crane(x: float, *, y: float = 0.0, yaw_deg: float = 0.0, **gripper: Any) -> 
     """Return a crane on the floor whose boom points along x, turned by an angle."""
     its = TEMPLATES["crane"]
     actuators = {**its["actuators"], "gripper": {**its["actuators"]["gripper"], **gripper}}
-    return {**its, "at": {"x": f"{x} m", "y": f"{y} m", "yaw": f"{yaw_deg} deg"}, "actuators": actuators}
+    sensors = {**its["sensors"], "grip": {"kind": "gripper_state", "rate": "50 Hz"}}
+    at = {"x": f"{x} m", "y": f"{y} m", "yaw": f"{yaw_deg} deg"}
+    return {**its, "at": at, "actuators": actuators, "sensors": sensors}
 
 
 def porter(x: float, **more: Any) -> dict[str, Any]:

@@ -90,9 +90,9 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "x_y_w": (Base(0.5, -1.2, 0.1), [0.5, -1.2, 0.1], ["m/s", "m/s", "rad/s"]),
     "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3, 7.0), [0.5, -1.2, 9.0, 1 / 3, 7.0], ["m", "m", "m", "rad", ""]),
     "gripper": (Grip(1.0, 3.0), [1.0, 3.0], ["", ""]),
-    "gripper_state": (GripperState(1.0, 1.0, 2.5, 4.0), [1.0, 1.0, 2.5, 4.0], ["", "", "kg", ""]),
+    "gripper_state": (GripperState(1.0, 1.0, 2.5), [1.0, 1.0, 2.5], ["", "", "kg"]),
     "go_to": (Place(0.5, -1.2, -7.0), [0.5, -1.2, -7.0], ["m", "m", ""]),
-    "job": (Jobs(1.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 3.0, 0.0, 2.0, 0.0], [""] * 3),
+    "job": (Jobs(1.0, 4.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 4.0, 3.0, 0.0, 2.0, 0.0], [""] * 4),
     "velocity": (
         Velocity(0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0),
         [0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0],
@@ -119,7 +119,7 @@ SIZES |= {"rod_force": 16, "rod_velocity": 16, "rod_voltage": 16, "ball_state": 
 SIZES |= {"contact": 24, "gps": 24, "imu": 48, "pose_3d": 56, "range": 8, "thermometer": 8}
 SIZES |= {
     "gripper": 8,
-    "gripper_state": 32,
+    "gripper_state": 24,
     "force": 48,
     "v_w": 16,
     "x_y_w": 24,
@@ -139,7 +139,7 @@ SEVERAL = {
     "proximity",
     "rotor_speeds",
 }
-SINGLE = {"figure_contact": 1, "job": 1}
+SINGLE = {"figure_contact": 1, "job": 2}
 """Fields of one number before those of several."""
 
 

@@ -6,7 +6,8 @@ of the link at the grasp; so whoever solves the two next holds them by the same.
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from enum import IntEnum
+from typing import Annotated, ClassVar, Final
 
 from msgspec import Struct
 
@@ -14,12 +15,12 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.components.entities import Motors
-from foosim.world.components.grasping import GraspFailure, Portable, distance_from, grasp_of, portables_of
+from foosim.world.components.grasping import Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import Misfit, Mounting, View, WritableView
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ENTITY, NO_ENTITY, Engine
-from foosim.world.forms.jobs import JobState
+from foosim.world.forms.jobs import FAILURE, JobState
 from foosim.world.forms.quantities import JobNumber, Share
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings, Tag
@@ -33,6 +34,17 @@ Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
 VALID: Final = "valid on robots that the engine solves, as urdf, quadrotor, differential_drive with dynamics: rigid"
 HALF: Final = 0.5
 """A command from here on means closed."""
+
+
+class GraspFailure(IntEnum):
+    """Why a gripper took nothing when it was last told to close."""
+
+    NONE = 0
+    OUT_OF_REACH = 1
+    NO_TAG = 2
+    TOO_WIDE = 3
+    TOO_HEAVY = 4
+    QUARANTINED = 5
 
 
 class GripperSettings(ActuatorSettings):
@@ -60,7 +72,7 @@ class Grip(Struct, frozen=True):
     "gripper",
     GripperSettings,
     Grip,
-    slots={"held": ENTITY, "grasp": 7, "wanted": 1, "failure": 1},
+    slots={"held": ENTITY, "grasp": 7, "wanted": 1, FAILURE: 1},
     moves=False,
     jobs=True,
 )
@@ -70,12 +82,20 @@ class Gripper:
     A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
     """
 
+    FAILURES: ClassVar = {
+        GraspFailure.OUT_OF_REACH: "there is no object within reach",
+        GraspFailure.NO_TAG: "the nearest object does not have the tag of the gripper",
+        GraspFailure.TOO_WIDE: "the nearest object is wider than the gripper opens",
+        GraspFailure.TOO_HEAVY: "the nearest object is heavier than the gripper holds",
+        GraspFailure.QUARANTINED: "the nearest object, or the robot, is in quarantine",
+    }
+
     def __init__(self, settings: GripperSettings, at: Mounting) -> None:
         self._settings = settings
         self._body, self._robot = body_at(at), at.robot
         self._link = link_index(self._body, settings.at.link)
         self._held, self._grasp = at.slot("held"), at.slot("grasp")
-        self._wanted, self._failure = at.slot("wanted"), at.slot("failure")
+        self._wanted, self._failure = at.slot("wanted"), at.slot(FAILURE)
         self._quarantined = at.slot("quarantined")
         self._objects = [(one, self._misfit(one)) for one in portables_of(at.spec, at.layout)]
         """Each with the reason why it can never be taken."""

@@ -1,12 +1,10 @@
-"""What a gripper may take: the free rigid objects of a layout, their sizes and masses, and how far away they are; and
-why it takes nothing."""
+"""What a gripper may take: the free rigid objects of a layout, their sizes and masses, and how far away they are."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import IntEnum
 from math import sqrt
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from foosim.world.components.entities import mounting_of
 from foosim.world.kinematics import forward_kinematics
@@ -17,32 +15,6 @@ from foosim.world.spec import WorldSpec
 
 Grasp = tuple[Vector, Quaternion]
 """The pose of what is held, its centre of mass in its principal axes, in the frame of the link that holds it."""
-
-
-class GraspFailure(IntEnum):
-    """Why a gripper took nothing when it was last told to close; 0 where it did not fail."""
-
-    NONE = 0
-    OUT_OF_REACH = 1
-    NO_TAG = 2
-    TOO_WIDE = 3
-    TOO_HEAVY = 4
-    QUARANTINED = 5
-
-    @property
-    def text(self) -> str:
-        """It as a sentence, empty of none."""
-        return _SENTENCES[self]
-
-
-_SENTENCES: Final[tuple[str, ...]] = (
-    "",
-    "there is no object within reach",
-    "the nearest object does not have the tag of the gripper",
-    "the nearest object is wider than the gripper opens",
-    "the nearest object is heavier than the gripper holds",
-    "the nearest object, or the robot, is in quarantine",
-)
 
 
 class Portable(NamedTuple):
