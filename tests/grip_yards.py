@@ -10,6 +10,7 @@ import yaml
 from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
 from foosim.players.workshop import HAND_M as FRONT_M
+from foosim.world.actuators.gripper import Grip
 from tests.forms.worlds import DEPLOY
 from tests.solid_yards import solids_text
 
@@ -34,7 +35,7 @@ class Script(Player):
         found: dict[str, dict[str, Any]] = {}
         for at, robot, actuator, values in self._steps:
             if at == tick:
-                found.setdefault(robot, {})[actuator] = tuple(values)
+                found.setdefault(robot, {})[actuator] = Grip(*values) if actuator == "gripper" else tuple(values)
         return found
 
 

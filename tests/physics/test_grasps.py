@@ -14,6 +14,7 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.simulation import Simulation
+from foosim.world.actuators.gripper import GraspFailure, Grip
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.components.grasping import grasp_of
 from foosim.world.forms.jobs import JobState
@@ -275,6 +276,24 @@ def test_what_fits_is_taken_and_a_job_says_why_another_is_not(gripper: dict[str,
         assert held(made) == ("" if why else "crate") and made.frame.at("a", "gripper.wanted") == 1.0
         assert job.state == (JobState.FAILED if why else JobState.DONE)
         assert why in job.why and bool(why) == bool(job.why)
+
+
+def test_what_fits_is_taken_before_what_is_nearer() -> None:
+    with at_crate({"crate": crate(1.005, mass=5.0), "other": crate(1.01, z=0.3)}, reach="11 cm", mass="4 kg") as made:
+        made.step({"a": {"gripper": (1.0,)}})
+        assert held(made) == "other"
+
+
+@pytest.mark.parametrize("name", ["a", "crate"])
+def test_nothing_is_taken_in_quarantine(name: str) -> None:
+    with at_crate() as made:
+        frame = made.frame
+        numbers = [*frame.numbers]
+        numbers[frame.layout[name].offsets["quarantined"]] = 800.0
+        made.reset(Frame(frame.tick, frame.layout, None, numbers=numbers))
+        made.step({"a": {"gripper": Grip(1.0, 1.0)}}, ticks=2)
+        assert held(made) == "" and made.frame.at("a", "gripper.jobs_states") == JobState.FAILED
+        assert made.frame.at("a", "gripper.failure") == GraspFailure.QUARANTINED
 
 
 @pytest.mark.parametrize(

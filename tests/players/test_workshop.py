@@ -79,6 +79,7 @@ def test_a_crate_that_is_missing_is_tried_again_until_it_is_there(capsys: pytest
         simulation.add("crate-4", "-0.6,-1.61")
         simulation.step(ticks=150)
         assert simulation.frame.at("porter", "gripper.held") == simulation.frame.layout["crate-4"].index
+        assert simulation.frame.at("porter", "gripper.failure") == 0.0
     out = capsys.readouterr().out.splitlines()
     assert len(out) >= 2 and all("porter/gripper: job" in line and "no object within reach" in line for line in out)
 
