@@ -12,6 +12,7 @@ that are due. A player:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
@@ -38,7 +39,8 @@ ENDS: Final[dict[JobState, type[JobError]]] = {
 class Job:
     """One job: `number` is None as long as it has not been sent, `state` NONE as long as it is not known to be taken.
 
-    `by` is who commanded the robot after it, where that is known of a job that was preempted.
+    `by` is who commanded the robot after it, where that is known of a job that was preempted; `why` is a sentence on
+    why it has failed, where the actuator says that.
     """
 
     def __init__(self, what: str, number: int | None, command: Any) -> None:
@@ -46,7 +48,7 @@ class Job:
         self.what: Final = what
         self.number = number
         self.state = JobState.NONE
-        self.by = ""
+        self.by = self.why = ""
         self.is_cancelled = False
         """Whether it was called off; it may have ended otherwise before that arrives."""
         self.command: Final = command
@@ -62,9 +64,11 @@ class Job:
         error = ENDS.get(self.state)
         if error is None:
             return self.state == JobState.DONE
-        by = f" by {self.by}" if self.by else ""
+        more = f" by {self.by}" if self.by else f": {self.why}" if self.why else ""
         raise error(
-            f"{self.what}: job {self.number or 'that was not sent'} has {_ENDED[self.state]}{by}", self.number, self.by
+            f"{self.what}: job {self.number or 'that was not sent'} has {_ENDED[self.state]}{more}",
+            self.number,
+            self.by,
         )
 
 
@@ -84,7 +88,9 @@ class Jobs:
         self._taker: Taker = CommandEncoder(deployment).actuator(robot, actuator)
         its = deployment.robots[robot]
         self.what: Final = f"{robot}/{actuator}"
-        if not find_component("actuator", its.actuators[actuator].kind).jobs:
+        kind = find_component("actuator", its.actuators[actuator].kind)
+        self._failures: Mapping[float, str] = getattr(kind.made, "FAILURES", {})
+        if not kind.jobs:
             raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
         self.senders: Final = deployment.senders_to(robot)
         if sender not in self.senders:
@@ -168,6 +174,8 @@ class Jobs:
             job.state = state if last == job.number else JobState.PREEMPTED
             if job.state == JobState.PREEMPTED:
                 job.by = self.running
+            elif job.state == JobState.FAILED:
+                job.why = self._failures.get(reading.failure, "")
         self._open = [job for job in self._open if not job.state.has_ended]
 
     def due(self, tick: int) -> Any | None:

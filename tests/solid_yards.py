@@ -34,7 +34,8 @@ class _Plain(yaml.SafeDumper):
         return True
 
 
-def _text(**sections: Any) -> str:
+def solids_text(**sections: Any) -> str:
+    """Return a deployment of rigid bodies in an empty yard, on a node."""
     whole = {
         "format": 2,
         "world": "solids",
@@ -45,9 +46,9 @@ def _text(**sections: Any) -> str:
         "pace": "fast",
         "assets": "models",
         "scene": {"kind": "empty"},
-        **sections,
         "nodes": {"n": {"robots": ["*"]}},
         "network": {"links": [{"id": "all", "from": "*", "to": "*", "delay": "3 ms", "order": "fifo"}]},
+        **sections,
     }
     return yaml.dump(whole, Dumper=_Plain, sort_keys=False)
 
@@ -59,7 +60,7 @@ def three_arms() -> str:
     robots["base"] = {"model": "holonomic", "at": {"x": "3.9 m", "y": "-50 cm"}}
     crates = {"at": {"x": "25 cm", "y": "-20 cm", "z": "1.3 m"}, "count": 3, "spacing": {"x": "2.6 m"}}
     fallen = {"at": {"x": "3.9 m", "y": "-45 cm", "z": "60 cm"}}
-    return _text(
+    return solids_text(
         surfaces={"floor": {"friction": 0.05, "restitution": 0.1}},
         objects={
             "box": {**BOX, "at": {"x": "-1.6 m", "y": "60 cm", "z": "10 cm"}},
@@ -98,7 +99,7 @@ def stack() -> str:
     robots: dict[str, Any] = {
         f"quad-{n}": {**quad, "at": {"x": "1 m", "y": f"{80 * (n - 1)} cm", "z": "50 mm"}} for n in range(3)
     }
-    return _text(objects=objects, robots=robots)
+    return solids_text(objects=objects, robots=robots)
 
 
 def run(

@@ -29,6 +29,7 @@ RUNS = {
     "table, shared air": ("table.yaml", 250, ["engine=pure", f"network={{{AIR}}}"]),
     "warehouse": ("warehouse.yaml", 50, []),
     "yard": ("yard.yaml", 100, []),
+    "workshop": ("workshop.yaml", 100, []),
 }
 """Deployment, ticks and settings."""
 REHEARSALS = """

@@ -42,7 +42,7 @@ def jobs() -> Jobs:
 
 def hear(its: Jobs, number: float, state: float, running: float = 0.0, others: float = 0.0) -> None:
     """Tell it of its last job, and of the numbers of the others."""
-    reading = Reading(running, (others, number, others), (0.0, state, 0.0))
+    reading = Reading(running, 0.0, (others, number, others), (0.0, state, 0.0))
     its.hear({its.heard: Sample(*its.heard, 1, 0, 0, reading)})
 
 
@@ -130,10 +130,10 @@ def test_after_a_restart_the_last_job_is_the_one_of_the_reading() -> None:
 @pytest.mark.parametrize(
     "reading",
     [
-        Reading(4.0, (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
-        Reading(0.5, (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
-        Reading(2.0, (0.0, 1.0, 0.0), (0.0, 9.0, 0.0)),
-        Reading(2.0, (1.0,), (1.0,)),
+        Reading(4.0, 0.0, (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        Reading(0.5, 0.0, (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        Reading(2.0, 0.0, (0.0, 1.0, 0.0), (0.0, 9.0, 0.0)),
+        Reading(2.0, 0.0, (1.0,), (1.0,)),
     ],
 )
 def test_a_reading_that_the_network_has_changed_is_passed_over(reading: Reading) -> None:

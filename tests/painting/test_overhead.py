@@ -214,7 +214,7 @@ def test_a_figure_swings_out_to_the_side() -> None:
     assert columns.min() in range(left, left + 3) or columns.max() in range(right - 3, right + 2)
 
 
-@pytest.mark.parametrize("name", ["table.yaml", "warehouse.yaml", "yard.yaml"])
+@pytest.mark.parametrize("name", ["table.yaml", "warehouse.yaml", "yard.yaml", "workshop.yaml"])
 def test_equal_frames_give_equal_pictures(name: str) -> None:
     painter, frame = painter_of(name)
     first = painter.paint(frame).tobytes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from itertools import product
 from math import cos, dist, sin
@@ -10,16 +9,21 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.client.jobs import Jobs
 from foosim.common.errors import DeploymentError
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.simulation import Simulation
+from foosim.world.actuators.gripper import GraspFailure, Grip
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.components.grasping import grasp_of
+from foosim.world.forms.jobs import JobState
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
 from foosim.world.sensors.rigid.gripper_state import GripperState
 from tests.forms.worlds import DEPLOY
-from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, folder, porter, world
+from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, porter, world
 
 GRAVITY: Final = 9.80665
 LEFT_M: Final = 1.0 - SIDE_M / 2
@@ -33,9 +37,8 @@ SWINGS: Final = ((1.5, 1.3), (0.6, 0.9), (1.0, 1.7), (0.7, 1.1), (1.5, 2.0), (0.
 
 
 def simulation(robots: Mapping[str, Any], objects: Mapping[str, Any], **more: Any) -> Simulation:
-    path = folder() / NAME
-    path.write_text(world(robots, objects, **more))
-    return Simulation(path)
+    text, files = pin_assets(world(robots, objects, **more), NAME, DEPLOY)
+    return Simulation(load_deployment(text, NAME).with_assets(files))
 
 
 def at_crate(crates: Mapping[str, Any] | None = None, robots: Mapping[str, Any] | None = None, **gripper: Any) -> Any:
@@ -88,7 +91,6 @@ def test_it_is_taken_without_a_jump_and_weighs_on_the_crane() -> None:
 
 def arm_with(mass: float, **more: Any) -> Simulation:
     """The arm of the yard with a box above its flange."""
-    shutil.copy(DEPLOY / "models" / "arm.urdf", folder() / "models" / "arm.urdf")
     actuators = {
         "gripper": {"kind": "gripper", "at": {"link": "grip"}, "reach": "10 cm", "mass": f"{mass} kg"},
         "joints": {"kind": "joint_position", "gain": "8 Hz"},
@@ -249,26 +251,49 @@ def test_what_a_holder_in_quarantine_held_falls() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gripper", "name"),
+    ("gripper", "why"),
     [
-        ({}, "crate"),
-        ({"mass": "3.9 kg"}, ""),
-        ({"mass": "4 kg"}, "crate"),
-        ({"opening": "19 cm"}, ""),
-        ({"opening": "20 cm"}, "crate"),
-        ({"reach": "9 mm"}, ""),
-        ({"reach": "11 mm"}, "crate"),
-        ({"tag": "cup"}, ""),
-        ({"tag": "crate"}, "crate"),
-        ({"at": {"link": "grip", "y": "14 cm"}}, ""),
-        ({"at": {"link": "grip", "y": "12 cm"}, "reach": "5 cm"}, "crate"),
+        ({}, ""),
+        ({"mass": "3.9 kg"}, "heavier"),
+        ({"mass": "4 kg"}, ""),
+        ({"opening": "19 cm"}, "wider"),
+        ({"opening": "20 cm"}, ""),
+        ({"reach": "9 mm"}, "no object within reach"),
+        ({"reach": "11 mm"}, ""),
+        ({"tag": "cup"}, "the tag"),
+        ({"tag": "crate"}, ""),
+        ({"at": {"link": "grip", "y": "14 cm"}}, "no object within reach"),
+        ({"at": {"link": "grip", "y": "12 cm"}, "reach": "5 cm"}, ""),
     ],
 )
-def test_what_fits_is_taken(gripper: dict[str, Any], name: str) -> None:
+def test_what_fits_is_taken_and_a_job_says_why_another_is_not(gripper: dict[str, Any], why: str) -> None:
     with at_crate({"crate": crate(1.0, tags=["crate"])}, **gripper) as made:
-        made.step({"a": {"gripper": (1.0,)}}, ticks=2)
-        assert held(made) == name
-        assert made.frame.at("a", "gripper.wanted") == 1.0
+        jobs = Jobs(made.declared, "script", "a", "gripper")
+        jobs.hear(made.readings)
+        job = jobs.call(closed=1.0)
+        while not job.state.has_ended:
+            jobs.hear(made.step(jobs.commands(made.tick)))
+        assert held(made) == ("" if why else "crate") and made.frame.at("a", "gripper.wanted") == 1.0
+        assert job.state == (JobState.FAILED if why else JobState.DONE)
+        assert why in job.why and bool(why) == bool(job.why)
+
+
+def test_what_fits_is_taken_before_what_is_nearer() -> None:
+    with at_crate({"crate": crate(1.005, mass=5.0), "other": crate(1.01, z=0.3)}, reach="11 cm", mass="4 kg") as made:
+        made.step({"a": {"gripper": (1.0,)}})
+        assert held(made) == "other"
+
+
+@pytest.mark.parametrize("name", ["a", "crate"])
+def test_nothing_is_taken_in_quarantine(name: str) -> None:
+    with at_crate() as made:
+        frame = made.frame
+        numbers = [*frame.numbers]
+        numbers[frame.layout[name].offsets["quarantined"]] = 800.0
+        made.reset(Frame(frame.tick, frame.layout, None, numbers=numbers))
+        made.step({"a": {"gripper": Grip(1.0, 1.0)}}, ticks=2)
+        assert held(made) == "" and made.frame.at("a", "gripper.jobs_states") == JobState.FAILED
+        assert made.frame.at("a", "gripper.failure") == GraspFailure.QUARANTINED
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ def digests_of(simulation: Simulation, ticks: int) -> list[bytes]:
 
 @pytest.mark.parametrize(
     ("name", "ticks", "sets"),
-    [("table.yaml", TICKS, [WAIT]), ("warehouse.yaml", 12, []), ("yard.yaml", 12, [])],
+    [("table.yaml", TICKS, [WAIT]), ("warehouse.yaml", 12, []), ("yard.yaml", 12, []), ("workshop.yaml", 40, [])],
 )
 def test_over_the_emulated_network_it_has_the_digests_of_a_rehearsal(name: str, ticks: int, sets: list[str]) -> None:
     """All players act by themselves, at periods and at arrivals; links lose and delay."""

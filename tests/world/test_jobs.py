@@ -218,13 +218,13 @@ def test_the_sensor_speaks_when_something_changes() -> None:
         assert readings() == 1.0
         tell(its, (ANN, 1.0), ticks=10)
         assert readings() == 2.0
-        assert its.readings["base", "jobs"].value == Jobs(1.0, (1.0, 0.0), (1.0, 0.0))
+        assert its.readings["base", "jobs"].value == Jobs(1.0, 0.0, (1.0, 0.0), (1.0, 0.0))
         tell(its, (ANN, 1.0), ticks=10)
         assert readings() == 2.0, "a repeat changes nothing"
         tell(its, (ANN, -1.0), ticks=1)
         tell(its, (BEN, 1.0), ticks=10)
         assert readings() == 4.0
-        assert its.readings["base", "jobs"].value == Jobs(2.0, (1.0, 1.0), (5.0, 1.0))
+        assert its.readings["base", "jobs"].value == Jobs(2.0, 0.0, (1.0, 1.0), (5.0, 1.0))
         tell(its, ticks=70)
         assert readings() == 5.0
 

@@ -92,13 +92,13 @@ VALUES: dict[str, tuple[Struct, list[float], list[str]]] = {
     "v_w": (Motion(0.5, -1.2), [0.5, -1.2], ["m/s", "rad/s"]),
     "x_y_w": (Base(0.5, -1.2, 0.1), [0.5, -1.2, 0.1], ["m/s", "m/s", "rad/s"]),
     "waypoint": (Waypoint(0.5, -1.2, 9.0, 1 / 3, 7.0), [0.5, -1.2, 9.0, 1 / 3, 7.0], ["m", "m", "m", "rad", ""]),
-    "gripper": (Grip(1.0), [1.0], [""]),
+    "gripper": (Grip(1.0, 3.0), [1.0, 3.0], ["", ""]),
     "gripper_state": (GripperState(1.0, 1.0, 2.5), [1.0, 1.0, 2.5], ["", "", "kg"]),
     "go_to": (Place(0.5, -1.2, -7.0), [0.5, -1.2, -7.0], ["m", "m", ""]),
     "look_at": (Sight(0.5, -1.2, 1 / 3, -7.0), [0.5, -1.2, 1 / 3, -7.0], ["m", "m", "m", ""]),
     "pan_tilt": (PanTiltAngles(0.5, 1 / 3, 7.0), [0.5, 1 / 3, 7.0], ["rad", "rad", ""]),
     "joint_trajectory": (Trajectory((0.5, 1.0), ((0.1, 1 / 3), (0.0, -1.0)), 7.0), [], ["s", "m or rad", ""]),
-    "job": (Jobs(1.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 3.0, 0.0, 2.0, 0.0], [""] * 3),
+    "job": (Jobs(1.0, 4.0, (3.0, 0.0), (2.0, 0.0)), [1.0, 4.0, 3.0, 0.0, 2.0, 0.0], [""] * 4),
     "velocity": (
         Velocity(0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0),
         [0.5, -1.2, 9.0, 1 / 3, 0.0, -1.0],
@@ -149,7 +149,7 @@ SEVERAL = {
 }
 PLAIN = {"joint_trajectory"}
 """Kinds that are MessagePack."""
-SINGLE = {"figure_contact": 1, "job": 1}
+SINGLE = {"figure_contact": 1, "job": 2}
 """Fields of one number before those of several."""
 
 

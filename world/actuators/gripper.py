@@ -6,7 +6,8 @@ of the link at the grasp; so whoever solves the two next holds them by the same.
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from enum import IntEnum
+from typing import Annotated, ClassVar, Final
 
 from msgspec import Struct
 
@@ -14,12 +15,13 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.components.entities import Motors
-from foosim.world.components.grasping import distance_from, grasp_of, portables_of
+from foosim.world.components.grasping import Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import Misfit, Mounting, View, WritableView
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ENTITY, NO_ENTITY, Engine
-from foosim.world.forms.quantities import Share
+from foosim.world.forms.jobs import FAILURE, JobState
+from foosim.world.forms.quantities import JobNumber, Share
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings, Tag
 from foosim.world.kinematics import forward_kinematics
@@ -32,6 +34,17 @@ Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
 VALID: Final = "valid on robots that the engine solves, as urdf, quadrotor, differential_drive with dynamics: rigid"
 HALF: Final = 0.5
 """A command from here on means closed."""
+
+
+class GraspFailure(IntEnum):
+    """Why a gripper took nothing when it was last told to close."""
+
+    NONE = 0
+    OUT_OF_REACH = 1
+    NO_TAG = 2
+    TOO_WIDE = 3
+    TOO_HEAVY = 4
+    QUARANTINED = 5
 
 
 class GripperSettings(ActuatorSettings):
@@ -52,25 +65,48 @@ class Grip(Struct, frozen=True):
     """Whether a gripper is to close: 1, or to open: 0."""
 
     closed: Share
+    job: JobNumber = 0.0
 
 
-@actuator("gripper", GripperSettings, Grip, slots={"held": ENTITY, "grasp": 7, "wanted": 1}, moves=False)
+@actuator(
+    "gripper",
+    GripperSettings,
+    Grip,
+    slots={"held": ENTITY, "grasp": 7, "wanted": 1, FAILURE: 1},
+    moves=False,
+    jobs=True,
+)
 class Gripper:
-    """Takes the nearest object in its reach when it is told to close, and lets it go when it is told to open."""
+    """Takes the nearest object in its reach when it is told to close, and lets it go when it is told to open.
+
+    A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
+    """
+
+    FAILURES: ClassVar = {
+        GraspFailure.OUT_OF_REACH: "there is no object within reach",
+        GraspFailure.NO_TAG: "the nearest object does not have the tag of the gripper",
+        GraspFailure.TOO_WIDE: "the nearest object is wider than the gripper opens",
+        GraspFailure.TOO_HEAVY: "the nearest object is heavier than the gripper holds",
+        GraspFailure.QUARANTINED: "the nearest object, or the robot, is in quarantine",
+    }
 
     def __init__(self, settings: GripperSettings, at: Mounting) -> None:
         self._settings = settings
         self._body, self._robot = body_at(at), at.robot
         self._link = link_index(self._body, settings.at.link)
-        self._held, self._grasp, self._wanted = at.slot("held"), at.slot("grasp"), at.slot("wanted")
+        self._held, self._grasp = at.slot("held"), at.slot("grasp")
+        self._wanted, self._failure = at.slot("wanted"), at.slot(FAILURE)
         self._quarantined = at.slot("quarantined")
-        self._fitting = [
-            one
-            for one in portables_of(at.spec, at.layout)
-            if one.across_m <= settings.opening
-            and one.mass_kg <= settings.mass
-            and (settings.tag is None or settings.tag in one.tags)
-        ]
+        self._objects = [(one, self._misfit(one)) for one in portables_of(at.spec, at.layout)]
+        """Each with the reason why it can never be taken."""
+
+    def _misfit(self, one: Portable) -> GraspFailure:
+        settings = self._settings
+        if settings.tag is not None and settings.tag not in one.tags:
+            return GraspFailure.NO_TAG
+        if one.across_m > settings.opening:
+            return GraspFailure.TOO_WIDE
+        return GraspFailure.TOO_HEAVY if one.mass_kg > settings.mass else GraspFailure.NONE
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
@@ -93,32 +129,46 @@ class Gripper:
     def accept(self, command: Grip, view: WritableView) -> bool:
         """Close or open. A robot in quarantine, which nobody solves, does neither."""
         if view.read(self._quarantined)[0] > 0.0:
+            view.write(self._failure, GraspFailure.QUARANTINED)
             return False
         is_closed = command.closed >= HALF
-        view.write(self._wanted, float(is_closed))
+        failure = GraspFailure.NONE
         if not is_closed:
             view.write(self._held, NO_ENTITY)
         elif view.read(self._held)[0] == NO_ENTITY:
-            self._take(view)
+            failure = self._take(view)
+        view.write(self._wanted, float(is_closed))
+        view.write(self._failure, failure)
         return True
 
-    def _take(self, view: WritableView) -> None:
-        """Take the nearest object, ties by name, as it is at the start of the tick."""
+    def progress(self, view: WritableView) -> JobState:
+        """Return whether it holds something, or nothing, as it was told."""
+        is_holding = view.read(self._held)[0] != NO_ENTITY
+        return JobState.DONE if is_holding == (view.read(self._wanted)[0] == 1.0) else JobState.FAILED
+
+    def _take(self, view: WritableView) -> GraspFailure:
+        """Take the nearest object, ties by name, as it is at the start of the tick; else return why the nearest is not
+        taken."""
         start, settings = view.start, self._settings
         _, position, orientation = forward_kinematics(self._body, self._robot, start)[self._link]
         point = moved(position, rotate(orientation, settings.at.position), 1.0)
-        found = []
-        for one in self._fitting:
-            if one.entity.is_absent(start) or start[one.entity.offsets["quarantined"]] > 0.0:
+        near = []
+        for one, misfit in self._objects:
+            if one.entity.is_absent(start):
                 continue
             way = distance_from(one, start, point, settings.reach)
             if way is not None:
-                found.append((way, one.entity.name, one.entity))
-        if found:
-            _, _, entity = min(found)
+                is_quarantined = start[one.entity.offsets["quarantined"]] > 0.0
+                failure = misfit or (GraspFailure.QUARANTINED if is_quarantined else GraspFailure.NONE)
+                near.append((failure != GraspFailure.NONE, way, one.entity.name, failure, one.entity))
+        if not near:
+            return GraspFailure.OUT_OF_REACH
+        _, _, _, failure, entity = min(near)
+        if failure == GraspFailure.NONE:
             place, turned = grasp_of(entity, start, position, orientation)
             view.write(self._held, float(entity.index))
             view.write(self._grasp, *place, *turned)
+        return failure
 
     def hold(self, view: WritableView) -> None:
         """Leave all as it is: what is held is held without power, too."""

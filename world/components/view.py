@@ -364,7 +364,8 @@ class JobActuator(Actuator, Protocol):
     """An actuator whose commands may be jobs: registered with `jobs=True`, its command has a last field `job`.
 
     `accept` gets the command of a job as any other one, without its number. `hold` is called besides when a job is
-    cancelled or fails.
+    cancelled or fails. A class with a slot `failure` says by that why it could not do what it was told last: it has the
+    sentences by the numbers in `FAILURES`.
     """
 
     def progress(self, view: WritableView) -> JobState:

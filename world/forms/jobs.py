@@ -24,6 +24,10 @@ SLOTS: Final = (NUMBERS, STATES, RUNNING, CHANGED)
 """The slots of an actuator with jobs: of each sender the number of its last job, and its state; the row of the sender
 whose job runs, counted from 1, 0 of nobody; whether any of these changed in the last tick."""
 
+FAILURE: Final = "failure"
+"""The slot of an actuator that says why it could not do what it was told last, 0 where it could. Its class has the
+sentences by these numbers, `FAILURES`."""
+
 
 class JobState(IntEnum):
     """How the last job of a sender stands; what is above `RUNNING` is how it ended."""

@@ -7,7 +7,7 @@ from msgspec import Struct
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name
 from foosim.world.components.view import Misfit, Mounting, View
-from foosim.world.forms.jobs import CHANGED, NUMBERS, RUNNING, STATES
+from foosim.world.forms.jobs import CHANGED, FAILURE, NUMBERS, RUNNING, STATES
 from foosim.world.forms.quantities import Count
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -22,11 +22,13 @@ class JobSettings(SensorSettings):
 class Jobs(Struct, frozen=True):
     """The jobs of an actuator. Senders are the players and clients that may command the robot, in name order.
 
-    `running` is the one whose job runs, counted from 1, 0 for none. Of each there are the number of its last job, 0
-    before the first one, and its state: 1 running, 2 done, 3 failed, 4 preempted, 5 cancelled.
+    `running` is the one whose job runs, counted from 1, 0 for none. `failure` says why the actuator could not do what
+    it was told last, by the numbers of its kind; 0: it could, or does not say. Of each sender there are the number of
+    its last job, 0 before the first one, and its state: 1 running, 2 done, 3 failed, 4 preempted, 5 cancelled.
     """
 
     running: Count
+    failure: Count
     numbers: tuple[Count, ...]
     states: tuple[Count, ...]
 
@@ -39,6 +41,8 @@ class JobSensor:
         self._running, self._numbers, self._states = (
             at.slot(f"{settings.actuator}.{slot}") for slot in (RUNNING, NUMBERS, STATES)
         )
+        failure = f"{settings.actuator}.{FAILURE}"
+        self._failure = at.slot(failure) if failure in at.robot.offsets else None
 
     @staticmethod
     def check(settings: JobSettings, at: Mounting) -> None:
@@ -50,4 +54,6 @@ class JobSensor:
             raise Misfit(("actuator",), what, name, nearest_quoted(name, having))
 
     def sample(self, view: View) -> Jobs:
-        return Jobs(view.numbers[self._running.at], tuple(view.read(self._numbers)), tuple(view.read(self._states)))
+        failure = 0.0 if self._failure is None else view.numbers[self._failure.at]
+        numbers, states = tuple(view.read(self._numbers)), tuple(view.read(self._states))
+        return Jobs(view.numbers[self._running.at], failure, numbers, states)
