@@ -99,7 +99,11 @@ REFUSED: Final[tuple[tuple[str, dict[str, Any], str], ...]] = (
     ("add", {"name": "w-4", "at": "0,-3"}, "at of w-4: a place that is occupied: w-4 would be in w-1"),
     ("add", {"name": "w-4", "at": "0,-3", "node": "n2"}, "at of w-4: a place that is occupied"),
     ("add", {"name": "w-1"}, "w-1 is in the world already"),
-    ("add", {"name": "wall"}, "no wall is left to add: all 1 that the deployment declares are in the world"),
+    (
+        "add",
+        {"name": "wall"},
+        "no wall is left to add: all 1 of the deployment are in the world, and objects.wall declares 0 spares",
+    ),
     ("add", {"name": "wal"}, "'wal', nearest is 'wall'"),
     ("add", {"name": "w-4", "node": "n9"}, "no node 'n9'; there are n1, n2"),
     ("remove", {"name": "w-4"}, "w-4 is absent already"),
@@ -135,7 +139,7 @@ def test_the_last_spare_is_the_last() -> None:
     assert [answer.text.rpartition(" at ")[0] or answer.text for answer in run.answers] == [
         "w-3 added",
         "w-4 added",
-        "no w is left to add: all 4 that the deployment declares are in the world",
+        "no w is left to add: all 4 of the deployment are in the world, and robots.w declares 2 spares",
         "w-1 removed",
         "w-1 added",
     ]
