@@ -163,7 +163,7 @@ def set_field(
     """
     field, is_set, text = setting.partition("=")
     if not is_set:
-        raise BadValue("no setting, which is FIELD=VALUE", setting)
+        raise BadValue("no FIELD=VALUE, such as down=true", setting)
     show_answer(control.set(name, field, _read_value(text), run), json)
 
 

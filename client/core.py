@@ -88,6 +88,10 @@ class ClientCore:
         """Packets that have reached a free-running client and were not taken yet, in order."""
         self.tick = -1
         """The newest tick that the vHub has named."""
+        self.since = -1
+        """The tick since which a free-running client exists; -1 while it does not, and before the vHub says so."""
+        self.absent: Sequence[str] = ()
+        """Those of its robots that are absent."""
         self.ended = False
         self.is_away = False
         """Whether the vHub is gone, and has not let the client in again."""
@@ -361,9 +365,16 @@ class ClientCore:
             self.go = None
         if not self._is_new(down):
             return
+        is_newest = down.number > self._downlink
         self._take_number(down.number)
         self.tick = max(self.tick, down.tick)
         self._received += len(down.packets)
+        if is_newest and not down.ended:
+            if down.since != self.since:
+                self.arrivals.clear()  # they have reached another one
+            self.since, self.absent = down.since, down.absent
+        if down.since != self.since:
+            return
         room = limits.INBOX_MESSAGES_MAX - len(self.arrivals)
         self.arrivals.extend(down.packets[: max(0, room)])
         self._overflowed += max(0, len(down.packets) - room)

@@ -187,12 +187,15 @@ class PlayerLoop:
             self._acting.exist(core.go.since, core.go.absent, core.go.tick)
             self.newest.take(core.go.packets)
             self._say(core.go.tick, now_ns)
-        elif self._period_ns:
+        elif self._period_ns and core.since >= 0:
+            assert self._acting is not None
+            self._acting.exist(core.since, core.absent, core.tick)
             self.newest.take(core.arrivals)
             core.arrivals.clear()
             if now_ns >= self._beat_ns and not core.is_away:
                 self._say(max(core.tick, 0), now_ns)
-                self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
+                following_ns = self._beat_ns + self._period_ns
+                self._beat_ns = following_ns if following_ns > now_ns else now_ns + self._period_ns
 
     @property
     def player(self) -> Player | None:
@@ -201,7 +204,7 @@ class PlayerLoop:
 
     def deadline_ns(self) -> int:
         """When a free-running player acts next."""
-        return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
+        return NEVER_NS if self.core.ended or self.core.is_away or self.core.since < 0 else self._beat_ns
 
     def _begin(self, deployment: Deployment, now_ns: int) -> None:
         acting = self._acting = Acting(deployment, self.core.name, self._load, self.core.tick)
@@ -210,7 +213,6 @@ class PlayerLoop:
             period, offset = deployment.turns(declared)
             self.core.join(period, acting.hears, offset, deployment.arrivals_of(acting.name))
         else:
-            acting.exist(0, (), self.core.tick)
             self.core.join(0, acting.hears)
             self._period_ns = int(NS_PER_S / declared.rate_hz)
             self._beat_ns = now_ns + self._period_ns

@@ -155,7 +155,7 @@ class Stepper:
         """Return the numbers of the frame after the edits of order and events, and the rules of the world; and what
         sensors that are still there remember of it, by place."""
         if frame.tick in self.events.by_tick:
-            edits = [*edits, *self.events.edits(frame, edits)]
+            edits = [*edits, *self.events.edits(frame.tick, frame, edits)]
         numbers, moved = edit(frame, edits, self.deployment)
         self.world.apply_rules(numbers, frame.tick)
         if edits or self.world.has_rules:

@@ -422,13 +422,19 @@ class Go(Message, frozen=True):
 
 
 class Down(Message, frozen=True):
-    """Downlink `number` to a free-running client, or, to any client, the end of the run."""
+    """Downlink `number` to a free-running client, or, to any client, the end of the run.
+
+    A free-running player gets one with or without packets at the tick at which it is taken in, and at which `since` or
+    `absent` become others: they are as in a Go, `since` is -1 while it does not exist.
+    """
 
     number: Counter
     tick: Counter
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
+    since: Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)] = 0
+    absent: Names = field(default_factory=list)
 
 
 class Heard(Message, frozen=True):

@@ -144,7 +144,7 @@ class Resident:
     def act(self, tick: int, now_ns: int, carrier: Carrier) -> list[Sent]:
         """Let it act at a tick on what has reached it. Raises PlayerError."""
         name = self.acting.name
-        self.acting.exist(carrier.members[name].since, carrier.existence.absent.get(name, ()), tick)
+        self.acting.exist(carrier.members[name].since, carrier.members[name].absent, tick)
         self.acting.newest.take(carrier.take(name))
         sent = []
         for one in self.acting.act(tick):

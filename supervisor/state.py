@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from typing import Any
 
 from foosim.common import limits
@@ -41,8 +42,10 @@ from foosim.supervisor.records import (
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
 from foosim.world.assembly.initial_state import first_chain, first_frame
+from foosim.world.components.view import ComponentError
 from foosim.world.edits import Edit, written
 from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.setting.scheduled import Schedule
 
 
 class InputBuffer:
@@ -177,6 +180,7 @@ class RunState:
         self.clock = clock
         self.actions = []
         self.deployment = settings.load_deployment()
+        self._events = Schedule(self.deployment)
         text = settings.deployment_name, settings.deployment_text
         self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock, settings.start)
         self.roster = Roster(self.deployment, fingerprint)
@@ -278,8 +282,13 @@ class RunState:
         return self.inputs.missing(self.frame.tick + 1, self.members)
 
     def coming_numbers(self) -> list[float]:
-        """Return the numbers of the newest frame after all edits that are ordered, released or not."""
-        edits = [edit for tick in range(self.frame.tick, self.released) for edit in self.orders[tick]]
+        """Return the numbers of the newest frame after all that is ordered, released or not, and the events of the
+        ticks that are released: those of a tick follow its order."""
+        edits: list[Edit] = []
+        for tick in range(self.frame.tick, self.released):
+            edits += self.orders[tick]
+            with suppress(ComponentError):  # the nodes report it, and the run ends at that tick
+                edits += self._events.edits(tick, self.frame, edits)
         edits += [edit for tick in sorted(self.coming_edits) for edit in self.coming_edits[tick]]
         return written(self.frame.layout, self.frame.numbers, edits)
 

@@ -123,8 +123,7 @@ class Clients:
             return
         for flight in flights:
             flight.released_wall_ns = now_ns
-        absent = self._state.existence.absent.get(name, [])
-        go = Go(member.downlink, tick, member.sequence, received(flights), member.since, absent)
+        go = Go(member.downlink, tick, member.sequence, received(flights), member.since, [*member.absent])
         self._sessions.send_go(session, go)
         session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
         allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")
@@ -158,11 +157,12 @@ class Clients:
         if join.period and not may_lockstep(self._state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         _check_timing(join)
+        is_another = not (session.is_present or session.returns or join.period)
         self._sessions.catch_up(session, self.waits_for(join.name), now_ns)
         self.absences.end(join.name, join.boot, session.returns)
         self.tell()
         known = self._known(join.name)
-        if known is not None and join.name not in self._leaves and _is_member(known, join):
+        if known is not None and join.name not in self._leaves and _is_member(known, join) and not is_another:
             self.repeated += 1
             return False
         self._sessions.join(join)

@@ -389,7 +389,9 @@ class HubCore:
         state, releases = self.state, self.releases
         assert state is not None and releases is not None
         for name, flights in world.free.items():
-            releases.add(name, state.members[name].downlink, world.frame.tick, flights, sent_ns)
+            member = state.members[name]
+            what = name, member.downlink, world.frame.tick, flights, sent_ns
+            releases.add(*what, member.since, member.absent)
         self._release(sent_ns)
         world.step, world.sent_ns = _Step.RELEASED, sent_ns
 
@@ -449,7 +451,8 @@ class HubCore:
             for flight in release.flights:
                 flight.released_wall_ns = now_ns
             member = self.state.members[release.client]
-            down = Down(release.number, release.tick, member.sequence, received(release.flights), False)
+            what = release.number, release.tick, member.sequence, received(release.flights)
+            down = Down(*what, False, release.since, [*release.absent])
             self.sessions.send_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 

@@ -20,7 +20,8 @@ ANCHOR_WINDOW_NS: Final = 1_000_000_000
 class Release:
     """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`.
 
-    Their latest was due at wall time `due_ns`; None where nothing is due by the clock.
+    Their latest was due at wall time `due_ns`; None where nothing is due by the clock. `since` and `absent` are those
+    of the client at the tick.
     """
 
     at_ns: int
@@ -29,6 +30,8 @@ class Release:
     tick: int
     flights: list[Flight]
     due_ns: int | None = None
+    since: int = 0
+    absent: tuple[str, ...] = ()
 
 
 class Releases:
@@ -59,15 +62,24 @@ class Releases:
         while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
             self._anchors.popleft()
 
-    def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
-        """Queue the packets of a closed tick for a client, never before earlier ones."""
+    def add(
+        self,
+        client: str,
+        number: int,
+        tick: int,
+        flights: list[Flight],
+        now_ns: int,
+        since: int = 0,
+        absent: tuple[str, ...] = (),
+    ) -> None:
+        """Queue the packets of a closed tick, and who exists, for a client, never before earlier ones."""
         at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
         due_ns = None
-        if self.factor and self._anchors:
+        if self.factor and self._anchors and flights:
             anchor_ns = min(anchor for _, anchor in self._anchors)
             due_ns = anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
             at_ns = max(at_ns, due_ns)
-        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns))
+        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns, since, absent))
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:

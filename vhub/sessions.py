@@ -399,7 +399,7 @@ class Sessions:
         Neither the lost process nor the next one has necessarily received that Go.
         """
         go = decode(Go, self.by_name[name].go)
-        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False))
+        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.since, go.absent))
         self.downlinks.keep(name, go.number, payload, now_ns)
         self._actions.append(Publish(channels.DOWN, name, payload))
 

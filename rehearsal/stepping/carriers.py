@@ -24,8 +24,6 @@ from foosim.world.robot_packets import Delivered, RobotPacket
 class Carrier(Protocol):
     """Carries packets. At each frame it is opened, then closed."""
 
-    existence: Existence
-    """Who exists in the newest frame."""
     members: dict[str, Member]
     """The clients that take part."""
 
@@ -45,7 +43,7 @@ class EmulatedNetwork:
 
     def __init__(self, deployment: Deployment, first_tick: int, joining: Sequence[Joining]) -> None:
         self.state = HubState(deployment, first_tick)
-        self.existence, self.members = self.state.existence, self.state.members
+        self.members = self.state.members
         self._joining = {one.name: one for one in sorted(joining, key=lambda one: one.name)}
         self._released: dict[str, list[Flight]] = {}
         self._delivered: list[Delivered] = []
@@ -80,7 +78,7 @@ class Bypass:
 
     def __init__(self, deployment: Deployment, first_tick: int, joining: Sequence[Joining]) -> None:
         self._tick_ns = deployment.tick_ns
-        self.existence = Existence(deployment)
+        self._existence = Existence(deployment)
         self.members: dict[str, Member] = {}
         self._joining = {one.name: one for one in sorted(joining, key=lambda one: one.name)}
         self._receivers: dict[tuple[str, str], list[str]] = {}
@@ -102,9 +100,10 @@ class Bypass:
         if self._joining:
             for name in [name for name, one in self._joining.items() if one.suits(tick)]:
                 self.members[name] = Member.of(self._joining.pop(name), tick)
-                self.existence.look_again()
-        for name in self.existence.turn_to(frame, self.members):
-            self._waiting.pop(name, None)
+                self._existence.look_again()
+        for name in self._existence.turn_to(frame, self.members):
+            if self.members[name].since == tick:
+                self._waiting.pop(name, None)
         for name in self._turns:
             member = self.members.get(name)
             if member is not None and member.is_over(tick):

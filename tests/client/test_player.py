@@ -129,21 +129,48 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
     assert isinstance(join, Join) and join.period == 0
     player = Scripted.made[-1]
     player.commands = {"red.goal": Command(0.0, 0.0)}
-    assert loop.deadline_ns() == 10_000_000
+    assert loop.deadline_ns() == NEVER_NS, "it is not told yet that it exists"
     down = Down(1, 7, 0, [sample("camera", "ball", 1, 0.0, 0.0, 0.0)], False)
     loop.core.receive(channels.DOWN, NAME, encode(down), 0)
     loop.step(9_999_999)
-    assert player.calls == []
+    assert player.calls == [] and loop.deadline_ns() == 10_000_000
     loop.step(10_000_000)
     assert player.calls == [(7, {("camera", "ball"): BallPosition(0.0, 0.0, 0.0)})]
     (up,) = said(loop)
     assert isinstance(up, Up) and [packet.stamp_ns for packet in up.packets] == [10_000_000]
     assert loop.deadline_ns() == 20_000_000
     loop.step(95_000_000)
-    assert loop.deadline_ns() == 95_000_000, "beats that were missed are not made up for"
+    assert loop.deadline_ns() == 105_000_000, "beats that were missed are not made up for"
     loop.core.receive(channels.DOWN, NAME, encode(Down(2, 8, 0, [], True)), 0)
     loop.step(200_000_000)
     assert (len(player.calls), loop.deadline_ns()) == (2, NEVER_NS)
+
+
+def test_a_free_running_player_is_another_one_since_another_tick() -> None:
+    """It acts while it exists, on what has reached it since, also where several messages come at once or late."""
+    loop = begun("players.player-red.lockstep=false")
+    before = Scripted.made[-1]
+
+    def hear(*downs: Down) -> None:
+        for down in downs:
+            loop.core.receive(channels.DOWN, NAME, encode(down), 0)
+        loop.step(loop.core.tick * 10_000_000)
+
+    def ball(x: float, sequence: int) -> list[Received]:
+        return [sample("camera", "ball", sequence, x, 0.0, 0.0)]
+
+    hear(Down(1, 1, 0, ball(0.1, 1), False, 0, ["red.goal"]), Down(2, 2, 0, [], False, -1, []))
+    assert before.calls == [] and loop.deadline_ns() == NEVER_NS
+    hear(Down(3, 3, 0, ball(0.2, 2), False, 3, ["red.attack"]))
+    hear(
+        Down(4, 4, 0, ball(0.4, 9), False, 3),
+        Down(6, 6, 0, ball(0.3, 3), False, 6),
+        Down(5, 5, 0, ball(0.5, 8), False, 3, ["red.goal"]),
+    )
+    first, second = before, Scripted.made[-1]
+    assert [tick for tick, _ in first.calls] == [3] and "red.attack" not in first.robots
+    assert second.calls == [(6, {("camera", "ball"): BallPosition(0.3, 0.0, 0.0)})]
+    assert second is not first and "red.attack" in second.robots and "red.goal" in second.robots
 
 
 # --- what a player must not do ---------------------------------------------------------------------------------------
@@ -191,6 +218,7 @@ def test_whoever_says_too_much_at_once_is_named() -> None:
     with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 5: \d+ bytes in one answer, at most 1048576"):
         go(loop, 1)
     free = begun("players.player-red.lockstep=false")
+    free.core.receive(channels.DOWN, NAME, encode(Down(1, 0, 0, [], False)), 0)
     Scripted.made[-1].commands = Turn({}, [Packet("", "talk", b"")] * 65_537)
     with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 0: 65537 packets at once, at most 65536"):
         free.step(10_000_000)

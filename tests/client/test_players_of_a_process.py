@@ -8,8 +8,10 @@ from __future__ import annotations
 import faulthandler
 import logging
 import signal
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final
 
 import pytest
@@ -38,6 +40,7 @@ from foosim.protocol.messages import (
 )
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.process import STACK_SIGNAL
+from foosim.runtime.roles import loop
 from foosim.runtime.roles.role import Role
 from foosim.runtime.roles.shell import Process
 from foosim.runtime.transport.session import Session
@@ -45,6 +48,7 @@ from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RED, BLUE = "player-red", "player-blue"
+NS_PER_S: Final = 1_000_000_000
 LATER_NS: Final = 2**62
 
 
@@ -122,6 +126,8 @@ def plane() -> Iterator[Session]:
 @pytest.fixture
 def bench(plane: Session, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr(client_main, "load_player", lambda path: Counts)
+    later_ns = time.monotonic_ns() + NS_PER_S  # when hello is due, and nothing is repeated: time stands still
+    monkeypatch.setattr(loop, "time", SimpleNamespace(monotonic_ns=lambda: later_ns))
     Counts.turns.clear()
     made = Bench(plane)
     yield made

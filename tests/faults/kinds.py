@@ -249,9 +249,9 @@ def node_joins(trial: Trial) -> Figures:
 
 
 def add_bodies(cluster: Cluster) -> None:
-    """Fill the table: rows of balls that fall on it."""
+    """Fill the table: rows of balls between the rods, that fall on it."""
     for number in range(ADDED):
-        x, y = -0.5 + 0.125 * (number % 9), -0.25 + 0.125 * (number // 9)
+        x, y = -0.45 + 0.15 * (number % 7), -0.25 + 0.1 * (number // 7)
         cluster.control.ask("add", name="ball", at=f"{x:g},{y:g},0.1")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -21,13 +22,15 @@ from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Deliveries, Go, Received, Sent
 from foosim.rehearsal.journals import ENDINGS, Ending
-from foosim.rehearsal.run import Rehearsed, rehearse
+from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
+from foosim.rehearsal.settings import Process
 from foosim.rehearsal.simulation import Resident, Simulation
 from foosim.rehearsal.stepping.carriers import Bypass, Carrier
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
 from foosim.vhub.state.existence import robots_it_lives_by
@@ -322,6 +325,79 @@ def test_a_player_that_does_not_exist_any_more_is_not_waited_for() -> None:
         system.at_tick(132, lambda: system.kill("pilot-4"))
 
     assert_the_same(fly(2, prepare))
+
+
+class OfItsOwnTime(System):
+    """A rehearsal with a player outside of lockstep."""
+
+    def _enter_clients(self) -> None:
+        for name in sorted(self.supervisor.state.deployment.players):
+            self._enter_player(name, "boot")
+
+    def _core_deadline_ns(self, process: Process) -> int:
+        loop, due_ns = self.players.get(process.name), super()._core_deadline_ns(process)
+        return due_ns if loop is None else min(due_ns, process.clock.when(loop.deadline_ns()))
+
+
+def fly_freely(heard: str, *disturbances: tuple[int, Callable[[System], None]]) -> Seen:
+    """The player of two carts runs by its own clock, at 100 Hz, and hears this of them; what happens at which ticks."""
+    seen = Seen()
+    about = f"class: {__name__}:{Counting.__name__}, rate: 100 Hz, lockstep: false"
+    sets = (f"players.both={{{about}, robots: {{cart-3: [{heard}], cart-4: [{heard}]}}}}",)
+    run = RunSettings("run", "yard.yaml", with_nodes(text(changes()), "yard.yaml", 2, sets), Pace("realtime"), TICKS)
+    system = OfItsOwnTime(run, Settings(observer=seen.watch, on_closing=seen.closings.append))
+    for tick, disturb in disturbances:
+        system.at_tick(tick, partial(disturb, system))
+    system.run()
+    assert system.supervisor.result()["reason"] == "done"
+    system.close()
+    return seen
+
+
+@pytest.mark.parametrize("kills", [(), (30, *range(47, 55), 81, 100)], ids=["undisturbed", "the vHub is killed"])
+def test_a_free_running_player_hears_who_is_there_and_is_made_anew(kills: Sequence[int]) -> None:
+    """As far as a process with a clock of its own can, which acts on what has reached it."""
+    seen = fly_freely("pose", *((tick, lambda system: system.kill_hub("unsaid", 5_000_000)) for tick in kills))
+    carts, spans, said, slack = PLAYERS["both"], spans_of("cart-3", "cart-4"), said_by_both(seen), 12 if kills else 4
+    made = [at for at, (_, calls, _, _) in enumerate(said) if calls == "1"]
+    assert len(made) == len(spans) and len(said) > 70, "another one at each coming"
+    for at, (tick, _, robots, heard) in enumerate(said):
+        first, last = spans[bisect(made, at) - 1]
+        assert first <= tick <= last + slack, "it is not called while it does not exist"
+        assert robots.split(",") in [
+            [cart for cart in carts if is_here(cart, then)] for then in range(tick - slack, tick + 1)
+        ]
+        assert all(int(one.split("@")[1]) >= first for one in heard.split(",") if one), "it has heard nothing of before"
+
+
+def said_by_both(seen: Seen) -> list[tuple[int, str, str, str]]:
+    """Return the tick, the number of the call, who is there, and who was heard and when, call by call."""
+    flights = [one for closing in seen.closings for one in closing.fates if one.source == "both"]
+    logs = sorted((one.sequence, one.sent_ns // TICK_NS, one.payload) for one in flights if one.channel == "log")
+    found = []
+    for _, tick, payload in logs:
+        calls, robots, heard = payload.decode().split(" ")
+        found.append((tick, calls, robots, heard))
+    return found
+
+
+def is_here(cart: str, tick: int) -> bool:
+    return any(first <= tick < last for first, last in HERE[cart])
+
+
+@pytest.mark.parametrize("is_alone", [True, False])
+def test_a_free_running_player_that_is_started_again_hears_who_is_there(is_alone: bool) -> None:
+    """Also where no packet is for it, and where the vHub has ended as well and remembers the process before it."""
+
+    def kill(system: System) -> None:
+        if not is_alone:
+            system.kill_hub("torn", 5_000_000)
+        system.kill("both")
+        system.later(20_000_000, partial(system.start, "both"))
+
+    said = said_by_both(fly_freely("", (63, kill)))
+    ((tick, robots),) = ((tick, robots) for tick, calls, robots, _ in said if calls == "1" and 60 < tick < 100)
+    assert tick < 71 and robots == "cart-3,cart-4"
 
 
 def quiet(events: Sequence[Change]) -> str:

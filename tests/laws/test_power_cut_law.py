@@ -165,7 +165,7 @@ def test_a_supervisor_that_alone_has_lost_its_machine_goes_on_from_the_vhubs_com
     """What was ordered up to there is not ordered again."""
 
     def add(system: System) -> None:
-        ask(system, "add", name="ball", at="0.1,0,0.05")
+        ask(system, "add", name="ball", at="0.15,0,0.05")
 
     def cut_power(system: System) -> None:
         lose_supervisor(system, 9)

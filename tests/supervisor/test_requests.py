@@ -126,6 +126,24 @@ def test_two_pushes_in_one_tick_add_up_in_their_order() -> None:
     assert both.frames[-1].vector("ball", "position", 3) == pytest.approx(one.frames[-1].vector("ball", "position", 3))
 
 
+@pytest.mark.parametrize(
+    ("at", "what"),
+    [
+        ("0.224,0,0.02", "red.attack, "),
+        ("-0.075,0.06,0.08", "red.midfield, "),
+        ("0.03,0", "ball, "),
+        ("0.3,0.335", "the table, "),
+    ],
+    ids=["figure", "tube", "ball", "wall"],
+)
+def test_a_ball_is_neither_added_nor_put_into_what_is_on_the_table(at: str, what: str) -> None:
+    run = Run(ticks=20).ask_at(4, "add", name="ball", at=at).ask_at(4, "add", name="ball", at="0.15,0")
+    added, beside, put = run.ask_at(10, "set", name="ball-2", field="at", value=at).go().answers
+    assert beside.accepted and not (added.accepted or put.accepted)
+    for answer in (added, put):
+        assert answer.text.startswith(f"at of ball-2: a place that is occupied: ball-2 would be in {what}")
+
+
 def present(frame: Frame) -> list[str]:
     """The names of the balls that are in the world in a frame."""
     return [entity.name for entity in frame.layout.present(frame.numbers) if entity.model == "ball"]

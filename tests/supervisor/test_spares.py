@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from foosim.deployment.loader import load_deployment
+from foosim.deployment.text.yaml import write_yaml
 from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
 from foosim.protocol import channels
@@ -98,7 +99,11 @@ REFUSED: Final[tuple[tuple[str, dict[str, Any], str], ...]] = (
     ("add", {"name": "w-4", "at": "0,-3"}, "at of w-4: a place that is occupied: w-4 would be in w-1"),
     ("add", {"name": "w-4", "at": "0,-3", "node": "n2"}, "at of w-4: a place that is occupied"),
     ("add", {"name": "w-1"}, "w-1 is in the world already"),
-    ("add", {"name": "wall"}, "no wall is left to add: all 1 that the deployment declares are in the world"),
+    (
+        "add",
+        {"name": "wall"},
+        "no wall is left to add: all 1 of the deployment are in the world, and objects.wall declares 0 spares",
+    ),
     ("add", {"name": "wal"}, "'wal', nearest is 'wall'"),
     ("add", {"name": "w-4", "node": "n9"}, "no node 'n9'; there are n1, n2"),
     ("remove", {"name": "w-4"}, "w-4 is absent already"),
@@ -134,10 +139,24 @@ def test_the_last_spare_is_the_last() -> None:
     assert [answer.text.rpartition(" at ")[0] or answer.text for answer in run.answers] == [
         "w-3 added",
         "w-4 added",
-        "no w is left to add: all 4 that the deployment declares are in the world",
+        "no w is left to add: all 4 of the deployment are in the world, and robots.w declares 2 spares",
         "w-1 removed",
         "w-1 added",
     ]
+
+
+def test_an_answer_counts_with_the_events_of_the_ticks_that_are_released_already() -> None:
+    """Spares come by events while others are requested: who is added by an answer comes at its tick."""
+    added: list[dict[str, Any]] = [{"at": f"{tick}0 ms", "entity": f"b-{tick - 28}", "add": True} for tick in (30, 31)]
+    gone = {"at": "310 ms", "entity": "w-2", "remove": True}
+    run = Run(1, ticks=45, world=WORLD + write_yaml({"events": [*added, gone]}))
+    run.ask_at(29, "add", name="b").ask_at(29, "remove", name="w-2").ask_at(
+        29, "set", name="w-2", field="down", value=1
+    )
+    answer, *refused = run.go().answers
+    assert answer.tick > 31, "released at once with the events"
+    assert answer.text == f"b-4 added at tick {answer.tick}" and came(run) == ["b-2", "b-3", "b-4"]
+    assert [one.text for one in refused] == ["w-2 is absent already", "w-2 is absent: add it first"]
 
 
 def test_what_leaves_is_parked_and_comes_back_as_it_was_at_first() -> None:

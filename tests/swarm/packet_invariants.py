@@ -181,7 +181,8 @@ class PacketLaws:
         if said is None or said.tick < tick:
             self._owed.setdefault((client, tick))
         elif isinstance(said, Go):
-            known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False))
+            what = said.acknowledged, said.packets, False, said.since, said.absent
+            known[number] = encode(Down(number, tick, *what))
 
     def answers(self, done: Done, raw: bytes) -> None:
         """A lockstep client has one Done per tick; a process that replaces another one sends its own."""

@@ -54,7 +54,16 @@ def test_the_oldest_that_waits_is_known_whatever_leaves_first(order: tuple[int, 
 class Later(Releases):
     """Lets everything leave `LATER_NS` after its tick was closed."""
 
-    def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
+    def add(
+        self,
+        client: str,
+        number: int,
+        tick: int,
+        flights: list[Flight],
+        now_ns: int,
+        since: int = 0,
+        absent: tuple[str, ...] = (),
+    ) -> None:
         self._waiting.append(Release(now_ns + LATER_NS, client, number, tick, flights))
 
 

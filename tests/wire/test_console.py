@@ -50,7 +50,7 @@ async def add_the_spare(browser: Browser, scene: dict[str, Any], poses: np.ndarr
     assert spare["name"] == "ball-2" and np.isnan(poses[spare["links"]]).all()
     outside = await answered(browser, 1, "add", name="ball-2", at={"x": "9 m"})
     assert not outside["accepted"] and "outside of the table" in outside["text"]
-    added = await answered(browser, 2, "add", name="ball", at={"x": "0.1 m"})
+    added = await answered(browser, 2, "add", name="ball", at={"x": "0.15 m"})
     assert added["accepted"], added
     while not np.isfinite((await moment_of(browser, 0))[1]).all():
         pass

@@ -374,7 +374,7 @@ def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -
     """Push, add, move and remove, each at the first tick that is not yet released."""
     at_rest = asked.status()["ball"]["position"]
     assert asked.ask("push", impulse=(0.02, 0.01, 0.0)).tick == tick
-    assert asked.ask("add", name="ball", at="0.1,0.1").text == f"ball-2 added at tick {tick}"
+    assert asked.ask("add", name="ball", at="0.15,0.1").text == f"ball-2 added at tick {tick}"
     moved = asked.ask("move", robot="red.goal", node="blue")
     assert moved.text == f"red.goal moved to blue at tick {tick}"
     asked.ask("step", count=30)

@@ -252,6 +252,7 @@ class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_f
     arrivals: tuple[tuple[str, str], ...] = ()
     called_tick: int = -1
     since: int = 0
+    absent: tuple[str, ...] = ()
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -24,12 +24,11 @@ def robots_it_lives_by(deployment: Deployment, player: Player) -> tuple[str, ...
 
 
 class Existence:
-    """The players of a deployment, as of the newest frame: `turn_to` writes `since` of those that take part."""
+    """The players of a deployment, as of the newest frame: `turn_to` writes `since` and `absent` of those that take
+    part."""
 
     def __init__(self, deployment: Deployment) -> None:
-        self.absent: dict[str, list[str]] = {}
-        """The robots of each player that are absent, in name order; players without such are left out."""
-        self._robots = {name: sorted(player.robots) for name, player in deployment.players.items() if player.robots}
+        self._robots = {name: sorted(player.robots) for name, player in deployment.players.items()}
         found = {name: robots_it_lives_by(deployment, player) for name, player in sorted(deployment.players.items())}
         self._lives_by = {name: frozenset(robots) for name, robots in found.items() if robots}
         self._layout: Layout | None = None
@@ -44,7 +43,7 @@ class Existence:
         self._states = b""
 
     def turn_to(self, frame: Frame, members: Mapping[str, Member]) -> list[str]:
-        """Take the newest frame; return the members that exist from it on and have not before, in name order."""
+        """Take the newest frame; return the members of which `since` or `absent` have become others, in name order."""
         if frame.layout is not self._layout:
             self._layout, self._states = frame.layout, b""
             robots = sorted({name for names in (*self._robots.values(), *self._lives_by.values()) for name in names})
@@ -58,17 +57,15 @@ class Existence:
             return []
         self._states = states
         gone = {name for name, is_absent in zip(self._named, found.tolist(), strict=True) if is_absent}
-        self.absent = {
-            player: [name for name in robots if name in gone]
-            for player, robots in self._robots.items()
-            if not gone.isdisjoint(robots)
-        }
-        begun = []
+        changed = []
         for name, lives_by in self._lives_by.items():
             member = members.get(name)
-            if member is None or member.exists is not (lives_by <= gone):
+            if member is None:
                 continue
-            member.since = frame.tick if lives_by - gone else -1
-            if member.exists:
-                begun.append(name)
-        return begun
+            before = member.since, member.absent
+            member.absent = tuple([robot for robot in self._robots[name] if robot in gone])
+            if member.exists is (lives_by <= gone):
+                member.since = frame.tick if lives_by - gone else -1
+            if before != (member.since, member.absent):
+                changed.append(name)
+        return changed

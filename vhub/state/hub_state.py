@@ -118,8 +118,9 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
-        for name in self.existence.turn_to(frame, self.members):
-            if self.members[name].active:
+        changed = self.existence.turn_to(frame, self.members)
+        for name in changed:
+            if self.members[name].active and self.members[name].since == tick:
                 self.ages.joins(name, self.members[name].subscriptions)
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
@@ -143,6 +144,10 @@ class HubState:
         for name, member in self.members.items():
             if member.is_due(tick):
                 self.ages.used(name, tick)
+            elif not member.period and member.active:
+                is_new = member.joined_tick == tick and name in self.deployment.players
+                if is_new or name in changed:  # it acts by what it hears of its existence
+                    released.setdefault(name, [])
         return released
 
     def _in_phase(self, packets: Iterable[Counted]) -> Iterable[Counted]:

@@ -42,6 +42,8 @@ class Member:
         """For a client that acts at arrival: the last tick at which it was called, -1 before the first."""
         self.since = state.since
         """The tick of the frame from which on it exists (`existence`); 0 from the start, -1 while it does not."""
+        self.absent = state.absent
+        """Those of its robots that are absent, in name order."""
 
     @classmethod
     def of(cls, joining: Joining, tick: int) -> Member:

@@ -175,7 +175,7 @@ def _number(past: Past, folded: Folded) -> None:
         member = members[name]
         if name in owing or not member.is_due(tick):
             packets = received(folded.released.get(name, []))
-            down = Down(member.downlink, tick, member.sequence, packets, False)
+            down = Down(member.downlink, tick, member.sequence, packets, False, member.since, [*member.absent])
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
 
 

@@ -10,7 +10,7 @@ are right.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Final, NamedTuple
 
@@ -100,9 +100,13 @@ def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def overlapped(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    """Return what an entity is in where the numbers of a frame put it, and how deep; empty if it is in nothing."""
+    """Return what an entity is in where the numbers of a frame put it, and how deep; empty if it is in nothing.
+
+    What a kit brings is compared as well: it comes where its kit has not placed it.
+    """
     others = [one for one in layout.entities if one is not entity]
-    pieces = _Pieces([*_scenery(spec), *_bodies(spec, layout, [*others, entity], numbers)])
+    bodies = [replace(piece, is_kits=False) for piece in _bodies(spec, layout, [*others, entity], numbers)]
+    pieces = _Pieces([*_scenery(spec), *bodies])
     overlap = pieces.first_overlap(len(others))
     return "" if overlap is None else f"{overlap.what}, {overlap.depth * 1e3:.3g} mm deep"
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar
 
 from foosim.common.keyed_random import draw_key
 from foosim.world.components.view import Mounting, Slot, SolvingView, WritableView
@@ -19,6 +19,8 @@ from foosim.world.spec import WorldSpec
 
 if TYPE_CHECKING:
     from foosim.common.finding import Finding
+
+S = TypeVar("S")
 
 Motors = tuple[tuple[float, ...], ...]
 """What actuators ask of each motor of an entity: target speed, and greatest force or acceleration (SI units).
@@ -132,6 +134,15 @@ class MotionMounting:
     name: str
     entities: tuple[Entity, ...]
     writes: frozenset[str]
+
+    def settings(self, kind: type[S]) -> dict[int, S]:
+        """Return the settings of what is moved, which are of this class, by index."""
+        found: dict[int, S] = {}
+        for entity in self.entities:
+            settings = self.spec.settings_of(entity.name)
+            assert isinstance(settings, kind), f"the motion {self.name} moves what has a {kind.__name__}"
+            found[entity.index] = settings
+        return found
 
     def slot(self, entity: Entity, field: str) -> Slot:
         """Return a slot of the motion itself on an entity, else a field of the entity."""

@@ -25,11 +25,7 @@ class Sliding:
         self._tick_s = at.spec.tick_ns / 1e9
         self._in_the_way = InTheWay(at)
         self._slots = {its.index: [at.slot(its, field) for field in (*STATE, "open")] for its in at.entities}
-        self._settings: dict[int, DoorObject] = {}
-        for entity in at.entities:
-            settings = at.spec.settings_of(entity.name)
-            assert isinstance(settings, DoorObject), "the motion door moves doors"
-            self._settings[entity.index] = settings
+        self._settings = at.settings(DoorObject)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these doors by a tick; they have no motors."""

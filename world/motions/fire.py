@@ -22,11 +22,7 @@ class Growing:
     def __init__(self, at: MotionMounting) -> None:
         self._tick_s = at.spec.tick_ns / 1e9
         self._slots = {its.index: tuple(at.slot(its, field) for field in STATE) for its in at.entities}
-        self._settings: dict[int, FireObject] = {}
-        for entity in at.entities:
-            settings = at.spec.settings_of(entity.name)
-            assert isinstance(settings, FireObject), "the motion fire moves fires"
-            self._settings[entity.index] = settings
+        self._settings = at.settings(FireObject)
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: SolvingView) -> None:
         """Advance these fires by a tick; they have no motors."""

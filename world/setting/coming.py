@@ -25,7 +25,10 @@ def absent_named(layout: Layout, numbers: Sequence[float], name: str) -> Entity:
     if absent:
         return absent[0]
     if fleet:
-        raise Refused(f"no {name} is left to add: all {len(fleet)} that the deployment declares are in the world")
+        spares, one = sum(entity.name in layout.spares for _, entity in fleet), fleet[0][1]
+        key = f"section {one.kind.kit}" if one.kind.kit else f"{'robots' if one.is_robot else 'objects'}.{name}"
+        why = f"all {len(fleet)} of the deployment are in the world, and {key} declares {spares} spares"
+        raise Refused(f"no {name} is left to add: {why}")
     if name not in layout:
         stems = {found["fleet"] for entity in layout.entities if (found := _NUMBERED.fullmatch(entity.name))}
         known = [entity.name for entity in layout.entities if entity.can_leave]

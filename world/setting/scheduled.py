@@ -23,11 +23,11 @@ class Schedule:
         self._spec = spec
         self.by_tick = events_by_tick(spec)
 
-    def edits(self, frame: Frame, before: Sequence[Edit] = ()) -> list[Edit]:
-        """Return what the events of a frame's tick do after these edits. Raises ComponentError."""
+    def edits(self, tick: int, frame: Frame, before: Sequence[Edit] = ()) -> list[Edit]:
+        """Return what the events of a tick do after these edits of a frame. Raises ComponentError."""
         found: list[Edit] = []
         layout = frame.layout
-        for one in self.by_tick.get(frame.tick, ()):
+        for one in self.by_tick.get(tick, ()):
             numbers = written(layout, frame.numbers, [*before, *found])
             entity = layout[one.name]
             if entity.is_absent(numbers) is (one.verb == "add"):

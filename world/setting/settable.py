@@ -135,8 +135,8 @@ def set_edits(
     found = [(made, its[name]) for one, made, its in _declared(spec, layout, entity) if one == label and name in its]
     if not found:
         fields = settable(spec, layout, entity)
-        there = f"settable are {', '.join(fields)}" if fields else "nothing is"
-        raise BadValue(f"not settable on {entity.name}: {there}", field, nearest_name(field, fields))
+        there = f"there are: {', '.join(fields) or 'none'}"
+        raise BadValue(f"no field of {entity.name} that can be set ({there})", field, nearest_name(field, fields))
     made, quantity = found[0]
     number = _number(quantity, value)
     if not hasattr(made, "set"):
@@ -265,13 +265,13 @@ def _completed(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity
     Without an angle the entity keeps its orientation, with one the angles that are not said are 0.
     """
     keys = read_place(value) if isinstance(value, str) else value
-    if not isinstance(keys, dict) or not keys:
+    if not isinstance(keys, dict) or not keys or not keys.keys() <= At.model_fields.keys():
         raise BadValue("no place: valid are X,Y or X,Y,Z, or some of x, y, z, roll, pitch, yaw", value)
     try:
         asked = At.model_validate(keys)
     except ValidationError as error:
         first = error.errors()[0]
-        raise BadValue(".".join(map(str, first["loc"])) + f": {first['msg']}", value) from None
+        raise BadValue(".".join(map(str, first["loc"])) + f": {first['msg']}", first["input"]) from None
     if entity.kind.motion and (problem := leaning(asked)) is not None:
         raise problem
     position, orientation = _frame_of(spec, layout, numbers, entity)
