@@ -141,7 +141,10 @@ def test_the_links_of_the_console_are_ideal_and_need_no_radio_where_no_rule_name
     """Whatever selectors match it by chance, radios and defaults there are."""
     console = "clients={desk: {console: true}, hand: {}}"
     radio = "network.radios={r: {preset: wifi_5_indoor}}", "network.robots={'*': [r]}"
-    others = "network.defaults={preset: zigbee}", "network.places={hand: [0 m, 0 m, 1 m], camera: [0 m, 0 m, 1 m], '*.*': [0 m, 0 m, 1 m]}"
+    others = (
+        "network.defaults={preset: zigbee}",
+        "network.places={hand: [0 m, 0 m, 1 m], camera: [0 m, 0 m, 1 m], '*.*': [0 m, 0 m, 1 m]}",
+    )
     lossy = "{id: all, from: '*', to: '*', loss: 50 %}"
     profiles = deployment_of(console, *radio, *others, f"network.links=[{lossy}]").profiles()
     pairs = ("desk", "camera"), ("camera", "desk"), ("hand", "camera")
@@ -151,7 +154,7 @@ def test_the_links_of_the_console_are_ideal_and_need_no_radio_where_no_rule_name
     profiles = deployment_of(console, *radio, others[1], named).profiles()
     assert [profiles.find(*pair, "x").rule for pair in pairs] == ["cable", "cable", "all"]
     assert profiles.find(*pairs[0], "x").radio == "", "it carries no radio"
-    with pytest.raises(DeploymentError, match="radio r, but is nowhere: write network.places.desk"):
+    with pytest.raises(DeploymentError, match=r"radio r, but is nowhere: write network\.places\.desk"):
         deployment_of(console, radio[0], "network.robots={desk: [r]}")
 
 
