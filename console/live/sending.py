@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any, Final, TypeVar
 
 from foosim.client.client import Client
-from foosim.common.errors import BadValue, Refused
+from foosim.common.errors import BadValue, Failed, Refused
 from foosim.console.live.desk import Desk
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import Answered, Feed
@@ -102,7 +102,10 @@ class Sending:
         if self._desk is None:
             assert self._drawing is not None, "a world is described before it is asked for anything"
             deployment = self._drawing.deployment
-            self._client = self._join(deployment.console)
+            try:
+                self._client = self._join(deployment.console)
+            except Refused as refused:
+                raise Failed(f"this console can send nobody, it is not connected: {refused}") from None
             self._desk = Desk(self._client, deployment, self._drawing.layout)
         return self._desk
 
