@@ -6,7 +6,7 @@ from itertools import permutations
 from typing import Final
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
@@ -183,6 +183,7 @@ CARRIED = st.dictionaries(
     st.sampled_from(["", *ENDS]),
     st.booleans(),
 )
+@example([(["*"], ["*"], "rate: 1 Mbit/s")], {}, {}, "a1", True)
 def test_one_pair_of_each_kind_says_what_all_pairs_say(
     rules: list[tuple[list[str], list[str], str]],
     carried: dict[str, list[str]],

@@ -79,6 +79,19 @@ async def send(browser: Browser, number: int, x: float) -> dict[str, Any]:
     return await answered(browser, number, "send", robot="porter", actuator="drive", numbers={"x": x, "y": 0.0})
 
 
+async def send_the_porter(browser: Browser, scene: dict[str, Any]) -> None:
+    """A robot goes where it is sent, over links that others would get nothing over; one that is absent does not."""
+    (porter,) = [body for body in scene["bodies"] if body["jobs"]]
+    assert (porter["name"], porter["jobs"]) == ("porter", [{"actuator": "drive", "numbers": ["x", "y"]}])
+    assert (await send(browser, 6, 3.2))["text"] == "porter/drive: x 3.2 m, y 0 m"
+    assert (await job_in(browser, "done"))["ended"]
+    assert (await answered(browser, 8, "remove", name="porter"))["accepted"]
+    while np.isfinite((await moment_of(browser, 0))[1]).all():
+        pass
+    assert (await send(browser, 9, 3.0))["text"] == "an absent robot does no jobs: add it first, 'porter'"
+    assert (await answered(browser, 10, "add", name="porter"))["accepted"]
+
+
 async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
     """What a page does while the run goes on."""
     page, _, token = addresses["operate"].partition("#operate=")
@@ -106,10 +119,7 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("watched"))["drops"] == []
         await add_the_spare(browser, scene, poses)
-        (porter,) = [body for body in scene["bodies"] if body["jobs"]]
-        assert (porter["name"], porter["jobs"]) == ("porter", [{"actuator": "drive", "numbers": ["x", "y"]}])
-        assert (await send(browser, 6, 3.2))["text"] == "porter/drive: x 3.2 m, y 0 m"
-        assert (await job_in(browser, "done"))["ended"]
+        await send_the_porter(browser, scene)
         assert (await answered(browser, 3, "step", count=0))["accepted"] is False
         paused = await answered(browser, 4, "pause")
         status = await status_with(browser, lambda status: bool(status["state"] == "paused"))
