@@ -14,7 +14,9 @@ import typer
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import read_about
 from foosim.cli.capture.options import reading
-from foosim.client.control import Control, connect
+from foosim.client.client import Client
+from foosim.client.client import connect as join
+from foosim.client.control import Control, connect, pki_of
 from foosim.client.replay_listener import hear_replay
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue, Refused
@@ -42,6 +44,8 @@ from foosim.runtime.run_folder import find_run, open_run
 
 ADDRESSES: Final = ("tcp/", "tls/")
 """How the address of a replay begins."""
+JOIN_S: Final = 3.0
+"""How long the console waits for the vHub when it connects to give jobs."""
 
 app = new_app()
 
@@ -116,7 +120,13 @@ def open_run_sources(
     def operating(give_up: Callable[[], bool]) -> Control:
         return connect(name, "operator", give_up)
 
-    live = LiveSource(name, viewing, None if view_only else operating, partial(how_ended, open_run(name)))
+    def joining(endpoint: str) -> Client:
+        info = find_run(name).info()
+        assert info is not None, "a run that was found has a run file"
+        return join(f"run:{name}", endpoint, timeout_s=JOIN_S, pki=pki_of(info))
+
+    ended = partial(how_ended, open_run(name))
+    live = LiveSource(name, viewing, None, ended) if view_only else LiveSource(name, viewing, operating, ended, joining)
     return [live] if second is None else _followed_live(live, name, second, offset_ns)
 
 

@@ -125,6 +125,11 @@ class CalledJob:
         """How it stands by the newest reading; NONE before it is known to be taken."""
         return self._job.state
 
+    @property
+    def by(self) -> str:
+        """Who commanded the robot after it, where that is known of a job that was preempted."""
+        return self._job.by
+
     def cancel(self) -> None:
         """Call it off. Raises NotJoined, RunEnded."""
         self._job.cancel()

@@ -160,12 +160,12 @@ def connect(run: str | None = None, role: Role = "operator", give_up: Callable[[
     folder = find_run(run)
     info = folder.info()
     assert info is not None, "a run that was found has a run file"
-    pki = _pki_of(info)
+    pki = pki_of(info)
     credentials = operator_credentials(pki) if role == "operator" else viewer_credentials(pki)
     return Control(info.simulation, credentials, give_up, role)
 
 
-def _pki_of(info: RunInfo) -> Path | None:
+def pki_of(info: RunInfo) -> Path | None:
     """Return the folder with certificates for a run: the one in the environment, else the run's own."""
     if not info.pki:
         return None

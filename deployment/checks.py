@@ -265,6 +265,15 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
             if about.on is not None and about.on not in deployment.robots:
                 nearest = ends.nearest(about.on, deployment.robots)
                 yield Finding((section, name, "on"), "unknown robot", nearest=nearest)
+    consoles = [name for name, client in deployment.clients.items() if client.console]
+    for name in consoles[1:]:
+        yield Finding(("clients", name, "console"), f"a second one: {consoles[0]} is the console's")
+    for name in consoles:
+        client = deployment.clients[name]
+        if client.lockstep:
+            yield Finding(("clients", name, "lockstep"), "the console is not in lockstep: the run would wait for it")
+        if client.on is not None:
+            yield Finding(("clients", name, "on"), "the console is on board of no robot")
     for index, name in enumerate(deployment.access.viewers):  # who would receive each other's answers
         if name in deployment.access.operators:
             yield Finding(("access", "viewers", index), "a viewer who is an operator, too")

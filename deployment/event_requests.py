@@ -62,7 +62,7 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
         of_schema = schema_findings(error, _UNDER)
         return [replace(finding, location=finding.location[len(_UNDER) :]) for finding in of_schema]
     found = list(event_findings(Names(deployment.endpoints()), (), event, links))
-    found += set_findings(deployment.network, event, (), deployment.endpoints(), deployment.carriers())
+    found += set_findings(deployment.profiles(), event, (), deployment.endpoints())
     found += _files(deployment, event)
     if event.until_ns is not None and event.until_ns <= at_ns:
         what = f"not after the present simulated time, {units.format_ns(at_ns)}"

@@ -23,6 +23,7 @@ from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
 from foosim.deployment.checks import DEPLOYMENT_KEYS, Names, check_references
 from foosim.deployment.components import check_components, read_components
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network_checks import check_network, check_phase
 from foosim.deployment.overrides import place_sets
@@ -216,7 +217,7 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
         findings = schema_findings(error, ("network",))
     else:
         of_itself = list(islice(check_network(network, Names(()), data.get("radios") or {}), PROBLEMS_MAX + 1))
-        findings = iter(of_itself) if of_itself else rule_findings(network, (), {})
+        findings = iter(of_itself) if of_itself else rule_findings(Profiles(network, {}, ""), ())
     places = Places(tree, tree, {})
     found = [*problems, *set_problems, *map(places.problem, islice(findings, PROBLEMS_MAX + 1))]
     if found or network is None:
@@ -298,7 +299,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = first(check_timing(deployment, ends)) or first(check_components(deployment))
     if not between and not within:
         states = () if deployment.lacks_files else _state_findings(deployment)
-        rules = rule_findings(network, ends.endpoints, deployment.carriers())
+        rules = rule_findings(deployment.profiles(), ends.endpoints)
         whole = chain(findings_of(deployment), engine_findings(deployment), rules, place_findings(deployment))
         between = next(filter(None, map(first, chain(states, [whole]))), [])
     return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]

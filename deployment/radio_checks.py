@@ -6,7 +6,7 @@ packets of a pair go by.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase, translate
+from fnmatch import translate
 from functools import cached_property
 from itertools import chain, islice, permutations
 from typing import Any, Final
@@ -17,7 +17,7 @@ from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.presets import preset_settings
 from foosim.deployment.network.radios import Radio, lora_longest
-from foosim.deployment.network.rules import Event, LinkRule, Network
+from foosim.deployment.network.rules import Event, LinkRule
 from foosim.deployment.schema import Deployment
 from foosim.world.forms import registry
 
@@ -41,8 +41,9 @@ _OF_MEDIUM: Final = {
     "gateway": "lora",
 }
 """Keys that one medium alone reads."""
-Kind = tuple[tuple[int, ...], tuple[str, ...]]
-"""What rules and radios know of an endpoint: the selectors that match it, by number, and the radios that it has."""
+Kind = tuple[tuple[int, ...], tuple[str, ...], bool]
+"""What rules and radios know of an endpoint: the selectors that match it, by number, the radios that it has, and
+whether it is the console."""
 PAIRS_MAX: Final = 200_000
 """Pairs of endpoints that are looked at for settings without an effect: in a valid deployment that is no error."""
 _LIMITING: Final = {"rate_bps": "rate", "trace": "trace", "overhead_bytes": "overhead", "payload_max": "mtu"}
@@ -105,30 +106,28 @@ def _unknown_airtime(radio: Radio) -> str | None:
 # --- settings of rules and events on radios ---------------------------------------------------------------------------
 
 
-def rule_findings(network: Network, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[Finding]:
+def rule_findings(profiles: Profiles, ends: Sequence[str]) -> Iterator[Finding]:
     """Return which settings of rules, and of events for them, the radios do not heed by which packets go.
 
     `ends` are the endpoints, none where they are not known: then only a rule's `via` is known.
     """
-    ways = _Ways(network, ends, carriers)
+    network, ways = profiles.network, _Ways(profiles, ends)
     for number, rule in enumerate(network.links):
         yield from ways.asked(rule, rule, ("network", "links", number))
     for number, event in enumerate(network.events):
         yield from ways.changed(event, ("network", "events", number))
 
 
-def set_findings(
-    network: Network, event: Event, location: Location, ends: Sequence[str], carriers: Mapping[str, str]
-) -> Iterator[Finding]:
+def set_findings(profiles: Profiles, event: Event, location: Location, ends: Sequence[str]) -> Iterator[Finding]:
     """Return which settings of an event the radios do not heed by which the packets go of the rule that it changes."""
-    return _Ways(network, ends, carriers).changed(event, location)
+    return _Ways(profiles, ends).changed(event, location)
 
 
 class _Ways:
     """By which radios the packets of rules go. Of the endpoints, one pair of each kind is looked at."""
 
-    def __init__(self, network: Network, ends: Sequence[str], carriers: Mapping[str, str]) -> None:
-        self._profiles = Profiles(network, carriers)
+    def __init__(self, profiles: Profiles, ends: Sequence[str]) -> None:
+        self._profiles = profiles
         self._ends = ends
 
     def changed(self, event: Event, location: Location) -> Iterator[Finding]:
@@ -193,12 +192,12 @@ class _Ways:
 def _kinds(profiles: Profiles, ends: Sequence[str]) -> dict[str, Kind]:
     """Return what rules and radios know of each endpoint: the selectors that match it, and its radios."""
     rules = profiles.network.links
-    globs = sorted({glob for rule in rules for glob in (*(rule.from_ or ()), *(rule.to or ()), *(rule.between or ()))})
+    globs = sorted({glob for rule in rules for glob in rule.selectors})
     matches = [re.compile(translate(glob)).match for glob in globs]
     found: dict[str, Kind] = {}
     for end in ends:
         matched = tuple(number for number, match in enumerate(matches) if match(end))
-        found[end] = matched, tuple(profiles.radios_of(end))
+        found[end] = matched, tuple(profiles.radios_of(end)), end == profiles.console
     return found
 
 
@@ -217,7 +216,7 @@ def _representatives(profiles: Profiles, kinds: Mapping[str, Kind]) -> list[str]
 def place_findings(deployment: Deployment) -> Iterator[Finding]:
     """Return the endpoints without a body or a place that use a radio: their own, that of a rule or of the defaults."""
     network, ends = deployment.network, deployment.endpoints()
-    profiles = Profiles(network, deployment.carriers())
+    profiles = deployment.profiles()
     on_air = {way for way in ("", *network.radios) if profiles.base(way).is_on_air}
     others: list[str] = []
     for end in ends if on_air else ():
@@ -226,14 +225,15 @@ def place_findings(deployment: Deployment) -> Iterator[Finding]:
         if has_body or network.place_of(end) is not None:
             continue
         where = f"is nowhere: write network.places.{end}{'' if end in deployment.robots else ' or its `on`'}"
-        glob = next((glob for glob in network.robots if fnmatchcase(end, glob)), "")
+        glob = next((glob for glob in network.robots if profiles.selects(glob, end)), "")
         own = next((radio for radio in network.robots.get(glob, ()) if radio in on_air), None)
         if own is not None:
             yield Finding(("network", "robots", glob), f"carries the radio {own}, but {where}", end, at="key")
             continue
         others = others or _representatives(profiles, _kinds(profiles, ends))
         pairs = [pair for other in others if other != end for pair in ((end, other), (other, end))]
-        met = ((rule, profiles.way(rule, *pair)) for pair in pairs for rule in profiles.rules_for(*pair))
+        rules = ((rule, pair) for pair in pairs for rule in profiles.rules_for(*pair))
+        met = ((rule, profiles.way(rule, *pair)) for rule, pair in rules if not profiles.is_ideal(rule, *pair))
         found = next(((rule, way) for rule, way in met if way in on_air), None)
         if found is not None:
             rule, way = found

@@ -18,6 +18,7 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import Name, Offset, Rate, RobotName, SpecBase, default
 from foosim.common.units import PaceField, Quantity, custom_error
 from foosim.deployment.hosts import Host, Listen, Placed
+from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
 from foosim.world.scenery import mesh_files, read_contents
@@ -88,9 +89,11 @@ class SupervisorSpec(SpecBase):
 class ClientSpec(SpecBase):
     """An endpoint that is started by hand, on board of a robot or anywhere.
 
-    One in lockstep is waited for before tick 0 and has a rate.
+    One in lockstep is waited for before tick 0 and has a rate. One with `console` is the console's: its operators send
+    robots with it, over links that are ideal where no link rule names it.
     """
 
+    console: bool = False
     on: RobotName | None = None
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
@@ -207,11 +210,20 @@ class Deployment(WorldSpec):
         players = [name for name, player in self.players.items() if robot in player.robots]
         return tuple(sorted([*players, *self.clients]))
 
+    @property
+    def console(self) -> str:
+        """The endpoint of the console; empty where none is declared."""
+        return next((name for name, client in self.clients.items() if client.console), "")
+
     def carriers(self) -> dict[str, str]:
         """The robot on whose board each player and client is that is on one."""
         on_board = [(name, player.on) for name, player in self.players.items()]
         on_board += [(name, client.on) for name, client in self.clients.items()]
         return {name: robot for name, robot in on_board if robot is not None}
+
+    def profiles(self, network: Network | None = None) -> Profiles:
+        """The settings of all links, of this network or of another one in its place."""
+        return Profiles(self.network if network is None else network, self.carriers(), self.console)
 
     def launch_of(self, role: str) -> Literal["local", "manual", "systemd"]:
         """Who starts the process of a role."""

@@ -21,7 +21,6 @@ from foosim.analysis.age_tallies import AgeAtUse, AgeTallies
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData
 from foosim.capture.rows import ClientRow, PacketRow, edit_of
-from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.replay.what_if_reader import Frames, Offers, frames_for, parts_lacking, world_of
@@ -161,7 +160,7 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     """
     compared = _Compared(capture)
     deployment = deployment or capture.deployment
-    frames = frames_for(capture, on_radio=Profiles(deployment.network, deployment.carriers()).on_radio)
+    frames = frames_for(capture, on_radio=deployment.profiles().on_radio)
     before, after = AgeTallies(deployment.tick_ns), AgeTallies(deployment.tick_ns)
     offers = Offers(capture, frames, compared.keep, before.take_row)
     for flight in _judged(capture, deployment, offers, frames, after):

@@ -133,7 +133,8 @@ def fleet_text() -> Callable[..., str]:
 
     def text(rovers: int, *sets: str) -> str:
         data = deepcopy(whole)
-        gone = {f"{kind}{number:02d}" for kind in ("rover", "pilot") for number in range(rovers + 1, 22)}
+        del data["clients"]
+        gone = {f"{kind}{number:02d}" for kind in ("rover", "pilot") for number in range(rovers + 1, 22)} | {"porter"}
         for section in ("robots", "players"):
             data[section] = {name: about for name, about in data[section].items() if name not in gone}
         if rovers == 1:

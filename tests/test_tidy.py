@@ -64,6 +64,7 @@ SHELLS = {
     "console/clock/deck.py",
     "console/recorded/capture_source.py",
     "console/live/live_source.py",
+    "console/live/sending.py",
     "console/live/presence.py",
     "console/recorded/replay_source.py",
     "console/recorded/poses_source.py",

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, replace
 from typing import Any, Final
 
-from foosim.common.errors import Malformed
+from foosim.common.errors import BadValue, Malformed
 from foosim.console.live.history import History
 from foosim.console.live.watched import Watched
 from foosim.console.shown.drawing import Drawing
@@ -107,6 +107,14 @@ class Following:
     def content(self) -> dict[str, Any]:
         """Return the scene of the world as pages read it."""
         return self._described.drawing.content()
+
+    def check_present(self, robot: object) -> None:
+        """Raise BadValue for a robot that is absent in the newest frame."""
+        newest = None if self._world is None else self._world.newest
+        if newest is not None and any(
+            one.name == robot and one.is_absent(newest.numbers) for one in newest.layout.robots
+        ):
+            raise BadValue("an absent robot does no jobs: add it first", robot)
 
     @property
     def _described(self) -> World:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final, TypeVar
 
@@ -21,6 +22,8 @@ from foosim.client.control import Control, NoAnswer, RequestRefused
 from foosim.common.errors import BadValue, Refused
 from foosim.console.live.following import Following, World, first_frame
 from foosim.console.live.presence import HERE, away
+from foosim.console.live.sending import VERBS as JOB_VERBS
+from foosim.console.live.sending import Join, Sending
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.runtime.transport.inbox import Inbox, Item
@@ -60,12 +63,18 @@ class LiveSource:
     """One run."""
 
     def __init__(
-        self, name: str, view: Connect, operate: Connect | None, how_ended: HowEnded = lambda stopped_by: None
+        self,
+        name: str,
+        view: Connect,
+        operate: Connect | None,
+        how_ended: HowEnded = lambda stopped_by: None,
+        join: Join | None = None,
     ) -> None:
-        """`name` is the run's; `operate` None permits no requests."""
+        """`name` is the run's; `operate` None permits no requests, `join` None gives no jobs."""
         self._name, self._connect_view, self._connect_operator = name, view, operate
         self._how_ended = how_ended
         self._has_ended = False
+        self._sending = None if join is None else Sending(join)
         self._verbs = () if operate is None else VERBS
         self.about = About("live", name, "", 1_000_000, self._verbs)
         self._following = Following(self.about)
@@ -82,6 +91,8 @@ class LiveSource:
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
         self._following.listen(wanted)
+        if self._sending is not None:
+            self._sending.want(wanted.readers)
         self._changed.set()
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
@@ -89,6 +100,10 @@ class LiveSource:
         wrong = [key for key in arguments if not key.isidentifier() or key in OUR_ARGUMENTS]
         if wrong:
             raise BadValue("no argument of a request", wrong[0])
+        if verb in JOB_VERBS:
+            assert self._sending is not None, "a source without these verbs is not asked for them"
+            self._following.check_present(arguments.get("robot"))
+            return await self._sending.ask(verb, arguments)
         loop = asyncio.get_running_loop()
         answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
         self._following.asked(sender, answered.tick, verb, who)
@@ -120,6 +135,7 @@ class LiveSource:
 
     async def run(self, feed: Feed) -> None:
         trouble = ""  # the last reported reason of a missing run
+        sending = None if self._sending is None else asyncio.create_task(self._sending.run(feed))
         try:
             while True:
                 try:
@@ -148,6 +164,8 @@ class LiveSource:
                     await self._in_thread(control.close)
         finally:
             self._closing.set()
+            if sending is not None:
+                sending.cancel()
             await self._say_ended(feed)  # `up` ends its console when the run has ended
             self._forget_idle()
             self._viewing.shutdown(wait=False)
@@ -198,7 +216,8 @@ class LiveSource:
 
         what, world, first = await self._in_thread(ask)
         if self._following.turn_to(what, world):
-            self.about = self._following.about
+            jobs = () if self._sending is None else self._sending.turn_to(world.drawing)
+            self.about = replace(self._following.about, verbs=(*self._verbs, *jobs))
             feed.describe(self.about, self._following.content())
         moment = self._following.first_moment(first)
         if moment is not None:

@@ -22,7 +22,6 @@ from foosim.console.report.map import Map, MapMaker
 from foosim.console.report.tallies import BinTally, LinkTally, RuleTally, SenderTally
 from foosim.console.shown.asked import edit_text, moves
 from foosim.console.shown.timeline import WorldEvents
-from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import event_of
 from foosim.deployment.network.settings_text import event_words, impairments_text, radio_text, rule_ends, sends_once
@@ -298,7 +297,7 @@ class _Gathered:
         return self._channels[name]
 
     def _profile(self, row: PacketRow) -> Radio:
-        profiles = Profiles(self._deployment.network, self._deployment.carriers())
+        profiles = self._deployment.profiles()
         return profiles.find(row.source, row.destination, row.channel).settings
 
     def take_tick(self, row: TickMark) -> None:
@@ -366,7 +365,7 @@ class _Gathered:
 
     def _radios(self) -> Iterator[RadioText]:
         network = self._deployment.network
-        profiles = Profiles(network, self._deployment.carriers())
+        profiles = self._deployment.profiles(network)
         ends = self._deployment.endpoints()
         carried = Counter(radio for endpoint in ends for radio in profiles.radios_of(endpoint))
         for name, radio in network.radios.items():

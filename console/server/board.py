@@ -21,7 +21,7 @@ MARKS_MAX: Final = 4096
 """Of one source: the last so many."""
 WATCHED_MAX: Final = 64
 """Links, and readings, that all browsers together have looked at."""
-KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence"})
+KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence", "jobs"})
 """Messages of which the last one is kept for those that join, and of which only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
 

@@ -16,7 +16,6 @@ from math import dist
 from typing import Any, Final
 
 from foosim.analysis.explain import Explained
-from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.placement import World
 from foosim.vhub.links.fabric import name_of
@@ -117,7 +116,7 @@ class Links:
         """`entities`: the last link of each body in the scene (`Drawing.entities`)."""
         self._deployment = deployment
         self._world = World(deployment, deployment.network)
-        self._profiles = Profiles(deployment.network, deployment.carriers())
+        self._profiles = deployment.profiles()
         self._windows = Windows()
         self._on_air: dict[Key, bool] = {}
         self._ends = {end: entities.get(self._world.body(end)) for end in deployment.endpoints()}

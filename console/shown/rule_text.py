@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from foosim.common.errors import Refused
-from foosim.deployment.network.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles, over
+from foosim.deployment.network.link_settings import IDEAL, NO_RADIO, ON_BOARD, Profile, over
 from foosim.deployment.network.rules import LinkRule, event_of
 from foosim.deployment.network.settings_text import impairments_text, radio_text, rule_ends
 from foosim.deployment.schema import Deployment
@@ -27,7 +27,7 @@ class RuleTexts:
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._endpoints = deployment.endpoints()
-        self._profiles = Profiles(deployment.network, deployment.carriers())
+        self._profiles = deployment.profiles()
         self._asked: tuple[tuple[int, str], ...] = ()
         self._timeline = self._timeline_of(())
         self._texts: dict[tuple[object, ...], str] = {}
@@ -115,13 +115,15 @@ def _lines(
         yield f"rule {rule.id}, {rule_ends(rule)}: {impairments_text(rule) or 'no settings of its own'}"
     elif profile.rule == ON_BOARD:
         yield "no rule: a link between a robot and what is on it is perfect"
+    elif profile.rule == IDEAL:
+        yield "no rule names the console: its links are perfect"
     else:
         yield "no rule"
     if profile.radio:
         radio = network.radios[profile.radio]
         written = radio_text(radio)
         yield f"radio {profile.radio}: preset {radio.preset}{', ' if written else ''}{written}"
-    elif profile.rule != ON_BOARD:
+    elif profile.rule not in {ON_BOARD, IDEAL}:
         yield f"defaults: preset {network.defaults.preset}"
     settings = profile.settings
     for change, text in zip(in_force, said, strict=True):

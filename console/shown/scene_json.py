@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from foosim.console.shown.sendable import jobs_content
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
@@ -51,6 +52,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "removable": layout[name].can_leave,
                 "pushable": layout[name].is_free,
                 "settable": settable(deployment, layout, layout[name]),
+                "jobs": jobs_content(deployment, name),
             }
         )
     scenery = _shapes(scene.scenery, meshes)

@@ -4,7 +4,7 @@ the defaults.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -17,6 +17,8 @@ from foosim.deployment.network.rules import LinkRule, Network
 PERFECT: Final = "perfect"
 ON_BOARD: Final = "on_board"
 """The rule of a link between a robot and what is on it, where no rule matches: a perfect one."""
+IDEAL: Final = "ideal"
+"""The rule of a link to or from the console, where no rule names it: a perfect one, whatever selectors match it."""
 NO_RADIO: Final = "no_radio"
 """The rule of a link between two that have radios: none of them the same, or not the one that their rule goes via."""
 
@@ -39,10 +41,12 @@ def preset_radio(name: str) -> Radio:
 
 
 class Profiles:
-    """The profiles of one network's links. `carriers` are the robots that endpoints are on board of."""
+    """The profiles of one network's links. `carriers` are the robots that endpoints are on board of, `console` is the
+    endpoint of the console, empty for none."""
 
-    def __init__(self, network: Network, carriers: Mapping[str, str]) -> None:
+    def __init__(self, network: Network, carriers: Mapping[str, str], console: str) -> None:
         self.network = network
+        self.console = console
         self._carriers = carriers
         self._by_channel = any(rule.channels is not None for rule in network.links)
         modelled = any(of.model is not None for of in (*network.radios.values(), *network.links))
@@ -59,16 +63,31 @@ class Profiles:
 
     def rule_for(self, source: str, destination: str, channel: str | None = None) -> LinkRule | None:
         """Return the first rule that matches the directed pair, or None."""
-        return next((rule for rule in self.network.links if rule.matches(source, destination, channel)), None)
+        rules = self._rules(source, destination)
+        return next((rule for rule in rules if rule.matches(source, destination, channel)), None)
 
     def rules_for(self, source: str, destination: str) -> Iterator[LinkRule | None]:
         """Yield each rule that packets on some channel meet between the directed pair; None where they meet none."""
-        for rule in self.network.links:
+        for rule in self._rules(source, destination):
             if rule.matches(source, destination):
                 yield rule
                 if rule.channels is None:
                     return
         yield None
+
+    def _rules(self, source: str, destination: str) -> Sequence[LinkRule]:
+        """Return the rules that may be those of a pair: of the console's links those that name it."""
+        if self.console not in (source, destination):
+            return self.network.links
+        return [rule for rule in self.network.links if self.console in rule.selectors]
+
+    def is_ideal(self, rule: LinkRule | None, source: str, destination: str) -> bool:
+        """Whether a pair that meets a rule, or none, has an ideal link: one of the console, which no rule names."""
+        return rule is None and self.console in (source, destination)
+
+    def selects(self, glob: str, endpoint: str) -> bool:
+        """Whether a selector of the network means an endpoint; the console is meant by its name alone."""
+        return glob == endpoint if endpoint == self.console else fnmatchcase(endpoint, glob)
 
     def find(self, source: str, destination: str, channel: str) -> Profile:
         """Return the profile of packets from source to destination on a channel."""
@@ -77,6 +96,8 @@ class Profiles:
     def of_rule(self, rule: LinkRule | None, source: str, destination: str) -> Profile:
         """Return the profile of a pair of which it is known which rule matches."""
         network = self.network
+        if self.is_ideal(rule, source, destination):
+            return Profile(IDEAL, "", preset_radio(PERFECT))
         way = self.way(rule, source, destination)
         if way is None:
             return Profile(NO_RADIO, "", preset_radio(PERFECT))
@@ -109,7 +130,7 @@ class Profiles:
         """Return the radios that an endpoint has: its own, or those of the robot that it is on."""
         for name in (endpoint, self._carriers.get(endpoint, "")):
             for glob, radios in self.network.robots.items() if name else ():
-                if fnmatchcase(name, glob):
+                if self.selects(glob, name):
                     return radios
         return []
 

@@ -61,6 +61,11 @@ class LinkRule(LinkSettings):
     channels: Selectors | None = None
     via: Name | None = None
 
+    @property
+    def selectors(self) -> tuple[str, ...]:
+        """Those of both ends."""
+        return (*(self.from_ or ()), *(self.to or ()), *(self.between or ()))
+
     def matches(self, source: str, destination: str, channel: str | None = None) -> bool:
         """True if a packet from source to destination (on channel) is this rule's; None is any channel."""
         if self.channels is not None and channel is not None and not selects(self.channels, channel):

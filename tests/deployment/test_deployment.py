@@ -45,7 +45,7 @@ def table() -> Deployment:
 
 def links_of(deployment: Deployment) -> Profiles:
     """What the links of a deployment are made from."""
-    return Profiles(deployment.network, deployment.carriers())
+    return deployment.profiles()
 
 
 def data_of(text: str) -> Any:

@@ -6,7 +6,7 @@ from itertools import permutations
 from typing import Final
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
@@ -137,6 +137,27 @@ def test_who_never_meets_a_radio_needs_no_place() -> None:
     deployment_of("network.radios={r: {preset: wifi_5_indoor}}", f"network.links=[{before}, {behind}]")
 
 
+def test_the_links_of_the_console_are_ideal_and_need_no_radio_where_no_rule_names_it() -> None:
+    """Whatever selectors match it by chance, radios and defaults there are."""
+    console = "clients={desk: {console: true}, hand: {}}"
+    radio = "network.radios={r: {preset: wifi_5_indoor}}", "network.robots={'*': [r]}"
+    others = (
+        "network.defaults={preset: zigbee}",
+        "network.places={hand: [0 m, 0 m, 1 m], camera: [0 m, 0 m, 1 m], '*.*': [0 m, 0 m, 1 m]}",
+    )
+    lossy = "{id: all, from: '*', to: '*', loss: 50 %}"
+    profiles = deployment_of(console, *radio, *others, f"network.links=[{lossy}]").profiles()
+    pairs = ("desk", "camera"), ("camera", "desk"), ("hand", "camera")
+    assert [profiles.find(*pair, "x").rule for pair in pairs] == ["ideal", "ideal", "all"]
+    assert [*profiles.rules_for(*pairs[0])] == [None]
+    named = f"network.links=[{lossy}, {{id: cable, between: [desk, '*'], delay: 5 ms}}]"
+    profiles = deployment_of(console, *radio, others[1], named).profiles()
+    assert [profiles.find(*pair, "x").rule for pair in pairs] == ["cable", "cable", "all"]
+    assert profiles.find(*pairs[0], "x").radio == "", "it carries no radio"
+    with pytest.raises(DeploymentError, match=r"radio r, but is nowhere: write network\.places\.desk"):
+        deployment_of(console, radio[0], "network.robots={desk: [r]}")
+
+
 def test_a_partition_has_two_groups() -> None:
     what = "network.events[0].partition: fewer than two groups, as in [[a, b], [rest]], a list of 1"
     assert what in refusal("network.events=[{at: 1 s, partition: [[camera]]}]")
@@ -155,9 +176,20 @@ CARRIED = st.dictionaries(
 )
 
 
-@given(RULES, CARRIED, st.dictionaries(st.sampled_from(ENDS), st.sampled_from(["a1", "b2", "r"])), st.booleans())
+@given(
+    RULES,
+    CARRIED,
+    st.dictionaries(st.sampled_from(ENDS), st.sampled_from(["a1", "b2", "r"])),
+    st.sampled_from(["", *ENDS]),
+    st.booleans(),
+)
+@example([(["*"], ["*"], "rate: 1 Mbit/s")], {}, {}, "a1", True)
 def test_one_pair_of_each_kind_says_what_all_pairs_say(
-    rules: list[tuple[list[str], list[str], str]], carried: dict[str, list[str]], on: dict[str, str], is_radio: bool
+    rules: list[tuple[list[str], list[str], str]],
+    carried: dict[str, list[str]],
+    on: dict[str, str],
+    console: str,
+    is_radio: bool,
 ) -> None:
     links = [f"{{id: l{n}, from: {source}, to: {target}, {keys}}}" for n, (source, target, keys) in enumerate(rules)]
     radios = "w: {preset: wifi_5_indoor}, l: {preset: lora_eu868, spreading_factor: 9}, x: {preset: wired_1g}"
@@ -166,7 +198,7 @@ def test_one_pair_of_each_kind_says_what_all_pairs_say(
     tree, problems = read_tree(text, locate_in("t"))
     assert tree is not None and not problems
     network = Network.model_validate(plain(tree)["network"])
-    profiles = Profiles(network, on)
+    profiles = Profiles(network, on, console)
     on_air = any(profiles.base(way).is_on_air for way in ("", *network.radios))
     refused: dict[tuple[int | str, int | str], set[str]] = {}
     for number, rule in enumerate(network.links):
@@ -179,7 +211,7 @@ def test_one_pair_of_each_kind_says_what_all_pairs_say(
                     is_heeded = (rule.payload_max or 0) <= (lora_longest(radio.spreading_factor) or 0)
                 if f"{key}:" in links[number] and not is_heeded:
                     refused.setdefault((number, key), set()).add(way or network.defaults.preset)
-    found = {(finding.location[2], finding.location[3]): finding for finding in rule_findings(network, ENDS, on)}
+    found = {(finding.location[2], finding.location[3]): finding for finding in rule_findings(profiles, ENDS)}
     assert found.keys() == refused.keys()
     for place, finding in found.items():
         assert finding.what.partition(",")[0].removeprefix("via ") in refused[place]

@@ -239,7 +239,7 @@ def test_the_warehouse_is_what_it_would_be_written_out() -> None:
     data = plain(tree)
     templates = data.pop("templates")
     rovers = [f"rover{number:02}" for number in range(1, 22)]
-    assert [name for name in data["robots"] if name != "base"] == rovers
+    assert [name for name in data["robots"] if name not in {"base", "porter"}] == rovers
     for section in ("robots", "scenery"):
         for name, entry in data[section].items():
             data[section][name] = {**templates.get(entry.pop("like", ""), {}), **entry}
@@ -248,7 +248,7 @@ def test_the_warehouse_is_what_it_would_be_written_out() -> None:
         pillar.pop(key)
     data["scenery"] |= {f"pillar-{n + 1}": {**pillar, "x": f"{x} m"} for n, x in enumerate((-15, -10, -5, 0))}
     data["nodes"]["west"]["robots"] = ["base", *rovers[:10]]
-    data["nodes"]["east"]["robots"] = rovers[10:]
+    data["nodes"]["east"]["robots"] = [*rovers[10:], "porter"]
     data["players"] = {"dispatch": data["players"]["dispatch"]}
     for number, rover in enumerate(rovers, 1):
         pilot = json.loads(json.dumps(templates["pilot"]).replace("$robot", rover))

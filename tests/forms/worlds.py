@@ -99,7 +99,11 @@ def _hall() -> dict[str, Any]:
     }
     robots["station"] = {"model": "station", "x": "1 m", "y": "2 m", "sensors": {}}
     return {
-        **{key: value for key, value in data.items() if key not in ("templates", "scenery", "network", "players")},
+        **{
+            key: value
+            for key, value in data.items()
+            if key not in ("templates", "scenery", "network", "players", "clients")
+        },
         "hall": data["hall"] | {"length": "8 m", "width": "6 m"},
         "robots": robots,
         "scenery": {"shelf": shelf},

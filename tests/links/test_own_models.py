@@ -18,7 +18,6 @@ from foosim.cli.net import linted
 from foosim.common.errors import DeploymentError
 from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.settings_text import impairments_text, radio_text
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.run import rehearse
@@ -194,7 +193,7 @@ def test_fates_do_not_know_nodes_or_a_vhub_that_was_killed(tmp_path: Path) -> No
     assert rows_of_run(2, kill=True)[0] == rows
     capture = open_capture(tmp_path / "run.mcap")
     assert capture.about.versions["link model fog"] == "foggy 1.2"
-    profiles = Profiles(capture.deployment.network, capture.deployment.carriers())
+    profiles = capture.deployment.profiles()
     assert profiles.on_radio, "fates depend on where endpoints are"
     found = what_if(capture)
     assert (found.packets, found.changed, found.inputs_changed) == (len(rows), 0, 0)

@@ -19,7 +19,7 @@ from tests.replay.conftest import SPARE, TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.conftest import in_process
 from tests.wire.served import served
-from tests.wire.test_console import addresses_of
+from tests.wire.test_console import PORTER, addresses_of
 from tests.wire.test_run import NODES, last_json
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ CARRIED = """[
 ]"""
 WIDER = "(one) => one.scrollWidth > one.clientWidth"
 CAUSES = "table.links td:last-child", "#panel-network .bar > span"
+JOB = "(document.querySelector('.jobs li')?.textContent ?? '')"
 NOWHERE = 2.0, 2.0
 TRIES = 50
 """What comes meanwhile may move a thing from below the pointer; that often in a row it does not."""
@@ -194,6 +195,21 @@ def add_and_move(page: Page) -> None:
     page.until("document.querySelector('[data-node=blue] .robots').textContent.includes('red.goal')")
 
 
+def send_a_robot(page: Page) -> None:
+    """A robot is sent where one clicks, and called off."""
+    page.click("#tab-world")
+    page.click(".entities button", "porter")
+    page.click("#send")
+    page.until("document.querySelector('#view').classList.contains('aiming')")
+    page.drag(page.place("#view canvas"))
+    page.until(f"{JOB}.includes(': running')")
+    assert not page.get("document.querySelector('#view').classList.contains('aiming')")
+    assert page.get("document.querySelector('.entities [aria-pressed=true]').textContent").startswith("porter")
+    page.click(".jobs .cancel")
+    page.until(f"{JOB}.includes(': cancelled')")
+    page.until("!document.querySelector('.jobs .cancel').offsetParent")
+
+
 def cut_and_heal(page: Page) -> None:
     """A link is chosen, plotted, cut off, its drops explained, and healed."""
     page.click("#tab-network")
@@ -267,7 +283,9 @@ def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House
     page, player = browser, {**PLAYER, "process": "main"}
     players = f"players={json.dumps({LINK[1]: player})}"
     alone = *in_process("null", "supervisor"), *in_process("main", *NODES)  # it is killed without the vHub
-    up = house.up("--console", "--json", "--engine", "pure", "--set", players, "--set", SPARE, *alone, players=True)
+    up = house.up(
+        "--console", "--json", "--engine", "pure", "--set", players, "--set", SPARE, *PORTER, *alone, players=True
+    )
     addresses = addresses_of(house)
     with looking(page, addresses["view"]):
         look_only(page)
@@ -276,6 +294,7 @@ def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House
         page.until(f"{STAT}.role === 'operator'")
         tabs_are_filled(page)
         add_and_move(page)
+        send_a_robot(page)
         cut_and_heal(page)
         lose_the_supervisor(page, house, pause_and_step(page))
         banner = end_the_run(page)

@@ -23,6 +23,16 @@ if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 
+PORTER = (
+    "--set", "robots.porter={model: holonomic, at: {x: 3 m}, actuators: {drive: {kind: go_to}}, "
+    "sensors: {jobs: {kind: job, actuator: drive, rate: 5 Hz}}}",
+    "--set", "nodes.blue.robots=[rest]", "--set", "clients={desk: {console: true}}",
+)  # fmt: skip
+"""A robot beside the table that the console can send."""
+DEAF = "--set", "network.links=[{id: all, from: '*', to: '*', loss: 100 %}]"
+"""Links over which nothing comes, but to and from the console."""
+
+
 async def answered(browser: Browser, number: int, verb: str, **arguments: Any) -> dict[str, Any]:
     await browser.say(type="ask", id=number, verb=verb, arguments=arguments)
     return await browser.hear("answer")
@@ -46,7 +56,7 @@ async def moment_of(browser: Browser, source: int) -> tuple[tuple[int, ...], np.
 
 async def add_the_spare(browser: Browser, scene: dict[str, Any], poses: np.ndarray[Any, Any]) -> None:
     """A ball that is absent in a moment is added; a place that it cannot have is refused."""
-    (spare,) = [body for body in scene["bodies"] if body["removable"]]
+    (spare,) = [body for body in scene["bodies"] if body["removable"] and not body["robot"]]
     assert spare["name"] == "ball-2" and np.isnan(poses[spare["links"]]).all()
     outside = await answered(browser, 1, "add", name="ball-2", at={"x": "9 m"})
     assert not outside["accepted"] and "outside of the table" in outside["text"]
@@ -54,6 +64,32 @@ async def add_the_spare(browser: Browser, scene: dict[str, Any], poses: np.ndarr
     assert added["accepted"], added
     while not np.isfinite((await moment_of(browser, 0))[1]).all():
         pass
+
+
+async def job_in(browser: Browser, state: str) -> dict[str, Any]:
+    """The job that is told of when it is in a state."""
+    while True:
+        jobs: list[dict[str, Any]] = (await browser.hear("jobs"))["jobs"]
+        for job in jobs:
+            if job["state"] == state:
+                return job
+
+
+async def send(browser: Browser, number: int, x: float) -> dict[str, Any]:
+    return await answered(browser, number, "send", robot="porter", actuator="drive", numbers={"x": x, "y": 0.0})
+
+
+async def send_the_porter(browser: Browser, scene: dict[str, Any]) -> None:
+    """A robot goes where it is sent, over links that others would get nothing over; one that is absent does not."""
+    (porter,) = [body for body in scene["bodies"] if body["jobs"]]
+    assert (porter["name"], porter["jobs"]) == ("porter", [{"actuator": "drive", "numbers": ["x", "y"]}])
+    assert (await send(browser, 6, 3.2))["text"] == "porter/drive: x 3.2 m, y 0 m"
+    assert (await job_in(browser, "done"))["ended"]
+    assert (await answered(browser, 8, "remove", name="porter"))["accepted"]
+    while np.isfinite((await moment_of(browser, 0))[1]).all():
+        pass
+    assert (await send(browser, 9, 3.0))["text"] == "an absent robot does no jobs: add it first, 'porter'"
+    assert (await answered(browser, 10, "add", name="porter"))["accepted"]
 
 
 async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
@@ -83,6 +119,7 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("watched"))["drops"] == []
         await add_the_spare(browser, scene, poses)
+        await send_the_porter(browser, scene)
         assert (await answered(browser, 3, "step", count=0))["accepted"] is False
         paused = await answered(browser, 4, "pause")
         status = await status_with(browser, lambda status: bool(status["state"] == "paused"))
@@ -95,6 +132,8 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
             pass
         links = await browser.hear("links")
         assert links["at"] >= paused["tick"]
+        assert (await send(browser, 7, 99.0))["accepted"]
+        await job_in(browser, "running")
     await look_later(page, token, paused["tick"])
 
 
@@ -104,6 +143,7 @@ async def look_later(page: str, token: str, tick: int) -> None:
         later = Browser(connection)
         await later.say(type="hello", token=token)
         await later.hear("scene")
+        assert [job["state"] for job in (await later.hear("jobs"))["jobs"]] == ["running"]
         curves: dict[str, dict[str, Any]] = {"t": {"status": "ticks"}, "n": {"field": 0}}
         curves["x"] = {"reading": ["camera", "ball"]}
         await later.say(type="plot", series=[{"id": name, **curve} for name, curve in curves.items()])
@@ -129,7 +169,20 @@ def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: Hous
     beside = ("--second", "walk.csv", "--offset", "2 s")
     alone = *in_process("null", "supervisor"), *in_process("main", "nodes.red", "nodes.blue")
     spare = "--set", "table.spare_balls=1"
-    up = house.up("--console", *beside, *spare, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x", *alone)
+    up = house.up(
+        "--console",
+        *beside,
+        *spare,
+        *PORTER,
+        *DEAF,
+        "--json",
+        "--engine",
+        "pure",
+        "--no-capture",
+        "--pace",
+        "0.5x",
+        *alone,
+    )
     house.ticking()
     path = house.live().path / "console.json"
     addresses = addresses_of(house)

@@ -132,11 +132,12 @@ def test_robots_of_a_kit_need_its_section() -> None:
     )
 
 
-def test_a_hall_has_no_ball_and_no_score_and_rovers_alone_leave_it() -> None:
+def test_a_hall_has_no_ball_and_no_score_and_its_station_alone_cannot_leave() -> None:
     layout = build_layout(DEPLOYMENT)
-    assert {entity.model for entity in layout.entities} == {"rover", "station"} and "world" not in layout
+    models = {"rover", "station", "differential_drive"}
+    assert {entity.model for entity in layout.entities} == models and "world" not in layout
     assert world_status(DEPLOYMENT, initial_frame(DEPLOYMENT)).keys() == {"commands", "rovers"}
-    assert {entity.model for entity in layout.entities if entity.can_leave} == {"rover"}
+    assert {entity.model for entity in layout.entities if entity.can_leave} == models - {"station"}
     numbers = initial_numbers(DEPLOYMENT, layout)
     edits: list[Edit] = [Add("b2", []), Remove("b2"), Remove("base"), Push("rover01", (0.0, 0.0, 0.0))]
     fitting: list[Edit] = [Set("rover01", "down", [1.0]), Set("base", "down", [0.0]), Remove("rover02")]

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from foosim.common.keyed_random import Slot, draw_key, draw_words
-from foosim.deployment.network.link_settings import NO_RADIO, Profile, Profiles, over
+from foosim.deployment.network.link_settings import NO_RADIO, Profile, over
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network, event_of
 from foosim.deployment.network.traces import read_opportunities
@@ -234,7 +234,7 @@ class Fabric:
         self.seed = deployment.seed if self.network.seed is None else self.network.seed
         self.timeline = Timeline(self.network, self.seed, deployment.endpoints())
         self.world = World(deployment, self.network)
-        self.profiles = Profiles(self.network, deployment.carriers())
+        self.profiles = deployment.profiles(self.network)
         self.states: dict[LinkKey, LinkState] = {}
         """The states of links that have had packets."""
         self.radios: dict[RadioKey, RadioState] = {}

@@ -102,7 +102,7 @@ def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str
 
 def warnings_of(deployment: Deployment) -> list[str]:
     """Return these warnings of a deployment, with the names of links' settings."""
-    found = long_packets(deployment, flows_of(deployment, Profiles(deployment.network, deployment.carriers())))
+    found = long_packets(deployment, flows_of(deployment, deployment.profiles()))
     return [
         f"{rule if radio in ('', rule) else f'{rule} via {radio}'}: {text}" for (rule, radio), text in found.items()
     ]

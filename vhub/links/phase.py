@@ -10,7 +10,6 @@ from math import gcd
 from typing import Final
 
 from foosim.common.units import format_ns
-from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.schema import Deployment
 
@@ -45,7 +44,7 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
     has waited for (own - a - sampled) mod g ticks at the least, and for (every - g) / 2 more in the mean: the first is
     a matter of the phase alone.
     """
-    profiles = Profiles(deployment.network, deployment.carriers())
+    profiles = deployment.profiles()
     tick_ns = deployment.tick_ns
     for name, player in deployment.players.items():
         if not player.lockstep or player.act != "period":

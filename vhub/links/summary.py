@@ -13,7 +13,7 @@ from math import exp, inf
 from typing import Final
 
 from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4
-from foosim.deployment.network.link_settings import NO_RADIO, Profiles, over, preset_radio
+from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network.traces import read_opportunities
@@ -124,7 +124,7 @@ class LinkSummary:
 def uses_of(deployment: Deployment) -> list[SharedSettings]:
     """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses; the
     example of each is a link that carries packets, if there is one."""
-    network, profiles = deployment.network, Profiles(deployment.network, deployment.carriers())
+    network, profiles = deployment.network, deployment.profiles()
     used = used_links(flows_of(deployment, profiles))
     found: dict[tuple[str, str], SharedSettings] = {}
     endpoints = deployment.endpoints()
@@ -165,7 +165,7 @@ def uses_alone(network: Network) -> list[SharedSettings]:
 def summaries(deployment: Deployment) -> list[LinkSummary]:
     """Return the summary of a deployment's network; the deployment has its files."""
     uses = uses_of(deployment)
-    flows = [*flows_of(deployment, Profiles(deployment.network, deployment.carriers()))]
+    flows = [*flows_of(deployment, deployment.profiles())]
     offered, too_long = offered_hz(flows), long_packets(deployment, flows)
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])

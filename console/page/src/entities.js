@@ -12,11 +12,13 @@ export class Entities {
    * @param {import("./store.js").Store} store
    * @param {import("./desk.js").Desk} desk
    * @param {{follow: () => void, plot: (entity: string) => void}} actions
+   * @param {HTMLElement} sending
    */
-  constructor(store, desk, actions) {
+  constructor(store, desk, actions, sending) {
     this.store = store;
     this.desk = desk;
     this.actions = actions;
+    this.sending = sending;
     this.facts = h("dl", { class: "facts" });
     this.filter = h("input", { type: "search", placeholder: "Find an entity", "aria-label": "Find an entity", oninput: () => this.draw() });
     this.list = h("ul", { class: "entities", "aria-label": "Entities" });
@@ -103,6 +105,7 @@ export class Entities {
       h("h2", {}, body.name),
       h("p", {}, `${body.model}, ${counted(body.links.length, "link")}${owner ? `, computed by ${owner}` : ""}${isAbsent ? ", absent" : ""}`),
       h("div", { class: "row" }, ...actions),
+      this.sending,
     );
   }
 

@@ -14,6 +14,7 @@ import { decodePoses } from "./messages.js";
 import { Network } from "./network.js";
 import { PlotPanel } from "./plot_panel.js";
 import { bannerOf } from "./presence.js";
+import { Sending } from "./sending.js";
 import { shortcutsOf } from "./shortcuts.js";
 import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
@@ -72,13 +73,14 @@ const desk = new Desk(connection, store, byId("toasts"));
 const control = new Control(store, desk);
 const timeline = new Timeline(store, desk, control);
 const plots = new PlotPanel(store, send, memory);
+const sending = new Sending(store, desk);
 const entities = new Entities(store, desk, {
   follow: () => bar.toggle("follow"),
   plot: (entity) => {
     layout.show("plots");
     plots.search(`${entity} `);
   },
-});
+}, sending.place);
 new Network(store, desk, plots);
 new Machines(store, desk);
 new Comparison(store);
@@ -156,7 +158,7 @@ store.on("scene", (source) => {
   stat.bodies = source.scene.bodies.length;
 });
 store.on("marks", (source) => source.info.id === 0 && (stat.marks = source.marks.length));
-layout.add(...shortcutsOf({ store, control, timeline, layout, bar, home: () => view.home(), pick: () => {
+layout.add(...shortcutsOf({ store, control, timeline, layout, bar, home: () => view.home(), send: () => sending.aim(), pick: () => {
   layout.show("plots");
   plots.search("");
 } }));

@@ -17,6 +17,10 @@ export class MapView {
     this.stat = stat;
     this.place = h("div", { class: "mapview" });
     place.append(h("p", { class: "notice" }, "This browser has no WebGL: the world is shown from above."), this.place);
+    this.place.addEventListener("click", (event) => {
+      const at = store.aim ? this._place_at(event) : null;
+      if (at) store.emit("aimed", at);
+    });
     this.next_ms = 0;
     window.requestAnimationFrame((now_ms) => this._frame(now_ms));
   }
@@ -30,6 +34,18 @@ export class MapView {
     const { clientWidth: width, clientHeight: height } = this.place;
     drawMap(this.place, mapOf(source.scene, source.poses.links), { width, height, selected: this.store.selected });
     this.stat.frames += 1;
+  }
+
+  /**
+   * The place (m) that is clicked; null without a drawing.
+   * @param {MouseEvent} event
+   * @returns {[number, number] | null}
+   */
+  _place_at(event) {
+    const onto = this.place.querySelector("svg")?.getScreenCTM()?.inverse();
+    if (!onto) return null;
+    const { clientX: x, clientY: y } = event;
+    return [onto.a * x + onto.c * y + onto.e, -(onto.b * x + onto.d * y + onto.f)];
   }
 
   touch() {

@@ -10,10 +10,11 @@ const TABS = ["world", "network", "machines", "plots", "log"];
  * @param {import("./layout.js").Layout} parts.layout
  * @param {import("./view_bar.js").ViewBar} parts.bar
  * @param {() => void} parts.home
+ * @param {() => void} parts.send
  * @param {() => void} parts.pick
  * @returns {import("./layout.js").Shortcut[]}
  */
-export function shortcutsOf({ store, control, timeline, layout, bar, home, pick }) {
+export function shortcutsOf({ store, control, timeline, layout, bar, home, send, pick }) {
   /** @type {(keys: string, text: string, act: (event: KeyboardEvent) => void, names?: string[]) => import("./layout.js").Shortcut} */
   const on = (shown, text, act, names = [shown]) => ({ keys: names, shown, text, act });
   return [
@@ -30,11 +31,16 @@ export function shortcutsOf({ store, control, timeline, layout, bar, home, pick 
     on("r", "rays of sensors", () => bar.toggle("rays")),
     on("l", "radio links", () => bar.toggle("radio")),
     on("f", "follow the selected entity", () => bar.toggle("follow")),
+    on("g", "send the selected robot where one clicks next", send),
     on("Home", "the whole world", home),
     on("1 – 5", "World, Network, Machines, Plots, Log", (event) => layout.show(TABS[Number(event.key) - 1]), ["1", "2", "3", "4", "5"]),
     on("v", "pick a value to plot", pick),
     on("t", "light, dark, as the system", () => layout.nextTheme()),
-    on("Esc", "select nothing", () => {
+    on("Esc", "send nobody, select nothing", () => {
+      if (store.aim) {
+        store.aimWith("");
+        return;
+      }
       store.select("");
       store.selectLink(null);
     }, ["Escape"]),

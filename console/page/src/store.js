@@ -36,6 +36,8 @@ export class Source {
     this.marks = [];
     /** @type {Presence | null} */
     this.presence = null;
+    /** @type {JobsMessage | null} */
+    this.jobs = null;
   }
 
   get tick() {
@@ -78,6 +80,8 @@ export class Store {
     this.compared = null;
     /** @type {string} the body that is selected; empty for none */
     this.selected = "";
+    /** @type {string} the robot that is sent to the place that is clicked next; empty for none */
+    this.aim = "";
     /** @type {[string, string] | null} */
     this.link = null;
     /** @type {Map<string, Set<(payload: any) => void>>} */
@@ -115,6 +119,13 @@ export class Store {
     if (this.selected === body) return;
     this.selected = body;
     this.emit("selected", body);
+  }
+
+  /** @param {string} robot */
+  aimWith(robot) {
+    if (this.aim === robot) return;
+    this.aim = robot;
+    this.emit("aim");
   }
 
   /** @param {[string, string] | null} link */
@@ -204,6 +215,9 @@ export class Store {
       case "overlay":
         if (source.scene?.generation !== message.generation) return;
         source.overlay = message;
+        break;
+      case "jobs":
+        source.jobs = message;
         break;
       case "presence":
         source.presence = message;

@@ -17,7 +17,9 @@ interface Shape {
 }
 
 interface SceneLink { name: string; body: string; shapes: Shape[] }
-interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string> }
+interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string>; jobs: SceneJobs[] }
+/** An actuator of whose jobs a sensor tells, and the names of its commands' numbers. */
+interface SceneJobs { actuator: string; numbers: string[] }
 interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
 interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
 interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
@@ -101,6 +103,8 @@ interface Presence {
   capture?: string | null;
   command?: string;
 }
+/** Jobs that the console has given, and why it can give none. */
+interface JobsMessage { source: number; problem: string; jobs: { robot: string; actuator: string; number: number | null; state: string; text: string; ended: boolean }[] }
 interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
 interface Compared {
   at: number;

@@ -1,7 +1,7 @@
 // The view: worlds, camera, what is followed and picked. It draws when the browser asks for a frame, the newest state only.
 
 import {
-  Box3, Color, DirectionalLight, GridHelper, HemisphereLight, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3,
+  Box3, Color, DirectionalLight, GridHelper, HemisphereLight, PerspectiveCamera, Plane, Raycaster, Scene, Vector2, Vector3,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -110,7 +110,10 @@ export class View3D {
     this.canvas.addEventListener("pointerdown", (event) => (pressed = [event.clientX, event.clientY]));
     this.canvas.addEventListener("pointerup", (event) => {
       const moved = Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
-      if (moved <= CLICK_PX && event.button === 0) store.select(this.pick(event.clientX, event.clientY));
+      if (moved > CLICK_PX || event.button !== 0) return;
+      const at = store.aim ? this.ground(event.clientX, event.clientY) : null;
+      if (at) store.emit("aimed", at);
+      else if (!store.aim) store.select(this.pick(event.clientX, event.clientY));
     });
     this.canvas.addEventListener("keydown", (event) => this._key(event));
   }
@@ -260,15 +263,20 @@ export class View3D {
     this.touch();
   }
 
+  /**
+   * The place on the ground (m) under a place of the window, in the first source; null where there is none.
+   * @param {number} x @param {number} y px
+   * @returns {[number, number] | null}
+   */
+  ground(x, y) {
+    if (this._look_through(x, y).source !== 0) return null;
+    const at = this.raycaster.ray.intersectPlane(new Plane(new Vector3(0, 0, 1)), new Vector3());
+    return at && [at.x, at.y];
+  }
+
   /** The body under a place of the window; empty where there is none. @param {number} x @param {number} y px */
   pick(x, y) {
-    const view = this._viewport_at(x - this.canvas.getBoundingClientRect().left);
-    const box = this.canvas.getBoundingClientRect();
-    const point = new Vector2(((x - box.left - view.left) / view.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2);
-    this.camera.aspect = view.width / box.height;
-    this.camera.updateProjectionMatrix();
-    this.raycaster.setFromCamera(point, this.camera);
-    const world = this.worlds.get(view.source);
+    const world = this.worlds.get(this._look_through(x, y).source);
     const hits = this.raycaster.intersectObjects((world?.batches ?? []).map((batch) => batch.mesh), false);
     for (const hit of hits) {
       const batch = hit.object.userData.batch;
@@ -276,6 +284,17 @@ export class View3D {
       if (link >= 0) return world?.scene?.links[link].body ?? "";
     }
     return "";
+  }
+
+  /** Lay the ray through a place of the window; returns the half of the view that it is in. @param {number} x @param {number} y px */
+  _look_through(x, y) {
+    const view = this._viewport_at(x - this.canvas.getBoundingClientRect().left);
+    const box = this.canvas.getBoundingClientRect();
+    const point = new Vector2(((x - box.left - view.left) / view.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2);
+    this.camera.aspect = view.width / box.height;
+    this.camera.updateProjectionMatrix();
+    this.raycaster.setFromCamera(point, this.camera);
+    return view;
   }
 
   get _is_split() {

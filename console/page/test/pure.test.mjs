@@ -15,6 +15,7 @@ import { decodePoses } from "../src/messages.js";
 import { bannerOf, stateOf } from "../src/presence.js";
 import { moreText, oldText } from "../src/network.js";
 import { Ring } from "../src/ring.js";
+import { goingOf, numbersTo } from "../src/sending.js";
 import { batchesOf, linkMatrix } from "../src/shapes.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
@@ -282,4 +283,14 @@ test("every curve stands out from the ground of its theme", () => {
       assert.ok((high + 0.05) / (low + 0.05) > (theme === themes[0] ? 2 : 4), colour);
     }
   }
+});
+
+test("a place is what a robot is sent to: on the ground, or at a height and with the heading that it has", () => {
+  const jobs = (...numbers) => ({ jobs: [{ actuator: "arm", numbers: ["q1"] }, { actuator: "drive", numbers }] });
+  assert.equal(goingOf(jobs("x", "y")).actuator, "drive");
+  assert.equal(goingOf(jobs("x", "y", "z", "yaw")).actuator, "drive");
+  assert.deepEqual([goingOf(jobs("x", "y", "force")), goingOf(jobs("x")), goingOf({ jobs: [] }), goingOf(undefined)], Array(4).fill(undefined));
+  const pose = [5, 6, 7, 0, 0, Math.SQRT1_2, Math.SQRT1_2];
+  assert.deepEqual(numbersTo(["x", "y"], [1.23456, -2], pose, 3), { x: 1.235, y: -2 });
+  assert.deepEqual(numbersTo(["x", "y", "z", "yaw"], [1, 2], pose, 3), { x: 1, y: 2, z: 3, yaw: 1.571 });
 });

@@ -1,0 +1,99 @@
+"""What the console, as a client of the run, has robots do: jobs that operators give by the page, and how they stand.
+
+It is used by one thread (`sending.py`), and knows neither browsers nor how the client has connected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from foosim.client.client import AGAIN_S, CalledJob, Client
+from foosim.client.commands import CommandEncoder
+from foosim.common.errors import BadValue, UnknownName
+from foosim.console.shown.sendable import jobs_of
+from foosim.deployment.schema import Deployment
+from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.forms.jobs import JobState
+from foosim.world.layout import Layout
+
+WORDS: Final[Mapping[JobState, str]] = {
+    JobState.NONE: "sent, not confirmed",
+    JobState.RUNNING: "running",
+    JobState.DONE: "done",
+    JobState.FAILED: "failed",
+    JobState.PREEMPTED: "preempted",
+    JobState.CANCELLED: "cancelled",
+}
+UNSENT: Final = "not sent: the robot's job sensor has not been heard"
+
+
+class Desk:
+    """The jobs of one connection. One that begins anew finds the last job of the one before."""
+
+    def __init__(self, client: Client, deployment: Deployment, layout: Layout) -> None:
+        """Join, and hear all sensors that tell of jobs; `deployment` has the contents of its files."""
+        self._client = client
+        encoder = CommandEncoder(deployment)
+        told = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
+        self._takers = {(robot, one): encoder.actuator(robot, one) for robot, its in told.items() for one in its}
+        self._fitted: dict[tuple[str, str], FittedActuator] = {
+            (robot, one.channel): one for robot, its in told.items() if its
+            for one in actuators_of(deployment, layout, layout[robot])
+        }  # fmt: skip
+        self._called: dict[tuple[str, str], str] = {}
+        """What was asked of each actuator last, in words."""
+        client.listen((robot, channel) for robot, its in told.items() for channel in its.values())
+
+    def send(self, robot: str, actuator: str, numbers: Mapping[str, Any]) -> str:
+        """Give a job, by the numbers of a command; return what is asked in words. It preempts the one that runs.
+
+        Raises UnknownName for an actuator without jobs, BadValue for numbers that are none of a command or beyond its
+        limits, NotJoined, RunEnded and ConnectionFailed.
+        """
+        taker = self._takers[self._found(robot, actuator)]
+        names = [field.name for field in taker.fields]
+        if {*numbers} != {*names}:
+            raise taker.wrong(f"{', '.join(numbers) or 'nothing'} given")
+        _, beyond = self._fitted[robot, actuator].examine(taker.pack(numbers))
+        if beyond:
+            one = beyond[0]
+            raise taker.wrong(f"{one.name} is beyond its limit of {one.limit:g} {one.unit}", one.value)
+        self._client.robots[robot].actuators[actuator].call(*(numbers[name] for name in names))
+        what = ", ".join(f"{field.name} {numbers[field.name]:g} {field.unit}" for field in taker.fields)
+        self._called[robot, actuator] = what
+        return f"{robot}/{actuator}: {what}"
+
+    def cancel(self, robot: str, actuator: str) -> str:
+        """Call the last job off; return what that is in words. Raises as `send`, BadValue where there is none."""
+        job = self._job(self._found(robot, actuator))
+        if job is None or job.state.has_ended:
+            raise BadValue(f"{robot}/{actuator}: no job of {self._client.name} to cancel")
+        job.cancel()
+        return f"{robot}/{actuator}: job {job.number} is called off" if job.number else f"{robot}/{actuator}: not sent"
+
+    def turn(self) -> None:
+        """Receive for a moment, and send what is due. Raises RunEnded, NotJoined and ConnectionFailed."""
+        self._client.receive(AGAIN_S)
+
+    def jobs(self) -> list[dict[str, Any]]:
+        """Return how the jobs stand, as pages read it: of each actuator with a job of this client."""
+        found = ((pair, self._job(pair)) for pair in self._takers)
+        return [self._told(*pair, job) for pair, job in found if job is not None]
+
+    def _told(self, robot: str, actuator: str, job: CalledJob) -> dict[str, Any]:
+        state = job.state
+        words = WORDS[state] + (f" by {job.by}" if job.by else "") if job.number is not None or state else UNSENT
+        what = self._called.get((robot, actuator), "")
+        text = f"job{f' {job.number}' if job.number else ''}{f' to {what}' if what else ''}: {words}"
+        names = {"robot": robot, "actuator": actuator, "number": job.number, "state": state.name.lower()}
+        return {**names, "text": text, "ended": state.has_ended}
+
+    def _job(self, pair: tuple[str, str]) -> CalledJob | None:
+        return self._client.robots[pair[0]].actuators[pair[1]].job
+
+    def _found(self, robot: str, actuator: str) -> tuple[str, str]:
+        if (robot, actuator) not in self._takers:
+            valid = ["/".join(pair) for pair in self._takers]
+            raise UnknownName("no actuator of whose jobs a sensor tells", f"{robot}/{actuator}", valid)
+        return robot, actuator
