@@ -80,6 +80,7 @@ class NodeLoss:
         process = state.roster.by_name.get(name)
         if process is not None:
             state.roster.lose(process)
+            process.gone_ns = now_ns  # also when the node is started again, this process is not
             state.actions += refuse(process.role, name, process.boot, "stopped by request")
 
     def join(self, process: Process, now_ns: int) -> None:

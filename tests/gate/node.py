@@ -36,7 +36,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node does not compare input digests", "a node collects parts with its own input digest only", 9)
+@register("node does not compare input digests", "a node collects parts with its own input digest only", 4)
 def _any_digest(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 

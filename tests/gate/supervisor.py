@@ -34,7 +34,7 @@ class _AnyDigest(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 3)
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 9)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
         state = self.state

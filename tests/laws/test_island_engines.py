@@ -201,12 +201,12 @@ def check(outcome: Outcome, contacts: float, handovers: int) -> None:
     print(f"seed {SEED}: {outcome}")
     assert outcome.contacts >= contacts and outcome.handovers >= handovers and outcome.rebuilt > 0
     assert outcome.largest >= 3, "arms and boxes share islands"
-    assert outcome.arms_met >= 100, "arms hit each other"
+    assert outcome.arms_met >= 50, "arms hit each other"
     assert outcome.differing == []
 
 
 def test_islands_have_the_same_bits_whatever_engine_solves_them() -> None:
-    check(compared(2_000), contacts=50, handovers=100)
+    check(compared(1_000), contacts=50, handovers=100)
 
 
 @pytest.mark.campaign

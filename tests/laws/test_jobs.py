@@ -161,11 +161,11 @@ def steps(frames: tuple[Frame, ...], robot: str, row: int) -> list[tuple[int, Jo
     return [found[0], *(after for before, after in pairwise(found) if before != after)]
 
 
-@pytest.mark.parametrize("nodes", [2, 3])
-def test_one_digest_on_any_number_of_nodes(nodes: int) -> None:
-    """On three of them robots move from node to node, and all that the nodes keep is made anew, at drawn ticks."""
-    assert [frame.digest for frame in ran(nodes).frames] == [frame.digest for frame in ran(1).frames]
-    assert ran(nodes).said == ran(1).said
+def test_one_digest_on_three_nodes_as_on_one() -> None:
+    """Robots move from node to node, and all that the nodes keep is made anew, at drawn ticks. The test of late repeats
+    has two nodes."""
+    assert [frame.digest for frame in ran(3).frames] == [frame.digest for frame in ran(1).frames]
+    assert ran(3).said == ran(1).said
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -212,7 +212,9 @@ def test_a_late_repeat_sends_nobody_back(tmp_path: Path) -> None:
     """Packets come again after a later job has begun, and no robot is told its place a second time."""
     path = tmp_path / "run.mcap"
     Dispatcher.said = {}
-    rehearse(text(**WORST), NAME, TICKS, 2, capture=path, folder=folder())
+    digests = rehearse(text(**WORST), NAME, TICKS, 2, capture=path, folder=folder()).digests
+    assert digests == [frame.digest for frame in ran(1).frames]
+    assert Dispatcher.said == ran(1).said
     assert verify_capture(path, 3).equal
     packets = open_capture(path).packets
     late = 0

@@ -25,7 +25,7 @@ from tests.frames import Frames, broken_laws
 from tests.laws.test_yard import yard
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-TICKS: Final = 200
+TICKS: Final = 120
 NAME: Final = "mixed.yaml"
 MODIFIERS: Final[dict[str, Any]] = {
     "pose": [

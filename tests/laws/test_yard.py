@@ -17,7 +17,7 @@ from tests.forms.worlds import DEPLOY, driver, still
 from tests.frames import Frames
 
 NAME: Final = "yard.yaml"
-TICKS: Final = 200
+TICKS: Final = 120
 CORNERS: Final = [[x, y, z] for x in ("-10 cm", "10 cm") for y in ("-10 cm", "10 cm") for z in ("0 cm", "20 cm")]
 SHAPES: Final[dict[str, Any]] = {
     "box": {"model": "box", "size": ["30 cm", "20 cm", "10 cm"]},
