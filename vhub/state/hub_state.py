@@ -118,7 +118,8 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
-        changed = self.existence.turn_to(frame, self.members)
+        if changed := self.existence.turn_to(frame, self.members):
+            self._here.renew(self.members)
         for name in changed:
             if self.members[name].active and self.members[name].since == tick:
                 self.ages.joins(name, self.members[name].subscriptions)

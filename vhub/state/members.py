@@ -69,7 +69,7 @@ class Member:
         """Whether it is due at a tick. For a client that acts at arrival, the tick's packets must be there."""
         if self.arrivals:
             return self.active and tick == self.called_tick
-        return self.active and self.exists and self.period > 0 and tick % self.period == self.offset
+        return self.active and self.since >= 0 and self.period > 0 and tick % self.period == self.offset
 
     def may_be_due(self, tick: int, closed: int) -> bool:
         """Whether it may be due at a tick after those that are closed, regardless of arrivals: in each of the frames
@@ -92,7 +92,7 @@ class Member:
 
 
 class Here:
-    """Values derived from the members, computed anew after each join or leave."""
+    """Values derived from the members, computed anew where one joins, leaves, or begins or ceases to exist."""
 
     def __init__(self, deployment: Deployment, speaking: Set[tuple[str, str]]) -> None:
         """`speaking` are the robots and channels of sensors that may measure at any tick."""
@@ -106,7 +106,7 @@ class Here:
         self.is_called_at_any_tick = False
         """Whether a client acts at the arrival of what may be measured at any tick."""
         self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
-        """Subscribers of each (endpoint, channel), in name order."""
+        """Subscribers of each (endpoint, channel) that exist, in name order."""
 
     def renew(self, members: Mapping[str, Member]) -> None:
         """Compute the values anew."""
@@ -118,7 +118,7 @@ class Here:
         )
         heard: dict[tuple[str, str], list[str]] = {}
         for name, member in here.items():
-            for pair in member.subscriptions:
+            for pair in member.subscriptions if member.exists else ():
                 heard.setdefault(pair, []).append(name)
         self.receivers = {pair: tuple(names) for pair, names in heard.items()}
 
