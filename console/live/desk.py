@@ -55,11 +55,14 @@ class Desk:
         names = [field.name for field in taker.fields]
         if {*numbers} != {*names}:
             raise taker.wrong(f"{', '.join(numbers) or 'nothing'} given")
+        for name in names:
+            if not isinstance(numbers[name], int | float):
+                raise taker.wrong(f"{name} is not a number", numbers[name])
         _, beyond = self._fitted[robot, actuator].examine(taker.pack(numbers))
         if beyond:
             one = beyond[0]
             raise taker.wrong(f"{one.name} is beyond its limit of {one.limit:g} {one.unit}", one.value)
-        self._client.robots[robot].actuators[actuator].call(*(numbers[name] for name in names))
+        self._client.robots[robot].actuators[actuator].call(**numbers)
         what = ", ".join(f"{field.name} {numbers[field.name]:g} {field.unit}" for field in taker.fields)
         self._called[robot, actuator] = what
         return f"{robot}/{actuator}: {what}"
