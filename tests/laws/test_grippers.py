@@ -158,9 +158,9 @@ def test_a_node_and_the_vhub_that_are_lost_while_both_hold_change_nothing(tmp_pa
 
 def goes_on(path: Path, tick: int, ticks: int) -> list[bytes]:
     """The digests of a run that begins with a captured frame."""
-    text, files = pin_assets(two_cranes(), NAME, folder())
+    text, files = pin_assets(two_cranes(), NAME, DEPLOY)
     start = read_branch(f"{path}@{tick * 0.01:g}s", load_deployment(text, NAME).with_assets(files)).start
-    return rehearse(two_cranes(), NAME, ticks, 2, start=start, folder=folder()).digests
+    return rehearse(two_cranes(), NAME, ticks, 2, start=start, folder=DEPLOY).digests
 
 
 def test_a_grasp_changes_no_draw_of_others() -> None:

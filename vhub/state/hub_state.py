@@ -118,11 +118,7 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
-        if changed := self.existence.turn_to(frame, self.members):
-            self._here.renew(self.members)
-        for name in changed:
-            if self.members[name].active and self.members[name].since == tick:
-                self.ages.joins(name, self.members[name].subscriptions)
+        changed = self._turn_existence_to(frame)
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)
@@ -150,6 +146,16 @@ class HubState:
                 if is_new or name in changed:  # it acts by what it hears of its existence
                     released.setdefault(name, [])
         return released
+
+    def _turn_existence_to(self, frame: Frame) -> list[str]:
+        """Let clients begin and cease to exist; return those of which that, or who is absent for them, has changed."""
+        changed = self.existence.turn_to(frame, self.members)
+        if changed:
+            self._here.renew(self.members)
+        for name in changed:
+            if self.members[name].active and self.members[name].since == frame.tick:
+                self.ages.joins(name, self.members[name].subscriptions)
+        return changed
 
     def _in_phase(self, packets: Iterable[Counted]) -> Iterable[Counted]:
         """Return packets in the order in which they reach their radios."""
