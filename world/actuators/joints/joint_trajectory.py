@@ -39,7 +39,8 @@ class JointTrajectorySettings(JointLoopSettings):
 class Trajectory(Struct, frozen=True):
     """Times from the command on (s), which rise from above 0, and the positions of all joints at each (m or rad).
 
-    It begins where the joints are. Between two points the way of each joint is a monotone cubic (`moving/spline.py`).
+    The way begins where the joints are. Between two points that of each joint is a monotone cubic, which
+    `world/moving/spline.py` describes.
     """
 
     times: Annotated[tuple[Time, ...], Meta(max_length=POINTS_MAX)]
