@@ -184,7 +184,7 @@ def test_a_ball_is_added_while_the_vhub_is_away() -> None:
     """Then others are present in its last record than in the last commit."""
 
     def add(system: System) -> None:
-        system.request("add", name="ball", at="0.1,0,0.02")
+        system.request("add", name="ball", at="0.15,0,0.02")
 
     usual = fly([(50, add), (120, lambda system: system.request("remove", name="ball-2"))])
     seen = fly([(50, add), (53, kill_hub("torn")), (120, lambda system: system.request("remove", name="ball-2"))])

@@ -348,7 +348,7 @@ def test_with_freeze_an_operators_down_holds_when_the_node_is_back() -> None:
 
 def test_a_ball_that_is_added_while_a_node_is_lost() -> None:
     faults: list[Fault] = [
-        (50, lambda system: system.request("add", name="ball", at="0.1,0,0.02")),
+        (50, lambda system: system.request("add", name="ball", at="0.15,0,0.02")),
         (50, kill("n2")),
         (150, start("n2")),
         (200, lambda system: system.request("remove", name="ball-2")),
