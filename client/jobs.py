@@ -95,11 +95,18 @@ class Jobs:
         self.senders: Final = deployment.senders_to(robot)
         if sender not in self.senders:
             raise UnknownName(f"{self.what} takes no jobs of it", sender, self.senders)
-        telling = [
+        telling = {
             channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
-        ]
+        }
         if not telling:
             raise BadValue(f"{robot} has no sensor of the kind job that tells of its actuator", actuator)
+        if sender in deployment.players:
+            heard = {channel for endpoint, channel in deployment.heard_by(sender) if endpoint == robot}
+            if telling.isdisjoint(heard):
+                raise BadValue(
+                    f"{sender} does not hear {' or '.join(sorted(telling))} of {robot}, which tells of", actuator
+                )
+            telling &= heard
         self.heard: Final = (robot, min(telling))
         """The (robot, channel) that tells how they stand."""
         self.sender, self.robot, self.actuator = sender, robot, actuator

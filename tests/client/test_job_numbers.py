@@ -28,10 +28,23 @@ SCOUT: Final = {
     "actuators": {"drive": {"kind": "go_to"}},
     "sensors": {"jobs": {"kind": "job", "actuator": "drive", "rate": "5 Hz"}},
 }
+PLAYER: Final = {"class": "foosim.client.player:Player", "rate": "10 Hz"}
+TWICE: Final = {
+    **SCOUT,
+    "at": {"y": "2 m"},
+    "sensors": {"a": SCOUT["sensors"]["jobs"], "b": SCOUT["sensors"]["jobs"]},
+}
 PLAIN: Final = {"model": "holonomic", "at": {"x": "1 m"}, "sensors": {}}
 SILENT: Final = {**SCOUT, "at": {"y": "1 m"}, "sensors": {}}
 DEPLOYMENT: Final = load_deployment(
     yard_text({"scout": SCOUT, "plain": PLAIN, "silent": SILENT}, clients={"a": {}, "hand": {}, "z": {}}), "yard.yaml"
+)
+PLAYERS: Final = load_deployment(
+    yard_text(
+        {"scout": SCOUT, "twice": TWICE},
+        players={"deaf": PLAYER | {"robots": {"scout": []}}, "one": PLAYER | {"robots": {"twice": ["b"]}}},
+    ),
+    "yard.yaml",
 )
 RUNNING: Final = JobState.RUNNING
 
@@ -155,6 +168,12 @@ def test_a_reading_that_the_network_has_changed_is_passed_over(reading: Reading)
 def test_what_takes_no_jobs_says_why(about: tuple[str, str, str], error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         Jobs(DEPLOYMENT, *about)
+
+
+def test_a_player_reads_the_sensor_that_it_hears() -> None:
+    assert Jobs(PLAYERS, "one", "twice", "drive").heard == ("twice", "b")
+    with pytest.raises(BadValue, match="deaf does not hear jobs of scout"):
+        Jobs(PLAYERS, "deaf", "scout", "drive")
 
 
 def test_a_command_that_is_none_is_refused() -> None:
