@@ -20,7 +20,8 @@ def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
 
     Rigid bodies are compared by their shapes, what moves by kinematics by its cylinder.
     """
-    return overlapped(spec, layout, numbers, entity) or _met_upright(spec, layout, numbers, entity)
+    found = overlapped(spec, layout, numbers, entity) if layout.couples or entity.is_rigid else ""
+    return found or _met_upright(spec, layout, numbers, entity)
 
 
 def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
