@@ -195,8 +195,10 @@ def test_who_acts_at_arrivals_is_neither_called_by_these_nor_by_time() -> None:
     firsts = [min(tick for tick in ticks if tick >= first) for first, _ in spans]
     assert [seen.said("waits")[tick][0] for tick in firsts] == ["1", "1"]
     assert len(ticks) > sum((last - first) // 20 for first, last in spans), "by packets, too"
-    lost = [one for one in seen.fates() if one[1] == "waits" and one[5] == RECEIVER_DOWN]
-    assert len(lost) > 20, "what others send to it meanwhile is lost"
+    offered = [one for closing in seen.closings for one in closing.fates if one.destination == "waits"]
+    sent = {one.sent_ns // TICK_NS for one in offered}
+    assert all(any(first <= tick < last for first, last in spans) for tick in sent), "nothing is offered meanwhile"
+    assert any(one.cause == RECEIVER_DOWN for one in offered), "what was in flight is lost"
 
 
 def test_a_player_is_made_at_its_start_and_when_it_exists_again(monkeypatch: pytest.MonkeyPatch) -> None:

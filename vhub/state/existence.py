@@ -44,7 +44,8 @@ class Existence:
         self._states = b""
 
     def turn_to(self, frame: Frame, members: Mapping[str, Member]) -> list[str]:
-        """Take the newest frame; return the members that exist from it on and have not before, in name order."""
+        """Take the newest frame; return the members that exist from it on and have not before, or do not exist any
+        more, in name order."""
         if frame.layout is not self._layout:
             self._layout, self._states = frame.layout, b""
             robots = sorted({name for names in (*self._robots.values(), *self._lives_by.values()) for name in names})
@@ -63,12 +64,11 @@ class Existence:
             for player, robots in self._robots.items()
             if not gone.isdisjoint(robots)
         }
-        begun = []
+        changed = []
         for name, lives_by in self._lives_by.items():
             member = members.get(name)
             if member is None or member.exists is not (lives_by <= gone):
                 continue
             member.since = frame.tick if lives_by - gone else -1
-            if member.exists:
-                begun.append(name)
-        return begun
+            changed.append(name)
+        return changed

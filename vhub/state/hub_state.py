@@ -118,9 +118,11 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
-        for name in self.existence.turn_to(frame, self.members):
-            if self.members[name].active:
-                self.ages.joins(name, self.members[name].subscriptions)
+        if changed := self.existence.turn_to(frame, self.members):
+            self._here.renew(self.members)
+            for name in changed:
+                if self.members[name].active and self.members[name].exists:
+                    self.ages.joins(name, self.members[name].subscriptions)
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)

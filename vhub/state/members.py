@@ -90,7 +90,7 @@ class Member:
 
 
 class Here:
-    """Values derived from the members, computed anew after each join or leave."""
+    """Values derived from the members, computed anew where one joins, leaves, or begins or ceases to exist."""
 
     def __init__(self, deployment: Deployment, speaking: Set[tuple[str, str]]) -> None:
         """`speaking` are the robots and channels of sensors that may measure at any tick."""
@@ -104,7 +104,7 @@ class Here:
         self.is_called_at_any_tick = False
         """Whether a client acts at the arrival of what may be measured at any tick."""
         self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
-        """Subscribers of each (endpoint, channel), in name order."""
+        """Subscribers of each (endpoint, channel) that exist, in name order."""
 
     def renew(self, members: Mapping[str, Member]) -> None:
         """Compute the values anew."""
@@ -116,7 +116,7 @@ class Here:
         )
         heard: dict[tuple[str, str], list[str]] = {}
         for name, member in here.items():
-            for pair in member.subscriptions:
+            for pair in member.subscriptions if member.exists else ():
                 heard.setdefault(pair, []).append(name)
         self.receivers = {pair: tuple(names) for pair, names in heard.items()}
 
