@@ -336,14 +336,14 @@ class NodeCore:
         raw, deliveries = delivered
         term = self._term
         numbers, self._remembered = term.stepper.edited(frame, edits, self._remembered)
-        share: Share = term.assignment.shares(numbers)[self.name]
+        is_edited = edits or frame.tick in term.stepper.events.by_tick or term.stepper.world.has_rules
+        values = None if is_edited else frame.values
+        share: Share = term.assignment.shares(numbers, values)[self.name]
         start = numbers.copy()
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         islands, movers = term.members(share)
-        is_edited = edits or frame.tick in term.stepper.events.by_tick or term.stepper.world.has_rules
-        values = None if is_edited else frame.values
         self.work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
         return True
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from operator import itemgetter
-from typing import Final, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from foosim.world.components.fitted import FittedSensor
 from foosim.world.forms.forms import DOWN, INACTIVE
@@ -12,13 +14,14 @@ from foosim.world.layout import Entity
 
 TURNS_MAX: Final = 64
 """Sets of schedules whose turn is kept."""
+Sensors: TypeAlias = tuple[FittedSensor, ...]
 
 
 class Turn(NamedTuple):
     """Who measures at a tick: robots in service with their sensors, these one after the other, and their packets."""
 
-    robots: tuple[tuple[Entity, tuple[FittedSensor, ...]], ...]
-    sensors: tuple[FittedSensor, ...]
+    robots: tuple[tuple[Entity, Sensors], ...]
+    sensors: Sensors
     heads: tuple[tuple[str, int, str], ...]
     """Robot, number among its packets and channel of each reading, where none is dropped."""
     counters: tuple[int, ...]
@@ -41,27 +44,28 @@ class DueSensors:
         """`sensors` and the bits of their switches are by robot."""
         self.robots = robots
         self._sensors = [tuple(sensors[robot.name]) for robot in robots]
-        self._bits = [tuple([switches[one.robot][one.channel] for one in its]) for its in self._sensors]
+        self._bits = [switches[robot.name] for robot in robots]
         self._down = [robot.offsets[DOWN] for robot in robots]
         self._inactive = [robot.offsets.get(INACTIVE, robot.offsets[DOWN]) for robot in robots]
         """Of one without components its `down`, which is 0 when it is looked at."""
         everyone = [one for its in self._sensors for one in its]
         self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
+        self._due: dict[tuple[bool, ...], list[Sensors]] = {}
+        """What is due of each robot, whoever is in service."""
         self._turns: dict[tuple[bool, ...], Turn] = {}
         """Of those who are in service now."""
-        places = [*self._down, *self._inactive]
-        self._state: Callable[[Sequence[float]], object] = itemgetter(*places) if places else lambda numbers: ()
-        """Returns who is out of service, and what is switched off."""
-        self._out: object = None
-        """The same when the turns were made."""
+        self._states = np.array([*self._down, *self._inactive], np.intp)
+        """The places that say who is out of service, and what is switched off."""
+        self._out = b""
+        """What they had when the turns were made."""
 
-    def at(self, tick: int, numbers: Sequence[float]) -> Turn:
-        """Return who measures at a tick, at whose start the numbers of the frame are these."""
+    def at(self, tick: int, numbers: Sequence[float], values: NDArray[np.float64]) -> Turn:
+        """Return who measures at a tick, at whose start the numbers of the frame are these; `values` are the same."""
         value = numbers.__getitem__
         if any(map(value, self._speaks)):
-            return self._turn(tick, numbers)
-        out = self._state(numbers)
+            return self._turn(self._due_at(tick, numbers), numbers)
+        out = values[self._states].tobytes()
         if out != self._out:
             self._turns, self._out = {}, out
         due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])
@@ -69,20 +73,31 @@ class DueSensors:
         if turn is None:
             while len(self._turns) >= TURNS_MAX:
                 self._turns.pop(next(iter(self._turns)))
-            turn = self._turns[due] = self._turn(tick, numbers)
+            turn = self._turns[due] = self._turn(self._known(due, tick, numbers), numbers)
         return turn
 
-    def _turn(self, tick: int, numbers: Sequence[float]) -> Turn:
-        robots = tuple(self._due(tick, numbers))
+    def _known(self, due: tuple[bool, ...], tick: int, numbers: Sequence[float]) -> list[Sensors]:
+        found = self._due.get(due)
+        if found is None:
+            while len(self._due) >= TURNS_MAX:
+                self._due.pop(next(iter(self._due)))
+            found = self._due[due] = self._due_at(tick, numbers)
+        return found
+
+    def _due_at(self, tick: int, numbers: Sequence[float]) -> list[Sensors]:
+        return [tuple([one for one in its if one.is_due(tick, numbers)]) for its in self._sensors]
+
+    def _turn(self, due: Sequence[Sensors], numbers: Sequence[float]) -> Turn:
+        robots = tuple(self._in_service(due, numbers))
         sensors = tuple([one for _, its in robots for one in its])
         heads = tuple([(robot.name, number, one.channel) for robot, its in robots for number, one in enumerate(its)])
         return Turn(robots, sensors, heads, tuple([one.samples_at for one in sensors]))
 
-    def _due(self, tick: int, numbers: Sequence[float]) -> Iterator[tuple[Entity, tuple[FittedSensor, ...]]]:
-        for robot, down, inactive, sensors, bits in zip(
-            self.robots, self._down, self._inactive, self._sensors, self._bits, strict=True
+    def _in_service(self, due: Sequence[Sensors], numbers: Sequence[float]) -> Iterator[tuple[Entity, Sensors]]:
+        """Yield the robots in service with those of these sensors that are switched on."""
+        for robot, down, inactive, its, bits in zip(
+            self.robots, self._down, self._inactive, due, self._bits, strict=True
         ):
             if numbers[down] == 0.0:
                 off = int(numbers[inactive])
-                its = zip(sensors, bits, strict=True)
-                yield robot, tuple([one for one, bit in its if not bit & off and one.is_due(tick, numbers)])
+                yield robot, tuple([one for one in its if not bits[one.channel] & off]) if off else its

@@ -134,7 +134,7 @@ class Stepper:
         tick, numbers = frame.tick, frame.numbers
         if self._due.robots is not robots and self._due.robots != robots:
             self._due = DueSensors(robots, self._sensors, self._switches)
-        turn = self._due.at(tick, numbers)
+        turn = self._due.at(tick, numbers, frame.values)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view)
         for at in turn.counters:
@@ -241,10 +241,17 @@ class Stepper:
         world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
             self._standing.note(bodies, numbers, before)
-        if not isfinite(sum(numbers)) or any(self._problem(entity, before, work) for entity in changed):
+        if not (isfinite(sum(numbers)) and self._can_all_be(changed, before, work)):
             self._quarantine(work, before)
 
-    def _awake(self, work: Work) -> tuple[list[Entity], bool]:
+    def _can_all_be(self, entities: Sequence[Entity], before: Sequence[float], work: Work) -> bool:
+        """Whether the new, finite states of these entities can be."""
+        numbers = work.numbers
+        if not self.world.are_plausible(entities, numbers, before, work.tick):
+            return not any(self._problem(entity, before, work) for entity in entities)
+        return not self._limits or not any(self._limits.problem(entity, numbers, before) for entity in entities)
+
+    def _awake(self, work: Work) -> tuple[Sequence[Entity], bool]:
         """Return what is solved, neither what stands nor what is in quarantine, and whether anything is in that."""
         numbers = work.numbers
         if work.islands is not self._islands:
@@ -252,7 +259,7 @@ class Stepper:
             self._bodies = [entity for island in work.islands for entity in island]
             self._quarantined = [entity.offsets["quarantined"] for entity in self._bodies]
             self._alone = frozenset([island[0].index for island in work.islands if len(island) == 1])
-        bodies = self._bodies
+        bodies: Sequence[Entity] = self._bodies
         is_partial = any(map(numbers.__getitem__, self._quarantined))
         if is_partial:
             for entity in bodies:

@@ -51,6 +51,7 @@ from foosim.supervisor.state import RunState
 from foosim.supervisor.status import SupervisorStatistics, result, status
 from foosim.supervisor.vhub_loss import PlayerLosses, VhubLoss
 from foosim.supervisor.viewing import Viewing
+from foosim.world.assembly.presence import Presence
 from foosim.world.components.command_watch import CommandWatch
 from foosim.world.edits import Edit
 from foosim.world.frame import Frame, chain_next
@@ -87,6 +88,7 @@ class SupervisorCore:
         self.on_commit: Callable[[Frame], None] | None = None
         """Gets every committed frame, for a rehearsal."""
         self._slots = Slots(state.frame.layout, state.owners)
+        self._presence = Presence(state.frame.layout)
         self._patience = Patience(now_ns)
         self._refused = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
@@ -318,7 +320,8 @@ class SupervisorCore:
             return False
         inputs.committed(tick)
         self._commands.committed(state.frame, frame, lambda: decode(Deliveries, deliveries).packets)
-        self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
+        solved = solved_by(barrier, frame.layout, self._presence.absent(frame.values))
+        self._take_frame(frame, edits, solved, now_ns)
         return True
 
     def _take_frame(self, frame: Frame, edits: list[Edit], solved: Solved, now_ns: int) -> None:

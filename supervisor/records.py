@@ -7,7 +7,7 @@ belongs together is one record, so that a journal never ends between a request a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -25,6 +25,7 @@ from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.assembly.initial_state import first_chain, first_frame
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
+from foosim.world.layout import Layout
 from foosim.world.start import Start
 
 ANSWERS_KEPT: Final = 1024
@@ -240,15 +241,16 @@ Solved = tuple[list[str], dict[str, str]]
 """The nodes that solved a body on the way to a frame, and who solved each free body, by its name."""
 
 
-def solved_by(barrier: Barrier, frame: Frame) -> Solved:
-    """Return the nodes that solved a body on the way to a frame, and who solved each free body."""
-    entities, numbers = frame.layout.entities, frame.numbers
+def solved_by(barrier: Barrier, layout: Layout, absent: Collection[int]) -> Solved:
+    """Return the nodes that solved a body on the way to a frame, and who solved each free body; `absent` has the
+    indices of who is not there."""
+    entities = layout.entities
     solving = [
         name
         for name, part in barrier.parts.items()
-        if any(entities[index].is_solved and not entities[index].is_absent(numbers) for index in part.solved)
+        if any(entities[index].is_solved and index not in absent for index in part.solved)
     ]
-    present = [body for body in frame.layout.free if not body.is_absent(numbers)]
+    present = [body for body in layout.free if body.index not in absent]
     return sorted(solving), {body.name: barrier.solver_of(body.index) for body in present}
 
 

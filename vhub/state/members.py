@@ -67,7 +67,7 @@ class Member:
         """Whether it is due at a tick. For a client that acts at arrival, the tick's packets must be there."""
         if self.arrivals:
             return self.active and tick == self.called_tick
-        return self.active and self.exists and self.period > 0 and tick % self.period == self.offset
+        return self.active and self.since >= 0 and self.period > 0 and tick % self.period == self.offset
 
     def may_be_due(self, tick: int, closed: int) -> bool:
         """Whether it may be due at a tick after those that are closed, regardless of arrivals: in each of the frames

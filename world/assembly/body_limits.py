@@ -43,6 +43,9 @@ class BodyLimits:
         bodies = build_scene(spec, layout).bodies if rigid else {}
         self._limits = {entity.index: _limits_of(bodies[entity.name]) for entity in rigid}
 
+    def __bool__(self) -> bool:
+        return bool(self._limits)
+
     def __contains__(self, index: int) -> bool:
         return index in self._limits
 

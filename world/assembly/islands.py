@@ -14,6 +14,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 
+import numpy as np
+from numpy.typing import NDArray
+
 from foosim.world.assembly.presence import Presence
 from foosim.world.assembly.volumes import BodyIsland, Volumes, solver_by_name
 from foosim.world.layout import Layout
@@ -28,8 +31,8 @@ MARGIN_M = 0.001
 @dataclass(frozen=True)
 class Reach:
     """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
-    with one half width and one band of z; `balls` are (index, start of the position); `alone` are (index, name) of what
-    touches nobody, without a name of what is no robot."""
+    with one half width and one band of z; `balls` are (index, start of the position); `alone` are the islands of what
+    touches nobody."""
 
     ball_m: float
     rods: tuple[tuple[int, str, float], ...]
@@ -38,12 +41,13 @@ class Reach:
     z_low_m: float
     z_high_m: float
     balls: tuple[tuple[int, int], ...]
-    alone: tuple[tuple[int, str], ...] = ()
+    alone: tuple[Island, ...] = ()
 
     def without(self, absent: Collection[int]) -> Reach:
         """Return those of all but some entities, by their indices."""
         balls = tuple([ball for ball in self.balls if ball[0] not in absent])
-        return replace(self, balls=balls, alone=tuple([one for one in self.alone if one[0] not in absent]))
+        alone = tuple([one for one in self.alone if one.entities[0] not in absent])
+        return replace(self, balls=balls, alone=alone)
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,9 @@ def reach_of(spec: WorldSpec, layout: Layout) -> Reach | Volumes:
 def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
     """Return the bounding volumes of rods and balls, and who moves alone."""
     alone = tuple(
-        (entity.index, entity.name if entity.is_robot else "") for entity in layout.entities if entity.kind.motion
+        Island((entity.index,), entity.name if entity.is_robot else "")
+        for entity in layout.entities
+        if entity.kind.motion
     )
     if TABLE not in spec.kits:
         return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
@@ -160,7 +166,7 @@ def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tu
         ]
         islands.append(Island(tuple(sorted(members)), min(candidates)[1] if candidates else ""))
     islands += [Island((index,), name) for index, name, _ in reach.rods if index not in taken]
-    islands += [Island((index,), name) for index, name in reach.alone]
+    islands += reach.alone
     return tuple(sorted(islands, key=lambda island: island.entities))
 
 
@@ -179,6 +185,7 @@ class Assignment:
         self._absent: frozenset[int] = frozenset()
         self.roster = tuple(roster)
         self.owners = dict(owners)
+        self._unsolved = [entity.index for entity in layout.entities if not entity.is_solved]
         self._shares: dict[Touching, dict[str, Share]] = {}
         self._divided: tuple[list[BodyIsland], dict[str, Share]] = [], {}
         """The islands of any bodies that were divided last, and their shares."""
@@ -187,9 +194,10 @@ class Assignment:
         """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
         return self.owners[island.nearest] if island.nearest else self.roster[0]
 
-    def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
-        """Return every node's share of the tick that starts from these edited numbers."""
-        absent = self.presence.absent(numbers)
+    def shares(self, numbers: Sequence[float], values: NDArray[np.float64] | None = None) -> dict[str, Share]:
+        """Return every node's share of the tick that starts from these edited numbers; `values` are the same as an
+        array, where there is one."""
+        absent = self.presence.absent(numbers if values is None else values)
         if absent is not self._absent:
             self._absent, self.reach = absent, self._everybody.without(absent)
             self._shares, self._divided = {}, ([], {})
@@ -240,6 +248,5 @@ class Assignment:
 
     def _add_unsolved(self, solved: dict[str, list[int]]) -> None:
         """Add who stays as it is, or is absent: its owner copies it, the first node what has none."""
-        for entity in self.layout.entities:
-            if not entity.is_solved or entity.index in self._absent:
-                solved[self.owners.get(entity.name, self.roster[0])].append(entity.index)
+        for index in sorted({*self._unsolved, *self._absent}):
+            solved[self.owners.get(self.layout.entities[index].name, self.roster[0])].append(index)

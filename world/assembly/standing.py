@@ -24,20 +24,22 @@ class Standing:
         self, layout: Layout, actuators: Mapping[int, Sequence[FittedActuator]], ruled: Collection[int]
     ) -> None:
         """`actuators` and `ruled` are by the entities' indices."""
+        self._having = [(one, one.offsets[UNMOVED]) for one in layout.entities if UNMOVED in one.offsets]
         self._places = {
-            entity.index: entity.offsets[UNMOVED]
-            for entity in layout.entities
-            if UNMOVED in entity.offsets
-            and entity.index not in ruled
+            entity.index: at
+            for entity, at in self._having
+            if entity.index not in ruled
             and all(getattr(one.actuator, "steady", False) for one in actuators.get(entity.index, ()))
         }
 
     def awake(
         self, bodies: Sequence[Entity], alone: Collection[int], numbers: Sequence[float], start: Sequence[float]
-    ) -> list[Entity]:
+    ) -> Sequence[Entity]:
         """Return the bodies that are solved: `alone` are those that are islands by themselves, `start` the numbers
         before commands reached them."""
         places, found = self._places, []
+        if not places:
+            return bodies
         for entity in bodies:
             at, first, last = places.get(entity.index, -1), entity.start, entity.split
             stands = at >= 0 and numbers[at] == 1.0 and entity.index in alone
@@ -47,7 +49,7 @@ class Standing:
 
     def note(self, solved: Iterable[Entity], numbers: list[float], before: Sequence[float]) -> None:
         """Say of each body that was solved whether that has left it as it was before."""
-        for entity in solved:
+        for entity in solved if self._places else ():
             at = self._places.get(entity.index, -1)
             if at >= 0:
                 numbers[at] = before[at]
@@ -57,9 +59,8 @@ class Standing:
     def wake_edited(self, before: Frame, numbers: list[float]) -> None:
         """Let those be solved that an order or a rule of the world has changed."""
         old = before.numbers
-        for entity in before.layout.entities:
-            at = entity.offsets.get(UNMOVED, -1)
-            if at < 0 or numbers[at] == 0.0:
+        for entity, at in self._having:
+            if numbers[at] == 0.0:
                 continue
             if numbers[entity.start : entity.split] != old[entity.start : entity.split]:
                 numbers[at] = 0.0

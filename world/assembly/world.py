@@ -268,6 +268,11 @@ class World:
                     self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
+        self._checks: Mapping[int, Callable[[Sequence[float], Sequence[float]], bool]] = {
+            index: check
+            for index, model in self.models.items()
+            if (check := getattr(model, "is_plausible", None)) is not None
+        }
         self._derive: Mapping[int, Callable[[WritableView], None]] = {
             entity.index: self.models[entity.index].derive  # type: ignore[attr-defined]
             for entity in layout.entities
@@ -470,9 +475,22 @@ class World:
                     if one.jobs is not None and not one.jobs.is_idle(view):
                         one.judge_job(view, has_power=self._has_power(entity, view))
 
+    def are_plausible(
+        self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
+    ) -> bool:
+        """Whether the new, finite states of all of these entities can be; `problem` says what is wrong with one."""
+        for entity in entities:
+            check = self._checks.get(entity.index)
+            try:
+                if check is not None and check(numbers, before) is not True:
+                    return False
+            except BaseException as error:
+                raise component_error(f"model {entity.model}", entity.name, tick, error) from error
+        return True
+
     def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float], tick: int) -> str:
         """Return in words why the new, finite state of an entity cannot be; empty where it can."""
-        check = getattr(self.models[entity.index], "is_plausible", None)
+        check = self._checks.get(entity.index)
         if check is None:
             return ""
         try:

@@ -29,7 +29,7 @@ class Beams:
         """`directions` are unit vectors in the mount's frame. Raises BadValue without a body, or without the link."""
         body_of(at)
         self.around, self.entity, self.mount = Surroundings(at.spec, at.layout), at.robot, Mounted(at, where)
-        self.directions, self.range_m = tuple(directions), range_m
+        self.directions, self.range_m = np.array(directions).reshape(-1, 3), range_m
 
 
 class BeamsTogether:

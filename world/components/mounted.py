@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
@@ -15,6 +17,8 @@ from foosim.world.rays.boxes import Floats
 from foosim.world.rays.shapes import multiplied, rotated
 from foosim.world.scene import Body, Quaternion, Vector, conjugate, moved, multiply, rotate
 
+STATE: Final = ("position", 3), ("orientation", 4)
+"""What of the state is where a free link is."""
 OF_TWIST = ("linear_velocity", "angular_velocity")
 """Fields of a free body without which nobody knows how its places move."""
 
@@ -43,8 +47,13 @@ class Mounted:
         self.link = link_index(self._body, where.link)
         self.position, self.orientation = where.position, where.orientation
         link = self._body.links[self.link]
-        self.free_link = link if link.joint == "free" else None
-        """The link where that moves freely, by itself."""
+        self.free: tuple[NDArray[np.intp], Floats] | None = None
+        """Where the link moves freely, by itself: the places of its position and orientation in the frame; its
+        principal axes, conjugated, its centre of mass, and the mount's position and orientation."""
+        if link.joint == "free":
+            places = [at.robot.offsets[name] + step for name, size in STATE for step in range(size)]
+            fixed = [*conjugate(link.principal), *link.centre_of_mass, *self.position, *self.orientation]
+            self.free = np.array(places, np.intp), np.array(fixed)
 
     def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
         """Return the place (m) and the orientation of the mount, in the world frame, from the frame's numbers."""
@@ -69,18 +78,13 @@ class MountedTogether:
 
     def __init__(self, several: Sequence[Mounted]) -> None:
         self._several = tuple(several)
-        self._free = [place for place, one in enumerate(several) if one.free_link is not None]
-        self._jointed = [place for place, one in enumerate(several) if one.free_link is None]
-        free = [several[place] for place in self._free]
-        at = [one.entity.offsets for one in free]
-        fields = ("position", 3), ("orientation", 4)
-        self._places = np.array(
-            [offsets[name] + step for name, size in fields for step in range(size) for offsets in at], np.intp
-        ).reshape(7, -1)
-        links = [link for one in free if (link := one.free_link) is not None]
-        self._back = _columns([conjugate(link.principal) for link in links], 4)
-        self._centres = _columns([link.centre_of_mass for link in links], 3)
-        self._mounts = _columns([one.position for one in free], 3), _columns([one.orientation for one in free], 4)
+        self._free = [place for place, one in enumerate(several) if one.free is not None]
+        self._jointed = [place for place, one in enumerate(several) if one.free is None]
+        if self._free:
+            free = [one.free for one in several if one.free is not None]
+            self._places = np.array([places for places, _ in free]).T.copy()
+            fixed = np.array([numbers for _, numbers in free]).T.copy()
+            self._back, self._centres, *self._mount = np.split(fixed, (4, 7, 10))
 
     def poses(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
         """Return places (3, n) (m) and orientations (4, n) of n mounts, in the world frame, from the frame's numbers.
@@ -91,7 +95,7 @@ class MountedTogether:
         places, orientations = np.empty((3, count)), np.empty((4, count))
         if self._free:
             state = (np.array(numbers) if values is None else values)[self._places]
-            place, orientation = self._mounts
+            place, orientation = self._mount
             origins, turned = free_poses(state, self._back, self._centres)
             places[:, self._free] = origins + rotated(turned, place)
             orientations[:, self._free] = multiplied(turned, orientation)
@@ -108,10 +112,6 @@ def free_poses(state: Floats, back: Floats, centres: Floats) -> tuple[Floats, Fl
     """
     turned = multiplied(state[3:], back)
     return state[:3] - rotated(turned, centres), turned
-
-
-def _columns(rows: Sequence[Sequence[float]], size: int) -> Floats:
-    return np.array(rows).reshape(-1, size).T
 
 
 def body_at(at: Mounting) -> Body:

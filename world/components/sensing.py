@@ -34,14 +34,14 @@ class Sensing:
     """Samples the sensors of one layout."""
 
     def __init__(self) -> None:
-        self._plans: dict[tuple[int, ...], Plan] = {}
+        self._plans: dict[tuple[FittedSensor, ...], Plan] = {}
 
     def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
 
         `view.not_finite` has the sensors whose readings are dropped since a number in them is not finite.
         """
-        key = tuple(map(id, fitted))
+        key = tuple(fitted)
         plan = self._plans.get(key)
         if plan is None:
             while len(self._plans) >= PLANS_MAX:
@@ -92,23 +92,20 @@ class Plan:
         alone, with the same bits.
         """
         kinds: dict[tuple[type[Any], int], list[tuple[int, Any]]] = {}
-        alone = []
         for place, one, size in members:
-            if size and has_together(type(one), METHODS[form]):
-                kinds.setdefault((type(one), size), []).append((place, one))
-            else:
-                alone.append(place)
-        groups = []
+            kinds.setdefault((type(one), size), []).append((place, one))
+        alone, groups = [], []
         for (kind, size), its in kinds.items():
-            if len(its) == 1 or len(its) * size < least:
+            if len(its) == 1 or len(its) * size < max(1, least) or not has_together(kind, METHODS[form]):
                 alone += [place for place, _ in its]
                 continue
-            names = [f"{self._fitted[place].channel} of {self._fitted[place].robot}" for place, _ in its]
-            what = f"{form} {', '.join(names[:NAMED_MAX])}{', ...' * (len(names) > NAMED_MAX)}"
+            first = [self._fitted[place] for place, _ in its[:NAMED_MAX]]
+            names = ", ".join([f"{one.channel} of {one.robot}" for one in first])
+            what = f"{form} {names}{', ...' * (len(its) > NAMED_MAX)}"
             places = [place for place, _ in its]
             is_last = not any(self._fitted[place].modifiers for place in places)
             groups.append(_Group(places, self._put_together(kind, its, what), size, what, is_last))
-        return groups, alone
+        return groups, sorted(alone)
 
     def _put_together(self, kind: Any, members: Sequence[tuple[int, Any]], what: str) -> Any:
         return called(what, "", self._tick, kind.together, [one for _, one in members])

@@ -21,21 +21,30 @@ class Columns:
     """Slots of several entities, alike in their sizes: the numbers of one entity are a row."""
 
     def __init__(self, rows: Sequence[Sequence[Slot]]) -> None:
-        places = [place for slots in rows for slot in slots for place in range(slot.at, slot.at + slot.size)]
-        self.width = len(places) // len(rows)
-        assert all(sum(slot.size for slot in slots) == self.width for slots in rows), rows
+        sizes = [slot.size for slot in rows[0]]
+        assert [[slot.size for slot in slots] for slots in rows] == [sizes] * len(rows), rows
+        self.width = sum(sizes)
+        starts = np.array([[slot.at for slot in slots] for slots in rows])
         self._rows = [tuple(slots) for slots in rows]
-        runs = [_run(slots) for slots in rows]
-        self._runs = [run for run in runs if run is not None] if None not in runs else []
-        self._take(np.array(places).reshape(len(rows), self.width))
+        self._runs_known: list[Slot] | None = None
+        """Each row as one slot, where all are that; made when it is first needed."""
+        steps = np.concatenate([np.arange(size) for size in sizes])
+        self._take(np.repeat(starts, sizes, axis=1) + steps)
 
     def taken(self, rows: Sequence[int]) -> Columns:
         """Return those of some of the entities, by their rows."""
         found = copy(self)
         found._rows = [self._rows[row] for row in rows]
-        found._runs = [self._runs[row] for row in rows] if self._runs else []
+        found._runs_known = [self._runs[row] for row in rows] if self._runs else []
         found._take(self._places[rows])
         return found
+
+    @property
+    def _runs(self) -> list[Slot]:
+        if self._runs_known is None:
+            runs = [_run(slots) for slots in self._rows]
+            self._runs_known = [run for run in runs if run is not None] if None not in runs else []
+        return self._runs_known
 
     def _take(self, places: NDArray[np.int64]) -> None:
         self._count, self._places = len(places), places

@@ -91,8 +91,8 @@ class LaserScanners:
 
     def __init__(self, sensors: Sequence[LaserScanner]) -> None:
         self._beams = BeamsTogether([one.beams for one in sensors])
-        self._least = np.array([[one.least_m] for one in sensors])
-        self._ranges = np.array([[one.range_m] for one in sensors])
+        self._least = np.array([one.least_m for one in sensors])[:, None]
+        self._ranges = np.array([one.range_m for one in sensors])[:, None]
 
     def sample(self, view: View) -> Floats:
         """Return the distances (m), of shape (sensors, beams)."""

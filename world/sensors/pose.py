@@ -41,4 +41,4 @@ class PoseTracker:
     @staticmethod
     def together(sensors: Sequence[PoseTracker]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([(*one._position.places[:2], one._heading.at) for one in sensors])
+        return SlotReadings([(one._position.at, one._position.at + 1, one._heading.at) for one in sensors])
