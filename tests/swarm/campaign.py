@@ -28,6 +28,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.trace import Traced
 from foosim.runtime.roles.bus import CALM, Weather
 from foosim.supervisor.settings import RunSettings
+from foosim.world.actuators.gripper import GripperSettings
 from foosim.world.assembly.misfits import rigid_bodies
 from foosim.world.frame import Frame
 from tests.swarm.faults import (
@@ -52,6 +53,7 @@ from tests.swarm.faults import (
 from tests.swarm.invariants import Laws
 from tests.swarm.memory_bounds import too_large
 from tests.swarm.packet_invariants import hold
+from tests.swarm.strikes import lose_owner, set_field, strike
 
 FAULTS: Final[tuple[int, ...]] = (8, 20)
 NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)
@@ -111,10 +113,10 @@ class Plan:
         return sorted({fault.kind for fault in self.faults})
 
 
-def plan_of(seed: int, ticks: int = TICKS) -> Plan:
+def plan_of(seed: int, ticks: int = TICKS, *, lives: bool = False) -> Plan:
     """Return the plan of a seed: nodes, clocks, bus impairments, and 8 to 20 faults of at least three kinds.
 
-    Their number grows with the length of the run.
+    Their number grows with the length of the run. A world that `lives` has some more, on what it holds and does.
     """
     dice = Dice(seed)
     nodes = dice.one_of(NODES)
@@ -141,6 +143,11 @@ def plan_of(seed: int, ticks: int = TICKS) -> Plan:
         of_sets = Dice(seed, "sets")
         wanted = [set_something(of_sets, names) for _ in range(of_sets.between(3, 8) * times)]
         faults += [_later(fault, of_sets.between(0, late) if late else 0) for fault in wanted]
+    if lives:
+        of_living = Dice(seed, "living")
+        kinds = [lose_owner] if seed % 2 else [lose_owner, strike, strike, set_field]
+        struck = [of_living.one_of(kinds)(of_living, names) for _ in range(of_living.between(4, 10) * times)]
+        faults += [_later(fault, of_living.between(0, late) if late else 0) for fault in struck]
     faults.sort(key=lambda fault: fault.tick)
     here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
     clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
@@ -228,6 +235,16 @@ class Flown:
     packets: dict[str, int] = field(default_factory=dict)
 
 
+@lru_cache(maxsize=WORLDS)
+def lives(text: str, name: str) -> bool:
+    """Return whether robots of a deployment hold things: faults hit these, too."""
+    return any(
+        isinstance(one, GripperSettings)
+        for robot in load_deployment(text, name).robots.values()
+        for one in robot.actuators.values()
+    )
+
+
 @lru_cache(maxsize=4 * WORLDS)
 def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
@@ -238,7 +255,7 @@ def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
         acting = [player for player in deployment.players if deployment.arrivals_of(player)]
         of_world += [f"players.{player}.{what}" for player in acting for what in BY_PERIOD]
     text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *of_world, *PATIENT])
-    return text, with_nodes(text, name, 1, ["players={}", "clients={}", "network={}"])
+    return text, with_nodes(text, name, 1)
 
 
 class Flight:
@@ -342,7 +359,7 @@ def fly(
     The text has the digests of `files` (`pin_assets`). `settings` may plant faulty cores.
     Where no fault changes the world, it has to equal that of the run without faults (law 3).
     """
-    plan = plan_of(seed, ticks)
+    plan = plan_of(seed, ticks, lives=lives(text, name))
     flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
     flight = Flight(text, name, plan, settings or Settings(), files)
     try:

@@ -62,7 +62,7 @@ class Fault:
     do: Callable[[System], object]
 
 
-def _tick(dice: Dice) -> int:
+def random_tick(dice: Dice) -> int:
     return dice.between(5, HEALED_TICK - 10)
 
 
@@ -89,13 +89,13 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
     name, back = dice.one_of(names), dice.between(1, 40)
 
     def do(system: System) -> None:
-        _end(system, name, names)
+        end_node(system, name, names)
         system.at_tick(system.supervisor.state.frame.tick + back, partial(revive, system, name))
 
-    return Fault(_tick(dice), "kill", f"kill {name}", _here(name, do))
+    return Fault(random_tick(dice), "kill", f"kill {name}", _here(name, do))
 
 
-def _end(system: System, name: str, names: Sequence[str]) -> None:
+def end_node(system: System, name: str, names: Sequence[str]) -> None:
     """Kill a node; start one at once if none is left, since no further tick would be committed."""
     system.kill(name)
     if _is_none_left(system, names):
@@ -130,11 +130,11 @@ def _stop(dice: Dice, names: Sequence[str]) -> Fault:
         asked = [ask(system, "stop", node=node)]
         when_answered(system, asked, partial(_leave_one, names=names))
         tick = system.supervisor.state.frame.tick
-        system.at_tick(tick + 10, partial(_here(node, lambda found: _end(found, node, names)), system))
+        system.at_tick(tick + 10, partial(_here(node, lambda found: end_node(found, node, names)), system))
         system.at_tick(tick + 15, partial(ask, system, "start", node=node))
         system.at_tick(tick + 20, partial(revive, system, node))
 
-    return Fault(_tick(dice), "stop", f"stop {node}", do)
+    return Fault(random_tick(dice), "stop", f"stop {node}", do)
 
 
 def _flip(dice: Dice, names: Sequence[str]) -> Fault:
@@ -150,7 +150,7 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
             frame.take(values)
             system.flipped.add(name)
 
-    return Fault(_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))
+    return Fault(random_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))
 
 
 # --- processes pause, are slow, have a clock that jumps --------------------------------------------------------------
@@ -161,7 +161,7 @@ def _pause(dice: Dice, names: Sequence[str]) -> Fault:
     if dice.unit() < 0.3:
         name, for_ms = dice.one_of((channels.SUPERVISOR, channels.VHUB)), dice.one_of((30, 300))
     return Fault(
-        _tick(dice),
+        random_tick(dice),
         "pause",
         f"pause {name} for {for_ms} ms",
         _here(name, lambda system: system.pause(name, for_ms * MS)),
@@ -174,7 +174,7 @@ def _slow(dice: Dice, names: Sequence[str]) -> Fault:
     def do(system: System) -> None:
         system.processes[name].slow_ns = slow_ns
 
-    return Fault(_tick(dice), "slow", f"{name} takes {slow_ns / MS:.1f} ms a turn", _here(name, do))
+    return Fault(random_tick(dice), "slow", f"{name} takes {slow_ns / MS:.1f} ms a turn", _here(name, do))
 
 
 def _clock(dice: Dice, names: Sequence[str]) -> Fault:
@@ -182,7 +182,7 @@ def _clock(dice: Dice, names: Sequence[str]) -> Fault:
     name = dice.one_of([*names, channels.VHUB, channels.SUPERVISOR])
     by_ns = dice.between(MS, 400 * MS if name == channels.SUPERVISOR else HOUR_NS)
     what = f"the clock of {name} jumps by {by_ns / 1e9:.3f} s"
-    return Fault(_tick(dice), "clock", what, lambda system: system.set_forward(name, by_ns))
+    return Fault(random_tick(dice), "clock", what, lambda system: system.set_forward(name, by_ns))
 
 
 # --- the network -----------------------------------------------------------------------------------------------------
@@ -195,7 +195,7 @@ def _cut(dice: Dice, names: Sequence[str]) -> Fault:
     def do(system: System) -> None:
         system.bus.cut_off(name, system.bus.now_ns + for_ms * MS, output=ways[1], input_=ways[2])
 
-    return Fault(_tick(dice), "cut", f"cut {name} off {ways[0]} for {for_ms} ms", do)
+    return Fault(random_tick(dice), "cut", f"cut {name} off {ways[0]} for {for_ms} ms", do)
 
 
 def _clog(dice: Dice, names: Sequence[str]) -> Fault:
@@ -208,7 +208,7 @@ def _clog(dice: Dice, names: Sequence[str]) -> Fault:
             until_ns = system.bus.now_ns + to_ms * MS
             system.later(from_ms * MS, partial(_unless_healed, system, partial(system.bus.clog, name, until_ns)))
 
-    return Fault(_tick(dice), "clog", f"clog {', '.join(chosen)} one after the other", do)
+    return Fault(random_tick(dice), "clog", f"clog {', '.join(chosen)} one after the other", do)
 
 
 def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
@@ -218,7 +218,7 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
     def do(system: System) -> None:
         system.bus.repeat_until(system.bus.now_ns + for_ms * MS)
 
-    return Fault(_tick(dice), "late", f"repeat all messages of {for_ms} ms, late", do)
+    return Fault(random_tick(dice), "late", f"repeat all messages of {for_ms} ms, late", do)
 
 
 # --- people ----------------------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ def _move(dice: Dice, names: Sequence[str]) -> Fault:
         robots = sorted(system.supervisor.state.owners)
         ask(system, "move", robot=robots[int(place * len(robots))], node=node)
 
-    return Fault(_tick(dice), "move", f"move robot {place:.2f} of all to {node}", do)
+    return Fault(random_tick(dice), "move", f"move robot {place:.2f} of all to {node}", do)
 
 
 def _add(dice: Dice, names: Sequence[str]) -> Fault:
@@ -249,7 +249,7 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
             at = {"at": f"{x:.4f},{y:.4f},0.05"} if verb == "add" and chosen.model == "ball" else {}
             ask(system, verb, name=chosen.name, **at)
 
-    return Fault(_tick(dice), "add", f"{verb} one of those who may leave", do)
+    return Fault(random_tick(dice), "add", f"{verb} one of those who may leave", do)
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
@@ -265,7 +265,7 @@ def _push(dice: Dice, names: Sequence[str]) -> Fault:
         for _ in range(1 + is_too_hard):
             ask(system, "push", impulse=impulse)
 
-    return Fault(_tick(dice), "push", "push the first free body", do)
+    return Fault(random_tick(dice), "push", "push the first free body", do)
 
 
 def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
@@ -285,7 +285,7 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
         if not system.healed:
             ask(system, "rate", pace="fast")
 
-    return Fault(_tick(dice), "tempo", f"pause for {for_ms} ms, step {ticks}, then {pace}", do)
+    return Fault(random_tick(dice), "tempo", f"pause for {for_ms} ms, step {ticks}, then {pace}", do)
 
 
 def when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
@@ -308,7 +308,9 @@ def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
         system.end_amid(channels.SUPERVISOR, amid)
         system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
 
-    return Fault(_tick(dice), "supervisor", f"end the supervisor, {amid} actions into a turn, for {down_ms} ms", do)
+    return Fault(
+        random_tick(dice), "supervisor", f"end the supervisor, {amid} actions into a turn, for {down_ms} ms", do
+    )
 
 
 def _revive_supervisor(system: System, down_ms: int) -> None:
@@ -322,7 +324,7 @@ def _revive_supervisor(system: System, down_ms: int) -> None:
 def _hub(dice: Dice, names: Sequence[str]) -> Fault:
     ending, back_ms = dice.one_of(ENDINGS), dice.one_of((1, 40, 400, 2_000))
     what = f"the vHub ends, {ending}, for {back_ms} ms"
-    return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
+    return Fault(random_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
 
 
 def _both(dice: Dice, names: Sequence[str]) -> Fault:
@@ -336,7 +338,7 @@ def _both(dice: Dice, names: Sequence[str]) -> Fault:
             system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
 
     what = f"the vHub ends for {hub_ms} ms, and the supervisor for {down_ms} ms"
-    return Fault(_tick(dice), "both", what, do)
+    return Fault(random_tick(dice), "both", what, do)
 
 
 def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
@@ -360,7 +362,7 @@ def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
             for after_ms, then in ((left_ms, partial(_give_up_waiting, system, name)), (left_ms + 300, be_fast)):
                 system.later(after_ms * MS, partial(_unless_healed, system, then))
 
-    return Fault(_tick(dice), "player", what, do)
+    return Fault(random_tick(dice), "player", what, do)
 
 
 def _give_up_waiting(system: System, name: str) -> None:
@@ -384,7 +386,7 @@ def set_something(dice: Dice, names: Sequence[str]) -> Fault:
         ask(system, "set", name=named[int(place * len(named))], field=field, value=value)
 
     what = f"put something at {where}" if is_put else f"set down={is_down} on robot {place:.2f} of all"
-    return Fault(_tick(dice), "set", what, do)
+    return Fault(random_tick(dice), "set", what, do)
 
 
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
@@ -411,7 +413,7 @@ LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
 the other faults. 7 and 15 are in the last world, where players act at arrival; 10 is not."""
 SETS: Final = 11
 """The remainder modulo 16 of the seeds that also set something, with separate dice."""
-CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player", "set"})
+CHANGES_THE_WORLD: Final = frozenset({"add", "push", "player", "set", "strike"})
 """Kinds that change the world. All others leave it bit-identical."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which a seed has at most one: if all nodes had changed frames, none would be right."""

@@ -28,6 +28,7 @@ from foosim.vhub.state.records import fold as fold_hub
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
+from tests.swarm.living_laws import LivingLaws
 from tests.swarm.packet_invariants import PacketLaws, hold
 from tests.swarm.world_bounds import strays
 
@@ -43,6 +44,7 @@ class Laws:
         """Nodes whose memory a fault has changed."""
         self._replica = replica
         self._deployment = deployment
+        self._living = LivingLaws(deployment, replica.frame.layout)
         self._chains = {0: CHAIN_START}
         """By tick, over all frames up to it."""
         self._digests = {0: initial_frame(deployment).digest}
@@ -239,10 +241,12 @@ class Laws:
         hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, not with {told}")
         if frame.tick != self._replica.frame.tick + 1:
             return  # frame 0, or the last one of a run that ended before all was closed
+        before = self._replica.frame
         again = self._replica.step(closing.edits, closing.delivered)
         hold(again.digest == closing.digest, f"frame {frame.tick} is not the one that its inputs give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
         self.packets.senses(again, self._replica)
+        self._living.check(closing, before)
         stray = strays(self._deployment, again)
         hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")
         self.ticks = frame.tick
