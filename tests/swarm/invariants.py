@@ -113,7 +113,7 @@ class Laws:
             self._ordered.setdefault(record.tick, []).extend(record.edits)
             self._stopped = record.control.stopped
             robot, does, _ = f"{record.answer.text}  ".split(" ", 2)
-            if does in ("moved", "is") and robot in self._chosen:
+            if record.answer.accepted and does in ("moved", "is") and robot in self._chosen:
                 self._chosen[robot] = record.owners[robot]
 
     def _commits_one(self, raw: bytes, commit: Commit) -> None:

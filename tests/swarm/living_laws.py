@@ -138,16 +138,18 @@ class LivingLaws:
             spoilt = [one.name for one in both if after.numbers[one.offsets[QUARANTINED]] > 0.0]
             hold(not (gone or spoilt), f"{what}: absent are {gone}, in quarantine {spoilt}")
             hold(both[1].is_free and not both[1].is_robot, f"{what}, which is no object")
-        grasps = [frame.numbers[gripper.grasp : gripper.grasp + 7] for frame in (before, after)]
+        channel = next(field for field, at in both[0].offsets.items() if at == gripper.held).rpartition(".")[0]
+        if any((packet.destination, packet.channel) == (both[0].name, channel) for packet in closing.delivered):
+            return  # told to open and to close in one tick, it may take the same again
         if was == held:
+            grasps = [frame.numbers[gripper.grasp : gripper.grasp + 7] for frame in (before, after)]
             hold(held < 0 or grasps[0] == grasps[1], f"{what}, in another way than before")
             return
-        told = any(packet.destination == both[0].name for packet in closing.delivered)
-        names = {both[0].name, *([entities[was].name] if was >= 0 else [])}
+        names = {both[0].name, entities[was].name}
         changed = {edit.name for edit in closing.edits if not isinstance(edit, Disrupt)}
         changed |= {event.name for event in self._events.get(before.tick, ())}
         spoilt = [name for name in names if after.at(name, QUARANTINED) > 0.0]
-        hold(told or (held < 0 and bool(names & changed or spoilt)), f"{what} for no reason")
+        hold(held < 0 and bool(names & changed or spoilt), f"{what} for no reason")
 
     def _islands(self, frame: Frame) -> None:
         """Who holds and what is held are solved together."""
