@@ -12,6 +12,8 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import read_branch
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.node.physics.mujoco_islands import CompositionEngine
@@ -20,6 +22,7 @@ from foosim.rehearsal.check.component_check import _shuffle as shuffle
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
+from foosim.replay.what_if import what_if
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.frame import Frame
 from tests.frames import Frames
@@ -64,7 +67,9 @@ def two_cranes(steps: Sequence[Step] = STEPS) -> str:
             },
         },
     }
-    return world(robots, {"crate": crate(-0.6), "loose": crate(0.0, y=4.0, z=2.0)}, steps)
+    return world(
+        robots, {"crate": crate(-0.6), "loose": crate(0.0, y=4.0, z=2.0)}, steps, capture={"frames_every": "1 tick"}
+    )
 
 
 def run(
@@ -140,13 +145,22 @@ def test_engines_that_are_rebuilt_amid_a_grasp_go_on_with_it() -> None:
 
 
 @pytest.mark.parametrize("victim", ["n1", "n2"])
-def test_a_node_that_is_lost_while_both_hold_changes_nothing(victim: str, tmp_path: Path) -> None:
+def test_a_node_and_the_vhub_that_are_lost_while_both_hold_change_nothing(victim: str, tmp_path: Path) -> None:
     def prepare(system: System) -> None:
         system.at_tick(BOTH_HOLD, partial(system.kill, victim))
+        system.at_tick(BOTH_HOLD + 2, partial(system.kill_hub, "torn"))
 
     path = tmp_path / "run.mcap"
     assert run(2, prepare, capture=path).digests == on_one()[0]
-    assert verify_capture(path, 3).equal
+    assert verify_capture(path, 3).equal and what_if(open_capture(path)).changed == 0
+    assert goes_on(path, BOTH_HOLD + 3, ticks=60) == on_one()[0][BOTH_HOLD + 3 :][:60]
+
+
+def goes_on(path: Path, tick: int, ticks: int) -> list[bytes]:
+    """The digests of a run that begins with a captured frame."""
+    text, files = pin_assets(two_cranes(), NAME, folder())
+    start = read_branch(f"{path}@{tick * 0.01:g}s", load_deployment(text, NAME).with_assets(files)).start
+    return rehearse(two_cranes(), NAME, ticks, 2, start=start, folder=folder()).digests
 
 
 def test_a_grasp_changes_no_draw_of_others() -> None:
