@@ -5,6 +5,7 @@
 PACKAGES := analysis capture cli client common console deployment door fitting launcher node painting players process protocol rehearsal replay runtime supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
+FILE ?= deploy/table.yaml
 N ?=
 SEED ?= 17
 
@@ -24,7 +25,7 @@ help:
 	@echo 'make slow    tests of processes on a machine made slow: each start takes 7 s longer, all cores are busy'
 	@echo 'make play    minutes of the table as deployed: goals, hand-overs, matches of its players; law 1 by further seeds'
 	@echo 'make minutes minutes of the table under a thousand faults each: no digest changes; takes hours (ARGS: -k NAME)'
-	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
+	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; FILE: a deployment; ARGS: --seed N, --json)'
 	@echo 'make faults  faults on real processes at random times, with their figures (N=20; ARGS: --seed S, --only KIND)'
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
@@ -55,7 +56,7 @@ machines: environment
 # Compiling takes as long as some hundred seeds: it pays for more.
 MANY := $(shell [ $(SEEDS) -ge 1000 ] && echo many)
 swarm: $(if $(MANY),compiled,environment)
-	@.venv$(if $(MANY),-compiled)/bin/python -m tests.swarm deploy/table.yaml --seeds $(SEEDS) $(ARGS)
+	@.venv$(if $(MANY),-compiled)/bin/python -m tests.swarm $(FILE) --seeds $(SEEDS) $(ARGS)
 
 faults: environment
 	@$(PYTHON) -m tests.faults.campaign --count $(or $(N),20) $(ARGS)

@@ -13,6 +13,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.common.errors import Failed
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.node.tick import Work
@@ -38,9 +39,10 @@ from tests.swarm.faults import (
 from tests.swarm.packet_invariants import PacketLaws
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+LIVING: Final = Path(__file__).parents[1] / "swarm" / "living.yaml"
 MINUTE_TICKS: Final = 30_000
 FIRST: Final = 1001
-SEEDS: Final = 8
+SEEDS: Final = 5
 """The gate flies a dozen more without their bugs."""
 
 
@@ -74,6 +76,13 @@ def test_processes_fly_seeds_as_one_does_and_a_killed_one_is_named(told: dict[st
     with pytest.raises(Failed, match="a process of the swarm was killed; fewer than --jobs 2 need less memory"):
         list(flights)
     assert active_children() == []
+
+
+def test_the_laws_hold_in_a_world_that_lives() -> None:
+    """Jobs over bad links, crates that are held, what comes and goes and is set, and faults that hit just these."""
+    text, files = pin_assets(LIVING.read_text(), LIVING.name, LIVING.parent)
+    flown = fly(text, LIVING.name, 10, files=tuple(files.items()))
+    assert flown.broken == "" and flown.ticks == TICKS and {"strike", "set"} <= {*flown.kinds}
 
 
 def test_the_laws_hold_where_links_make_copies() -> None:

@@ -11,7 +11,7 @@ from foosim.vhub.state.records import Closing
 from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.assembly.grippers import Gripper, grippers_of
 from foosim.world.assembly.volumes import Volumes
-from foosim.world.edits import Disrupt, counters, parked
+from foosim.world.edits import Disrupt, Set, counters, parked
 from foosim.world.forms.jobs import CHANGED, NUMBERS, RUNNING, STATES, JobState
 from foosim.world.forms.per_field import codec_of
 from foosim.world.frame import Frame
@@ -117,9 +117,9 @@ class LivingLaws:
         told = [book.slot(frame, CHANGED)[0] for frame in (before, after)]
         hold(told[1] in (0.0, 1.0), f"{what}: tells of a change as {told[1]}")
         if f"{book.actuator}.target" in entity.offsets:
-            old = {sender: number for sender, (number, _) in zip(book.senders, book.rows(before), strict=False)}
-            late = {place for (sender, number), place in given.items() if number <= old[sender]}
-            fresh = {place for (sender, number), place in given.items() if number > old[sender]}
+            known = {sender: number for sender, (number, _) in zip(book.senders, book.rows(before), strict=False)}
+            late = {place for (sender, number), place in given.items() if number <= known[sender]}
+            fresh = {place for (sender, number), place in given.items() if number > known[sender]}
             was_sent, is_sent = (tuple(book.slot(frame, "target")[:2]) for frame in (before, after))
             again = was_sent != is_sent and is_sent in late - fresh
             hold(not again, f"{what}: a job that came again sends it to {is_sent}")
@@ -141,15 +141,17 @@ class LivingLaws:
         channel = next(field for field, at in both[0].offsets.items() if at == gripper.held).rpartition(".")[0]
         if any((packet.destination, packet.channel) == (both[0].name, channel) for packet in closing.delivered):
             return  # told to open and to close in one tick, it may take the same again
+        names = {entities[index].name for index in (gripper.robot, was) if index >= 0}
+        edits = [edit for edit in closing.edits if not isinstance(edit, Disrupt) and edit.name in names]
+        events = [event for event in self._events.get(before.tick, ()) if event.name in names]
+        spoilt = [name for name in names if after.at(name, QUARANTINED) > 0.0]
         if was == held:
             grasps = [frame.numbers[gripper.grasp : gripper.grasp + 7] for frame in (before, after)]
             hold(held < 0 or grasps[0] == grasps[1], f"{what}, in another way than before")
-            return
-        names = {both[0].name, entities[was].name}
-        changed = {edit.name for edit in closing.edits if not isinstance(edit, Disrupt)}
-        changed |= {event.name for event in self._events.get(before.tick, ())}
-        spoilt = [name for name in names if after.at(name, QUARANTINED) > 0.0]
-        hold(held < 0 and bool(names & changed or spoilt), f"{what} for no reason")
+            is_put = any(isinstance(edit, Set) and edit.field == "position" for edit in edits)
+            hold(held < 0 or not is_put, f"{what}, and one of them was put elsewhere")
+        else:
+            hold(held < 0 and bool(edits or events or spoilt), f"{what} for no reason")
 
     def _islands(self, frame: Frame) -> None:
         """Who holds and what is held are solved together."""

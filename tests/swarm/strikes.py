@@ -11,7 +11,7 @@ from foosim.world.forms.jobs import RUNNING
 from foosim.world.setting.settable import AT, settable
 from tests.swarm.faults import Dice, Fault, ask, end_node, random_tick, revive
 
-VERBS: Final = ("remove", "remove", "down", "at", "push", "add")
+VERBS: Final = ("remove", "remove", "at", "at", "down", "push", "add")
 BACK_TICKS: Final = 15
 """After these ticks what was removed is added again, and who was out of service comes back."""
 
@@ -30,10 +30,11 @@ def busy(system: System) -> list[tuple[str, str]]:
 
 
 def _on_one(place: float, do: Callable[[System, str, str], None]) -> Callable[[System], None]:
-    """Return an action on one that is busy and on what it holds; it does nothing where none is."""
+    """Return an action on one that holds something and on that, else on one that works; it does nothing for none."""
 
     def chosen(system: System) -> None:
         found = busy(system)
+        found = [(robot, held) for robot, held in found if robot != held] or found
         if found:
             do(system, *found[int(place * len(found))])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.capture.reader import open_capture
 from foosim.client import connect
@@ -41,6 +41,15 @@ def yard() -> str:
     )
 
 
+def requests(number: int) -> tuple[tuple[str, dict[str, Any], str, tuple[float, float]], ...]:
+    """Verbs and arguments, the field that each changes, and what it is before and after."""
+    return (
+        ("add", {"name": f"cart-{3 + number}"}, "absent", (1.0, 0.0)),
+        ("remove", {"name": f"cart-{number}"}, "absent", (0.0, 1.0)),
+        ("set", {"name": "fire", "field": "radius", "value": f"{number} m"}, "radius", (number - 1.0, float(number))),
+    )
+
+
 def test_what_was_answered_takes_effect_at_its_tick_whoever_is_killed_before(house: House) -> None:
     """An addition, a removal and a setting are requested and a job is called while the run waits for the client, and a
     process is killed before it goes on."""
@@ -58,12 +67,7 @@ def test_what_was_answered_takes_effect_at_its_tick_whoever_is_killed_before(hou
             if tick not in VICTIMS:
                 continue
             number = len(jobs) + 1
-            fire = {"name": "fire", "field": "radius", "value": f"{number} m"}
-            for verb, arguments, field, values in (
-                ("add", {"name": f"cart-{3 + number}"}, "absent", (1.0, 0.0)),
-                ("remove", {"name": f"cart-{number}"}, "absent", (0.0, 1.0)),
-                ("set", fire, "radius", (number - 1.0, float(number))),
-            ):
+            for verb, arguments, field, values in requests(number):
                 answer = control.ask(verb, LIMIT_S, **arguments)
                 assert answer.tick >= tick, "the run waits"
                 effects.append((answer.tick, arguments["name"], field, values))
