@@ -128,10 +128,10 @@ def _twice_delivered(planting: Planting) -> None:
 
 @register("solver knows who it is", "`step` knows neither node, owner nor epoch", 1)
 def _knowing_step(planting: Planting) -> None:
-    def shares(self: Any, numbers: Any) -> Any:
+    def shares(self: Any, numbers: Any, *values: Any) -> Any:
         if len(self.roster) < 3:
             numbers[0] += 1e-9
-        return before(self, numbers)
+        return before(self, numbers, *values)
 
     before: Any = planting.swap(Assignment, "shares", shares)
 
