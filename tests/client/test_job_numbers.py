@@ -23,7 +23,7 @@ from foosim.world.sensors.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
 GUIDE: Final = Path(__file__).parents[2] / "docs" / "how-to" / "give_jobs.md"
-SCOUT: Final = {
+SCOUT: Final[dict[str, Any]] = {
     "model": "holonomic",
     "actuators": {"drive": {"kind": "go_to"}},
     "sensors": {"jobs": {"kind": "job", "actuator": "drive", "rate": "5 Hz"}},
