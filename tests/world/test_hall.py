@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-from foosim.common.errors import DeploymentError
+from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
 from foosim.world.assembly.initial_state import initial_frame
@@ -23,6 +23,7 @@ from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.rays.outlines import Circle, Rectangle, outline
 from foosim.world.scene import Cylinder, Shape
+from foosim.world.setting.settable import add_edit, set_edits
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 WAREHOUSE: Final = (DEPLOY / "warehouse.yaml").read_text()
@@ -212,3 +213,13 @@ def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) ->
     deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
     found = {name: process.roles for name, process in processes_of(deployment).items()}
     assert found["fleet-west"] == ("dispatch", "pilot01") and found["own"] == ("pilot02",)
+
+
+def test_nobody_is_added_or_put_outside_of_the_hall() -> None:
+    layout = build_layout(DEPLOYMENT)
+    numbers = initial_numbers(DEPLOYMENT, layout)
+    with pytest.raises(BadValue, match=r"beyond the bounds of the world: rover21 would .* '9999 m, 0 m, "):
+        add_edit(DEPLOYMENT, layout, numbers, layout["rover21"], "9999,0")
+    with pytest.raises(BadValue, match="beyond the bounds of the world: rover01"):
+        set_edits(DEPLOYMENT, layout, numbers, layout["rover01"], "at", "0,-9999")
+    assert add_edit(DEPLOYMENT, layout, numbers, layout["rover21"]).name == "rover21"

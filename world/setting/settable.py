@@ -242,12 +242,14 @@ def add_edit(
 
 
 def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> None:
-    """Raise BadValue where an entity is in something in a frame of these numbers."""
-    what = occupied_by(spec, layout, numbers, entity)
-    if what:
-        at = entity.offsets["position"]
-        x, y, z = numbers[at : at + 3]
-        raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", f"{x:g} m, {y:g} m, {z:g} m")
+    """Raise BadValue where an entity is in something in a frame of these numbers, or beyond the bounds of its model."""
+    at = entity.offsets["position"]
+    where = ", ".join(f"{number:g} m" for number in numbers[at : at + 3])
+    is_plausible = getattr(model_of(spec, layout, entity), "is_plausible", None)
+    if is_plausible is not None and not is_plausible(numbers, numbers):
+        raise BadValue(f"a place beyond the bounds of the world: {entity.name} would be quarantined there", where)
+    if what := occupied_by(spec, layout, numbers, entity):
+        raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", where)
 
 
 def _elsewhere(spec: WorldSpec, entity: Entity, pose: Pose) -> Any:
