@@ -77,6 +77,8 @@ class System:
         self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
+        self._simulation = b""
+        """The fingerprint of the engine, once a node has built one."""
         self._run = settings
         self.journal: list[bytes] = []
         """The supervisor's, where it may be started again."""
@@ -137,11 +139,12 @@ class System:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
         core.is_watched = self.settings.is_watched
-        # The small run compares machines, and here is one; in a check of components these are called in it, too.
-        solver = self.solvers[name] = Solver(core, self.settings.factory, b"" if core.is_watched else fingerprint)
+        # The processes of a rehearsal are one: the small run of one node is that of all.
+        solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 
         def turn(now_ns: int) -> None:
             solver.build()
+            self._simulation = self._simulation or solver.fingerprint
             core.advance(now_ns)
             while core.work is not None:
                 solver.solve(core.work)

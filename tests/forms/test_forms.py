@@ -29,16 +29,16 @@ from tests.frames import Frames, broken_laws
 Key = tuple[str, ...]
 TICKS: Final = 100
 NAME: Final = "world.yaml"
-OF_FILES: Final = [
-    *(("model", "urdf"), ("actuator", "joint_torque"), ("actuator", "look_at"), ("actuator", "pan_tilt")),
-]
-"""What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py and test_jobs.py have
-these."""
+HEADS: Final = {("actuator", "look_at"), ("actuator", "pan_tilt")}
+"""What turns heads: tests/laws/test_jobs.py has the laws of these."""
+OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque"), *HEADS]
+"""What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has the others."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
 ALONE: Final = {
     *(("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")),
-    *(("actuator", "go_to"), ("actuator", "gripper"), ("sensor", "gripper_state"), ("sensor", "job")),
+    *(("actuator", "go_to"), ("actuator", "gripper"), ("actuator", "joint_trajectory")),
+    *(("sensor", "gripper_state"), ("sensor", "job")),
 }
 """What no mixed world has: each has one engine and one scene, and none has grippers and jobs."""
 EACH_ALONE: Final = pytest.mark.parametrize(
