@@ -74,8 +74,8 @@ class Acting:
         """The (endpoint, channel) that it subscribes to."""
         self._deployment = deployment
         self._load = load
-        self._since: int | None = None
-        """The tick since which the player exists, once it has acted."""
+        self._known: tuple[int | str, ...] = ()
+        """The tick since which the player exists, and its robots that are absent, once it has acted."""
         self.player = self._make(tick)
         self._encoder = CommandEncoder(deployment)
         self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in self.hears})
@@ -85,10 +85,13 @@ class Acting:
 
         It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
         """
-        if self._since not in (None, since):
+        asked = since, *absent
+        if asked == self._known:
+            return
+        if self._known and self._known[0] != since:
             self.player = self._make(tick)
             self.newest.samples = {}
-        self._since = since
+        self._known = asked
         self.player.robots = tuple([name for name in sorted(self.declared.robots) if name not in absent])
 
     def _make(self, tick: int) -> Player:

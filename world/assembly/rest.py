@@ -88,8 +88,8 @@ def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> N
         for entity in before.layout.resting:
             numbers[entity.offsets[STILL_TICKS]] = 0.0
     for entity in before.layout.resting:
-        at = entity.offsets[STILL_TICKS]
-        if numbers[at] == 0.0:
+        at, first, last = entity.offsets[STILL_TICKS], entity.start, entity.stop
+        if numbers[at] == 0.0 or numbers[first:last] == old[first:last]:
             continue
         for field in entity.fields:
             here, count = entity.offsets[field], entity.counts[field]

@@ -122,16 +122,14 @@ class PayloadCodec:
             except (TypeError, ValueError, OverflowError) as error:
                 raise BadValue(f"{self.name}: {error}", value) from None
         numbers = self.numbers(value)
-        if not self._many and FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers)):
-            payload = self._packed.pack(*numbers)
-            return payload[:-8] if self.has_job and numbers[-1] == 0.0 else payload
         more = (len(numbers) - len(self.fields) + self._many) // self._many if self._many else 0
         if self._many and not self._least <= more <= self._most:
             last = self.fields[-1].name
             raise BadValue(f"{self.name}.{last} is not {self._least} to {self._most} numbers", more)
-        for place, number in enumerate(numbers):
-            self._check(field_at(self.fields, len(numbers), place).name, number)
-        payload = struct.pack(f"<{len(numbers)}d", *numbers)
+        if not (FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers))):
+            for place, number in enumerate(numbers):
+                self._check(field_at(self.fields, len(numbers), place).name, number)
+        payload = struct.pack(f"<{len(numbers)}d", *numbers) if self._many else self._packed.pack(*numbers)
         return payload[:-8] if self.has_job and payload[-8:] == PLAIN else payload
 
     def encode_checked(self, value: Any) -> bytes:
