@@ -210,6 +210,18 @@ def test_a_robot_that_is_down_keeps_what_it_holds() -> None:
         assert held(made) == "crate" and vector(made, "crate", "position")[2] == pytest.approx(0.6, abs=0.005)
 
 
+def test_without_power_for_its_drives_a_gripper_does_its_jobs() -> None:
+    """What a job is said to have ended as is what the gripper has done."""
+    with at_crate(robots={"a": {**crane(0.0), "rules": {"battery": {"kind": "battery", "capacity": "1 J"}}}}) as made:
+        made.set("a", "battery.charge", "0 %")
+        made.step()
+        for job, closed, holding in ((1.0, 1.0, "crate"), (2.0, 0.0, "")):
+            made.step({"a": {"gripper": Grip(closed, job)}})
+            made.step()
+            assert held(made) == holding
+            assert made.frame.vector("a", "gripper.jobs_states", 1) == [JobState.DONE]
+
+
 def test_what_is_put_elsewhere_is_let_go() -> None:
     with at_crate() as made:
         made.step({"a": {"gripper": (1.0,)}})

@@ -473,7 +473,7 @@ class World:
             if entity.index in self.having_jobs:
                 for one in self.actuators[entity.index]:
                     if one.jobs is not None and not one.jobs.is_idle(view):
-                        one.judge_job(view, has_power=self._has_power(entity, view))
+                        one.judge_job(view, has_power=not one.moves or self._has_power(entity, view))
 
     def are_plausible(
         self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
