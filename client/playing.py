@@ -85,7 +85,7 @@ class Acting:
 
         It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
         """
-        asked = since, *absent
+        asked: tuple[int | str, ...] = (since, *absent)
         if asked == self._known:
             return
         if self._known and self._known[0] != since:

@@ -123,9 +123,11 @@ class Episodes:
         for pair, (agent, jobs) in self._jobs.items():
             if jobs.job is None or jobs.job.state.has_ended or not self.simulation.agents[agent].exists:
                 continue
+            for name, its in packets.items():
+                packets[name] = [one for one in its if (one.destination, one.channel) != pair]
             payload = jobs.payload(self.simulation.tick)
-            kept = [one for one in packets.get(agent, ()) if (one.destination, one.channel) != pair]
-            packets[agent] = kept if payload is None else [*kept, Packet(*pair, payload)]
+            if payload is not None:
+                packets.setdefault(agent, []).append(Packet(*pair, payload))
 
     def _hear(self) -> None:
         """Let jobs hear of how they stand."""

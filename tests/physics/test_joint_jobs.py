@@ -21,6 +21,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.simulation import Simulation
+from foosim.world.actuators.joints.joint_trajectory import JointTrajectory, TrajectoryFailure
 from foosim.world.components.fitted import actuators_of
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
@@ -155,28 +156,44 @@ def test_an_arm_follows_within_a_milliradian() -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "rows", "why"),
+    ("failure", "times", "rows", "why"),
     [
-        ((1.0, 1.0), ((0.1, 0.1), (0.2, 0.2)), "its times do not rise"),
-        ((1.0, 0.5), ((0.1, 0.1), (0.2, 0.2)), "its times do not rise"),
-        ((1.0,), ((0.1,),), "1 positions at a time: one for each of 2 joints is valid"),
-        ((1.0,), ((0.1, 0.1, 0.1),), "3 positions at a time: one for each of 2 joints is valid"),
-        ((1.0,), ((0.1, 0.1), (0.2, 0.2)), "1 times and positions at 2: as many are valid, 1 to 3"),
-        ((), (), "0 times and positions at 0: as many are valid, 1 to 3"),
-        ((1.0, 2.0, 3.0, 4.0), ((0.1, 0.1),) * 4, "4 times and positions at 4: as many are valid, 1 to 3"),
-        ((9.0,), ((0.1, 1.3),), "joint of skull to 1.3, beyond its limits -1.2 to 1.2"),
-        ((0.5,), ((1.5, 0.0),), ""),
-        ((1.0, 1.2), ((0.0, 0.0), (0.0, 0.6)), ""),
+        (TrajectoryFailure.TIMES, (1.0, 1.0), ((0.1, 0.1), (0.2, 0.2)), "its times do not rise"),
+        (TrajectoryFailure.TIMES, (1.0, 0.5), ((0.1, 0.1), (0.2, 0.2)), "its times do not rise"),
+        (TrajectoryFailure.JOINTS, (1.0,), ((0.1,),), "1 positions at a time: one for each of 2 joints is valid"),
+        (
+            TrajectoryFailure.JOINTS,
+            (1.0,),
+            ((0.1, 0.1, 0.1),),
+            "3 positions at a time: one for each of 2 joints is valid",
+        ),
+        (
+            TrajectoryFailure.POINTS,
+            (1.0,),
+            ((0.1, 0.1), (0.2, 0.2)),
+            "1 times and positions at 2: as many are valid, 1 to 3",
+        ),
+        (TrajectoryFailure.POINTS, (), (), "0 times and positions at 0: as many are valid, 1 to 3"),
+        (
+            TrajectoryFailure.POINTS,
+            (1.0, 2.0, 3.0, 4.0),
+            ((0.1, 0.1),) * 4,
+            "4 times and positions at 4: as many are valid, 1 to 3",
+        ),
+        (TrajectoryFailure.LIMITS, (9.0,), ((0.1, 1.3),), "joint of skull to 1.3, beyond its limits -1.2 to 1.2"),
+        (TrajectoryFailure.SPEED, (0.5,), ((1.5, 0.0),), ""),
+        (TrajectoryFailure.SPEED, (1.0, 1.2), ((0.0, 0.0), (0.0, 0.6)), ""),
     ],
 )
 def test_what_no_joint_can_follow_is_refused_and_its_job_fails(
-    its: Simulation, times: Any, rows: Any, why: str
+    its: Simulation, failure: TrajectoryFailure, times: Any, rows: Any, why: str
 ) -> None:
-    """The last two are too fast; what went on does not, for another job has come."""
+    """What went on does not, for another job has come."""
     assert tell(its, "arm", value("joint_trajectory", (0.5,), ((0.2, 0.1),), 1.0), 3) == JobState.RUNNING
     command, before = value("joint_trajectory", times, rows, 2.0), its.frame.vector("arm", "go.times", 3)
     assert tell(its, "arm", command, 2) == JobState.FAILED
     assert its.frame.at("arm", "refused") == 1.0
+    assert its.frame.at("arm", "go.failure") == failure and JointTrajectory.FAILURES[failure]
     assert its.frame.vector("arm", "go.times", 3) == before
     (fitted,) = actuators_of(heads(), layout := build_layout(heads()), layout["arm"])
     assert fitted.examine(fitted.codec.encode(command)) == (why, ())
@@ -215,6 +232,8 @@ def test_what_is_in_the_way_of_a_head_fails_its_job(kind: str, command: Any, fai
         assert tell(its, "head", value(kind, *command), failed - 20) == JobState.RUNNING
         its.advance({}, 40)
         assert its.frame.at("head", "go.jobs_states") == JobState.FAILED
+        if kind == "joint_trajectory":
+            assert its.frame.at("head", "go.failure") == TrajectoryFailure.LATE
         held = its.frame.vector("head", "joint_positions", 2)
         assert 0.1 < held[0] < 1.4
         its.advance({}, 20)

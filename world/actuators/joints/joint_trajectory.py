@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import IntEnum
 from itertools import pairwise
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from msgspec import Meta, Struct
 from pydantic import Field
@@ -13,7 +14,7 @@ from foosim.common.spec_base import default
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
-from foosim.world.forms.jobs import JobState
+from foosim.world.forms.jobs import FAILURE, JobState
 from foosim.world.forms.quantities import JobNumber
 from foosim.world.forms.registry import actuator
 from foosim.world.moving.progress import Patience
@@ -22,6 +23,18 @@ from foosim.world.parameters.joints import JointGroup, JointLoopSettings, Positi
 
 POINTS_MAX: Final = 256
 Time = Annotated[float, Meta(gt=0.0, le=1e6, extra={"unit": "s"})]
+
+
+class TrajectoryFailure(IntEnum):
+    """Why joints do not follow, or have not followed, the way that they were told last."""
+
+    NONE = 0
+    POINTS = 1
+    TIMES = 2
+    JOINTS = 3
+    LIMITS = 4
+    SPEED = 5
+    LATE = 6
 
 
 class JointTrajectorySettings(JointLoopSettings):
@@ -51,7 +64,14 @@ class Trajectory(Struct, frozen=True):
 def _slots(settings: JointTrajectorySettings, carrier: Carrier) -> Mapping[str, int]:
     found = loop_points(settings, carrier)
     joints = found["set_point"]
-    return {**found, "begun": 1, "count": 1, "times": settings.points, "positions": settings.points * joints}
+    return {
+        **found,
+        "begun": 1,
+        "count": 1,
+        FAILURE: 1,
+        "times": settings.points,
+        "positions": settings.points * joints,
+    }
 
 
 @actuator(
@@ -69,10 +89,19 @@ class JointTrajectory:
     `set_point` is where its way began; without points it is where the joints stay.
     """
 
+    FAILURES: ClassVar = {
+        TrajectoryFailure.POINTS: "it has no points, more than the actuator takes, or not as many positions as times",
+        TrajectoryFailure.TIMES: "its times do not rise",
+        TrajectoryFailure.JOINTS: "it has not one position for each joint",
+        TrajectoryFailure.LIMITS: "a position is beyond the limits of its joint",
+        TrajectoryFailure.SPEED: "a joint would have to be faster than its limit",
+        TrajectoryFailure.LATE: "the joints are not where it ends after the patience of the actuator",
+    }
+
     def __init__(self, settings: JointTrajectorySettings, at: Mounting) -> None:
         self._group, self._gain = JointGroup(settings, at), settings.gain
         self._begun, self._count = at.slot("begun"), at.slot("count")
-        self._times, self._positions = at.slot("times"), at.slot("positions")
+        self._times, self._positions, self._failure = at.slot("times"), at.slot("positions"), at.slot(FAILURE)
         self._tolerance, self._tick_s = settings.tolerance, at.spec.tick_ns / 1e9
         self._patience_s = settings.patience_ns / 1e9
 
@@ -87,30 +116,38 @@ class JointTrajectory:
 
     def problem(self, command: Trajectory) -> str:
         """Return why a command is refused wherever the joints are; empty for one that is not."""
+        return self._refusal(command)[1]
+
+    def _refusal(self, command: Trajectory) -> tuple[TrajectoryFailure, str]:
         group, times, rows = self._group, command.times, command.positions
         if not 1 <= len(times) <= self._times.size or len(rows) != len(times):
-            return f"{len(times)} times and positions at {len(rows)}: as many are valid, 1 to {self._times.size}"
+            what = f"{len(times)} times and positions at {len(rows)}: as many are valid, 1 to {self._times.size}"
+            return TrajectoryFailure.POINTS, what
         if not all(before < time for before, time in pairwise(times)):
-            return "its times do not rise"
+            return TrajectoryFailure.TIMES, "its times do not rise"
         for row in rows:
             if len(row) != len(group.names):
-                return f"{len(row)} positions at a time: one for each of {len(group.names)} joints is valid"
+                what = f"{len(row)} positions at a time: one for each of {len(group.names)} joints is valid"
+                return TrajectoryFailure.JOINTS, what
             for name, low, position, high in zip(group.names, group.lows, row, group.highs, strict=True):
                 if not low <= position <= high:
-                    return f"{name} to {position:g}, beyond its limits {low:g} to {high:g}"
-        return ""
+                    what = f"{name} to {position:g}, beyond its limits {low:g} to {high:g}"
+                    return TrajectoryFailure.LIMITS, what
+        return TrajectoryFailure.NONE, ""
 
     def accept(self, command: Trajectory, view: WritableView) -> bool:
         """Take points; False: they are none, or a joint cannot be as fast."""
-        if self.problem(command):
-            return False
-        group, times = self._group, (0.0, *command.times)
-        start = group.positions(view)
-        ways = zip(start, *command.positions, strict=True)
-        if not all(fastest(times, way) <= most for way, most in zip(ways, group.speeds, strict=True)):
+        failure, _ = self._refusal(command)
+        start, times = self._group.positions(view), (0.0, *command.times)
+        if failure == TrajectoryFailure.NONE:
+            ways = zip(start, *command.positions, strict=True)
+            if not all(fastest(times, way) <= most for way, most in zip(ways, self._group.speeds, strict=True)):
+                failure = TrajectoryFailure.SPEED
+        view.write(self._failure, failure)
+        if failure != TrajectoryFailure.NONE:
             return False
         numbers = [position for row in command.positions for position in row]
-        view.write(group.set_point, *start)
+        view.write(self._group.set_point, *start)
         view.write(self._begun, view.tick)
         view.write(self._count, len(command.times))
         view.write(self._times, *command.times, *[0.0] * (self._times.size - len(command.times)))
@@ -135,7 +172,10 @@ class JointTrajectory:
         left = [abs(way[-1] - at) for way, at in zip(ways, self._group.positions(view), strict=True)]
         if max(left) <= self._tolerance:
             return JobState.DONE
-        return JobState.FAILED if over_s >= self._patience_s else JobState.RUNNING
+        if over_s < self._patience_s:
+            return JobState.RUNNING
+        view.write(self._failure, TrajectoryFailure.LATE)
+        return JobState.FAILED
 
     def _way(self, view: View) -> tuple[tuple[float, ...], list[tuple[float, ...]]]:
         """Return times (s), from 0 on, and for each joint its positions at these."""
