@@ -112,7 +112,7 @@ class Stepper:
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
         self._due = DueSensors((), self._sensors, self._switches)
-        self._sensing = Sensing()
+        self._sensing = Sensing([one for its in self._sensors.values() for one in its])
         self._waiting = [
             (layout.entities[index], one)
             for index, actuators in sorted(self.world.actuators.items())

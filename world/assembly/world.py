@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, Final, NamedTuple
 
@@ -25,6 +25,7 @@ from foosim.world.components.entities import (
     mounting_of,
 )
 from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.together import Together
 from foosim.world.components.view import (
     ComponentError,
     Mounting,
@@ -268,6 +269,11 @@ class World:
                     self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
+        kinds: dict[Hashable, list[Any]] = {}
+        for index, one in self._only.items():
+            kinds.setdefault((self._motion_of.get(index), type(one.actuator)), []).append(one.actuator)
+        self._asking = Together(kinds)
+        """The actuators that may be asked together, by motion and class."""
         self._checks: Mapping[int, Callable[[Sequence[float], Sequence[float]], bool]] = {
             index: check
             for index, model in self.models.items()
@@ -353,8 +359,7 @@ class World:
             or any(entity.index in self._powers for entity in entities)
         ):
             return None
-        made: Any = actuators[0]
-        return called(f"actuators of the motion {motion}", "", 0, made.together, actuators)
+        return self._asking.of((motion, kinds.pop()), actuators, f"actuators of the motion {motion}", 0)
 
     def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
         """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""

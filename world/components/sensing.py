@@ -5,7 +5,7 @@ Sensors that are due at one tick are due together again, so what is put together
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, cast
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue, NotFinite
 from foosim.world.components.fitted import FittedSensor
-from foosim.world.components.view import SensingView, called, component_error, has_together
+from foosim.world.components.together import Together
+from foosim.world.components.view import SensingView, component_error, has_together
 from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.payloads import as_floats
 
@@ -31,10 +32,15 @@ PLANS_MAX: Final = 64
 
 
 class Sensing:
-    """Samples the sensors of one layout."""
+    """Samples any of the sensors of one layout, which are `everyone`."""
 
-    def __init__(self) -> None:
+    def __init__(self, everyone: Sequence[FittedSensor]) -> None:
         self._plans: dict[tuple[FittedSensor, ...], Plan] = {}
+        kinds: dict[Hashable, list[Any]] = {}
+        for its in everyone:
+            for one in (its.sensor, *[one.modifier for one in its.modifiers]):
+                kinds.setdefault((type(one), its.size), []).append(one)
+        self._known = Together(kinds)
 
     def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
@@ -46,7 +52,7 @@ class Sensing:
         if plan is None:
             while len(self._plans) >= PLANS_MAX:
                 self._plans.pop(next(iter(self._plans)))
-            plan = self._plans[key] = Plan(fitted, view.tick)
+            plan = self._plans[key] = Plan(fitted, view.tick, self._known)
         return plan.sample(view)
 
 
@@ -65,8 +71,8 @@ class _Group:
 class Plan:
     """What is done for one set of sensors, in which order. Raises ComponentError."""
 
-    def __init__(self, fitted: Sequence[FittedSensor], tick: int) -> None:
-        self._fitted, self._tick = tuple(fitted), tick
+    def __init__(self, fitted: Sequence[FittedSensor], tick: int, known: Together) -> None:
+        self._fitted, self._tick, self._known = tuple(fitted), tick, known
         everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
         self._together, self._alone = self._divided(everyone, "sensor", 0)
         depth = max((len(one.modifiers) for one in fitted), default=0)
@@ -104,11 +110,9 @@ class Plan:
             what = f"{form} {names}{', ...' * (len(its) > NAMED_MAX)}"
             places = [place for place, _ in its]
             is_last = not any(self._fitted[place].modifiers for place in places)
-            groups.append(_Group(places, self._put_together(kind, its, what), size, what, is_last))
+            made = self._known.of((kind, size), [one for _, one in its], what, self._tick)
+            groups.append(_Group(places, made, size, what, is_last))
         return groups, sorted(alone)
-
-    def _put_together(self, kind: Any, members: Sequence[tuple[int, Any]], what: str) -> Any:
-        return called(what, "", self._tick, kind.together, [one for _, one in members])
 
     def sample(self, view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor, None of a reading that is dropped. Raises ComponentError."""
