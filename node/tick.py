@@ -112,7 +112,7 @@ class Stepper:
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
         self._due = DueSensors((), self._sensors, self._switches)
-        self._sensing = Sensing([one for its in self._sensors.values() for one in its])
+        self._sensing = Sensing()
         self._waiting = [
             (layout.entities[index], one)
             for index, actuators in sorted(self.world.actuators.items())
@@ -136,7 +136,7 @@ class Stepper:
             self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers, frame.values)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
-        payloads = self._sensing.sample(turn.sensors, view)
+        payloads = self._sensing.sample(turn.sensors, view, turn.whole, turn.rows)
         for at in turn.counters:
             view.written[at] = numbers[at] + 1.0
         self.not_finite.update(f"{one.robot} {one.channel}" for one in view.not_finite)

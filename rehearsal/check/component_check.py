@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
 
+import numpy as np
+
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
@@ -24,8 +26,7 @@ from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.world import World, asked_together
 from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.together import Together
-from foosim.world.components.view import ComponentError, SensingView, View, called, has_together
+from foosim.world.components.view import ComponentError, SensingView, View, called, has_together, some_together
 from foosim.world.components.watching import ReadOnly
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Form
@@ -212,7 +213,7 @@ class _Fitted:
         self._deployment = load_deployment(text, name).with_assets(files)
         layout = build_layout(self._deployment)
         self._sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
-        self.sensing = Sensing(self._sensors)
+        self.sensing = Sensing()
         self.together = _together(self._deployment, layout)
         """The actuators that can be asked together, by motion and class, in the order of their robots."""
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
@@ -256,7 +257,8 @@ class _Compared:
         """
         numbers, due = ReadOnly(frame.numbers), fitted.due(frame)
         view = SensingView(frame.tick, numbers, frame.values)
-        together = fitted.sensing.sample(due[::-1], view)[::-1]
+        rows = np.arange(len(due))[::-1]
+        together = fitted.sensing.sample(due[::-1], view, tuple(due), rows)[::-1]
         labels = [f"sensor {one.channel} of {one.robot}" for one in due]
         self.sampled.update(labels)
         self.not_finite.update(f"sensor {one.channel} of {one.robot}" for one in view.not_finite)
@@ -274,7 +276,8 @@ class _Compared:
         view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
         members = [one.actuator for one in actuators]
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
-        together = Together({what: members}).of(what, members[::-1], what, frame.tick)
+        made = called(what, "", frame.tick, type(members[0]).together, members)  # type: ignore[attr-defined]
+        together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
         asked = asked_together(what, together, len(actuators), view)[::-1]
         for one, its in zip(actuators, asked.tolist(), strict=True):
             label = f"actuator {one.channel} of {one.robot}"

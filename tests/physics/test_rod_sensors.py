@@ -29,7 +29,7 @@ def read(one: Driven, channel: str, robot: str | None = None) -> Any:
     entity = one.layout[robot or one.rod.name]
     (fitted,) = [sensor for sensor in sensors_of(one.deployment, one.layout, entity) if sensor.channel == channel]
     kind = one.deployment.robots[entity.name].sensors[channel].kind
-    (payload,) = Sensing([fitted]).sample([fitted], SensingView(one.tick, one.numbers))
+    (payload,) = Sensing().sample([fitted], SensingView(one.tick, one.numbers))
     return None if payload is None else codec_of(kind, "sensor").decode(payload)
 
 

@@ -77,7 +77,7 @@ class Reader:
     def read(self, tick: int) -> tuple[float, ...]:
         """Return the numbers of a reading; what the sensor remembers is kept."""
         view = SensingView(tick, self.numbers)
-        (payload,) = Sensing([self.sensor]).sample([self.sensor], view)
+        (payload,) = Sensing().sample([self.sensor], view)
         assert payload is not None
         for place, number in view.written.items():
             assert self.entity.split <= place < self.entity.stop, "an owner's slot"

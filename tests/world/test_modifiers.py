@@ -47,7 +47,7 @@ class Rod:
         self.entity = self.layout["red.goal"]
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.stepper = Stepper(self.deployment, self.layout)
-        self._sensing = Sensing([self.sensor])
+        self._sensing = Sensing()
 
     @property
     def sensor(self) -> FittedSensor:
@@ -165,7 +165,7 @@ def test_another_frame_has_points_moved_and_turned() -> None:
     at = layout["ball"].offsets["position"]
     numbers[at : at + 3] = 1.5, 2.25, 3.125
     (camera,) = sensors_of(deployment, layout, layout["camera"])
-    (payload,) = Sensing([camera]).sample([camera], SensingView(0, numbers))
+    (payload,) = Sensing().sample([camera], SensingView(0, numbers))
     assert payload is not None
     assert struct.unpack("<3d", payload) == pytest.approx((0.25, -0.5, 0.125))
 

@@ -47,14 +47,14 @@ def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> Fit
 
 
 def sampled(one: FittedSensor, numbers: list[float], tick: int) -> bytes:
-    (payload,) = Sensing([one]).sample([one], SensingView(tick, numbers))
+    (payload,) = Sensing().sample([one], SensingView(tick, numbers))
     assert payload is not None
     return payload
 
 
 def samples(robot: str, channel: str, numbers: list[float], deployment: Deployment = DEPLOYMENT) -> list[list[float]]:
     one = fitted(robot, channel, deployment)
-    sensing = Sensing([one])
+    sensing = Sensing()
     drawn = [payload for tick in range(COUNT) for payload in sensing.sample([one], SensingView(tick, numbers))]
     return [list(struct.unpack(f"<{len(raw) // 8}d", raw)) for raw in drawn if raw is not None]
 

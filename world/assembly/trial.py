@@ -177,7 +177,7 @@ def _check_body(model: Model, entity: Entity) -> None:
 def _check_readings(sensors: Sequence[FittedSensor], numbers: Sequence[float]) -> None:
     view = SensingView(TICK, ReadOnly(numbers), np.array(numbers))
     view.values.setflags(write=False)
-    for one, payload in zip(sensors, Sensing(sensors).sample(sensors, view), strict=True):
+    for one, payload in zip(sensors, Sensing().sample(sensors, view), strict=True):
         if payload is not None:
             called(f"sensor {one.channel}", one.robot, TICK, one.codec.decode, payload)
 

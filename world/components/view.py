@@ -157,6 +157,17 @@ class Rows:
         return found
 
 
+def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows: NDArray[np.intp]) -> Any:
+    """Return what some of several components are together, by their rows; `made` is what all of them are.
+
+    It is taken from that where that can be. Raises ComponentError, which names them as `what`.
+    """
+    if hasattr(made, "taken"):
+        return called(what, "", tick, made.taken, rows)
+    some = [members[row] for row in rows.tolist()]
+    return called(what, "", tick, type(some[0]).together, some)
+
+
 class SlotReadings(Rows):
     """The readings of several sensors that are numbers of the frame as they are: read as one array."""
 
