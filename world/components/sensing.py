@@ -58,7 +58,7 @@ class Sensing:
                 plan = Plan(key, view.tick)
             else:
                 planned = self._wholes.get(whole) or _keep(self._wholes, whole, Plan(whole, view.tick))
-                plan = planned.taken(key, rows, view.tick)
+                plan = planned if key == whole else planned.taken(key, rows, view.tick)
             _keep(self._plans, key, plan)
         return plan.sample(view)
 
