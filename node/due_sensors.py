@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import compress
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -26,6 +27,24 @@ class Turn(NamedTuple):
     """Robot, number among its packets and channel of each reading, where none is dropped."""
     counters: tuple[int, ...]
     """The places of the numbers that count the samples."""
+    whole: Sensors = ()
+    rows: NDArray[np.intp] | None = None
+    """Those that were due were all robots in service, and which of them the sensors are; None where not all of a robot
+    in service is switched on."""
+
+    def taken(self, is_there: NDArray[np.bool_]) -> Turn:
+        """Return that of some of the robots, with all of their sensors that are due."""
+        robots, counts = is_there.tolist(), [len(its) for _, its in self.robots]
+        measures = np.repeat(is_there, counts)
+        chosen = measures.tolist()
+        return Turn(
+            tuple(compress(self.robots, robots)),
+            tuple(compress(self.sensors, chosen)),
+            tuple(compress(self.heads, chosen)),
+            tuple(compress(self.counters, chosen)),
+            self.sensors,
+            measures.nonzero()[0],
+        )
 
 
 class DueSensors:
@@ -51,11 +70,11 @@ class DueSensors:
         everyone = [one for its in self._sensors for one in its]
         self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
-        self._due: dict[tuple[bool, ...], list[Sensors]] = {}
-        """What is due of each robot, whoever is in service."""
+        self._due: dict[tuple[bool, ...], Turn] = {}
+        """Those of all robots, whoever is in service."""
         self._turns: dict[tuple[bool, ...], Turn] = {}
         """Of those who are in service now."""
-        self._states = np.array([*self._down, *self._inactive], np.intp)
+        self._states = np.array([self._down, self._inactive], np.intp)
         """The places that say who is out of service, and what is switched off."""
         self._out = b""
         """What they had when the turns were made."""
@@ -64,8 +83,9 @@ class DueSensors:
         """Return who measures at a tick, at whose start the numbers of the frame are these; `values` are the same."""
         value = numbers.__getitem__
         if any(map(value, self._speaks)):
-            return self._turn(self._due_at(tick, numbers), numbers)
-        out = values[self._states].tobytes()
+            return self._turn(self._in_service(self._due_at(tick, numbers), numbers))
+        states = values[self._states]
+        out = states.tobytes()
         if out != self._out:
             self._turns, self._out = {}, out
         due = tuple([(tick * step + shift) % period < step for step, shift, period in self._schedules])
@@ -73,22 +93,29 @@ class DueSensors:
         if turn is None:
             while len(self._turns) >= TURNS_MAX:
                 self._turns.pop(next(iter(self._turns)))
-            turn = self._turns[due] = self._turn(self._known(due, tick, numbers), numbers)
+            whole = self._known(due, tick, numbers)
+            is_there = states[0] == 0.0
+            if states[1][is_there].any():
+                turn = self._turn(self._in_service([its for _, its in whole.robots], numbers))
+            else:
+                turn = whole.taken(is_there)
+            self._turns[due] = turn
         return turn
 
-    def _known(self, due: tuple[bool, ...], tick: int, numbers: Sequence[float]) -> list[Sensors]:
+    def _known(self, due: tuple[bool, ...], tick: int, numbers: Sequence[float]) -> Turn:
         found = self._due.get(due)
         if found is None:
             while len(self._due) >= TURNS_MAX:
                 self._due.pop(next(iter(self._due)))
-            found = self._due[due] = self._due_at(tick, numbers)
+            found = self._due[due] = self._turn(zip(self.robots, self._due_at(tick, numbers), strict=True))
         return found
 
     def _due_at(self, tick: int, numbers: Sequence[float]) -> list[Sensors]:
         return [tuple([one for one in its if one.is_due(tick, numbers)]) for its in self._sensors]
 
-    def _turn(self, due: Sequence[Sensors], numbers: Sequence[float]) -> Turn:
-        robots = tuple(self._in_service(due, numbers))
+    @staticmethod
+    def _turn(due: Iterable[tuple[Entity, Sensors]]) -> Turn:
+        robots = tuple(due)
         sensors = tuple([one for _, its in robots for one in its])
         heads = tuple([(robot.name, number, one.channel) for robot, its in robots for number, one in enumerate(its)])
         return Turn(robots, sensors, heads, tuple([one.samples_at for one in sensors]))

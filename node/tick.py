@@ -136,7 +136,7 @@ class Stepper:
             self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers, frame.values)
         view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
-        payloads = self._sensing.sample(turn.sensors, view)
+        payloads = self._sensing.sample(turn.sensors, view, turn.whole, turn.rows)
         for at in turn.counters:
             view.written[at] = numbers[at] + 1.0
         self.not_finite.update(f"{one.robot} {one.channel}" for one in view.not_finite)

@@ -23,7 +23,7 @@ Neighbours: `foosim.common.keyed_random` has draws of eight words for one packet
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -66,10 +66,10 @@ class NoiseKeys:
         """Return the number of streams."""
         return self._keys.size
 
-    def chosen(self, rows: Sequence[int] | NDArray[np.int64]) -> NoiseKeys:
+    def taken(self, rows: NDArray[np.intp]) -> NoiseKeys:
         """Return the streams of some rows, to be kept where it is drawn from again: the first draw prepares keys."""
         some = NoiseKeys(())
-        some._keys = self._keys[np.asarray(rows, np.int64)]
+        some._keys = self._keys[rows]
         return some
 
     def words(self, counter: int | Words, width: int, slot: int = 0) -> Words:

@@ -11,7 +11,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Final
+from typing import Final
+
+import numpy as np
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
@@ -24,7 +26,7 @@ from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.world import World, asked_together
 from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
-from foosim.world.components.view import ComponentError, SensingView, View, called, has_together
+from foosim.world.components.view import ComponentError, SensingView, View, called, has_together, some_together
 from foosim.world.components.watching import ReadOnly
 from foosim.world.forms import registry
 from foosim.world.forms.forms import Form
@@ -116,7 +118,7 @@ class ComponentCheck:
         fitted, found = _Fitted(self.text, self.name, self.files), _Compared()
         try:
             for frame in alone:
-                found.measure(fitted.due(frame), frame)
+                found.measure(fitted, frame)
                 for actuators in fitted.together:
                     found.ask(actuators, frame)
         except ComponentError as error:
@@ -211,6 +213,7 @@ class _Fitted:
         self._deployment = load_deployment(text, name).with_assets(files)
         layout = build_layout(self._deployment)
         self._sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
+        self.sensing = Sensing()
         self.together = _together(self._deployment, layout)
         """The actuators that can be asked together, by motion and class, in the order of their robots."""
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
@@ -222,7 +225,7 @@ class _Fitted:
     def readings(self, frame: Frame) -> dict[tuple[str, str], object]:
         """Return what is measured at a frame, by robot and channel."""
         due = self.due(frame)
-        payloads = Sensing().sample(due, SensingView(frame.tick, frame.numbers, frame.values))
+        payloads = self.sensing.sample(due, SensingView(frame.tick, frame.numbers, frame.values))
         return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}
 
 
@@ -247,17 +250,21 @@ class _Compared:
     not_finite: Counter[str] = field(default_factory=Counter)
     given: Counter[str] = field(default_factory=Counter)
 
-    def measure(self, due: Sequence[FittedSensor], frame: Frame) -> None:
-        """Compare the readings of sensors in a frame. Raises ComponentError."""
-        numbers = ReadOnly(frame.numbers)
+    def measure(self, fitted: _Fitted, frame: Frame) -> None:
+        """Compare the readings of sensors in a frame, which are taken in the other order together.
+
+        Raises ComponentError.
+        """
+        numbers, due = ReadOnly(frame.numbers), fitted.due(frame)
         view = SensingView(frame.tick, numbers, frame.values)
-        together = Sensing().sample(due, view)
+        rows = np.arange(len(due))[::-1]
+        together = fitted.sensing.sample(due[::-1], view, tuple(due), rows)[::-1]
         labels = [f"sensor {one.channel} of {one.robot}" for one in due]
         self.sampled.update(labels)
         self.not_finite.update(f"sensor {one.channel} of {one.robot}" for one in view.not_finite)
         for label, one, payload in zip(labels, due, together, strict=True):
             its = SensingView(frame.tick, numbers, frame.values)
-            (alone,) = Sensing().sample([one], its)
+            (alone,) = fitted.sensing.sample([one], its)
             self.given[label] += payload is not None
             if alone != payload or any(view.written.get(at) != number for at, number in its.written.items()):
                 self.differ.setdefault(
@@ -265,12 +272,13 @@ class _Compared:
                 )
 
     def ask(self, actuators: Sequence[FittedActuator], frame: Frame) -> None:
-        """Compare what actuators of one class ask for in a frame. Raises ComponentError."""
+        """Compare what actuators of one class ask for in a frame, as `measure` does. Raises ComponentError."""
         view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
-        made: Any = type(actuators[0].actuator)
+        members = [one.actuator for one in actuators]
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
-        together = called(what, "", frame.tick, made.together, [one.actuator for one in actuators])
-        asked = asked_together(what, together, len(actuators), view)
+        made = called(what, "", frame.tick, type(members[0]).together, members)  # type: ignore[attr-defined]
+        together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
+        asked = asked_together(what, together, len(actuators), view)[::-1]
         for one, its in zip(actuators, asked.tolist(), strict=True):
             label = f"actuator {one.channel} of {one.robot}"
             alone = called(f"actuator {one.channel}", one.robot, frame.tick, one.actuator.command, view)

@@ -205,7 +205,7 @@ def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monke
     assert list(broken_laws(text, "yard.yaml", 3)) == []
     monkeypatch.setattr(MotionsAsked, "command", wrong)
     (found,) = broken_laws(text, "yard.yaml", 3)
-    assert found == "actuator motion of r2 asks for something else alone than with others, at tick 1"
+    assert found == "actuator motion of r0 asks for something else alone than with others, at tick 1"
     monkeypatch.setattr(MotionsAsked, "command", lambda self, view: right(self, view)[1:])
     (found,) = broken_laws(text, "yard.yaml", 3)
     assert "actuators motion of r0, motion of r1, motion of r2" in found and "of the shape (3, motors, 2)" in found

@@ -217,20 +217,21 @@ def test_a_zone_counts_who_is_in_it(shape: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("kind", ["v_w", "wheel_speeds"])
 def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -> None:
+    """Whichever of the robots there are, in whatever order."""
     robot = {"model": "differential_drive", "actuators": {"motion": {"kind": kind}}}
     robots = {
         f"r{n}": {**robot, "at": {"x": f"{n} m"}, "speed": f"{1 + n / 10} m/s", "track": f"{20 + n / 2} cm"}
-        for n in range(TOGETHER_MIN)
+        for n in range(TOGETHER_MIN + 3)
     }
     yard = Yard(yard_text(robots))
     for n, name in enumerate(robots):
         yard.put(name, "motion.set_point", *drawn(name, n, (4.0, 8.0)))
     world = yard.stepper.world
     view = View(0, yard.numbers)
-    actuators = [world.actuators[entity.index][0].actuator for entity in yard.layout.robots]
-    together = type(actuators[0]).together(actuators).command(view)  # type: ignore[attr-defined]
     alone = world.motors(yard.layout.robots, view)
-    assert together.tolist() == [[list(motor) for motor in motors] for motors in alone]
+    for some in (slice(None, None, -1), slice(3, None), slice(None)):
+        ((_, _, together),) = world._moving_of(yard.layout.robots[some]).groups
+        assert together.command(view).tolist() == [[list(motor) for motor in motors] for motors in alone[some]]
     at_limit = sum(max(abs(target) for target, _ in motors) > 0.999 * (1 + n / 10) for n, motors in enumerate(alone))
     assert at_limit > 3 or kind == "wheel_speeds"
 

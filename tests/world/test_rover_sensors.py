@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import inf, nan, pi, sqrt
 from typing import Final
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -131,22 +132,24 @@ def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callabl
     """Whoever computes which rovers: with other ranges and numbers of rays among them, near each other or far."""
     other = ("robots.rover02.sensors.proximity.rays=5", "robots.rover03.sensors.proximity.range=30 m")
     fitted = Fitted(fleet_text(5, *other))
-    sensors = [
-        one for rover in fitted.layout.of("rover") for one in sensors_of(fitted.deployment, fitted.layout, rover)
-    ]
+    sensors = tuple(
+        [one for rover in fitted.layout.of("rover") for one in sensors_of(fitted.deployment, fitted.layout, rover)]
+    )
     assert [one.channel for one in sensors] == ["battery", "odometry", "pose", "proximity"] * 5
     place = st.tuples(st.floats(-19.0, 19.0), st.floats(-12.0, 12.0), st.floats(-3.0, 3.0))
+    drawn = st.lists(st.integers(0, len(sensors) - 1), unique=True)
 
     @settings(max_examples=30)
-    @given(places=st.lists(place, min_size=5, max_size=5), tick=st.integers(0, 100))
-    def hold(places: list[tuple[float, float, float]], tick: int) -> None:
+    @given(places=st.lists(place, min_size=5, max_size=5), tick=st.integers(0, 100), chosen=drawn)
+    def hold(places: list[tuple[float, float, float]], tick: int, chosen: list[int]) -> None:
         for rover, (x, y, heading) in zip(fitted.layout.of("rover"), places, strict=True):
             at = rover.offsets["position"]
             fitted.numbers[at : at + 2] = x, y
             turn_to(fitted.numbers, rover, heading)
         alone, view = [fitted.payload(one, tick) for one in sensors], SensingView(tick, fitted.numbers)
         assert sensing.sample(sensors, view) == alone
-        assert sensing.sample(sensors[::-1][:7], view) == alone[::-1][:7]
+        some, rows = [sensors[one] for one in chosen], np.array(chosen, np.intp)
+        assert sensing.sample(some, view, sensors, rows) == [alone[one] for one in chosen]
 
     sensing = Sensing()
     hold()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import compress
 from operator import itemgetter
 
 import numpy as np
@@ -32,8 +33,10 @@ class Presence:
         flags = numbers[self._in_array].tobytes() if isinstance(numbers, np.ndarray) else self._flags_of(numbers)
         if flags != self._flags:
             self._flags = flags
-            its = zip(self._indices, self._places, strict=True)
-            absent = frozenset([index for index, at in its if numbers[at] != 0.0])
+            if isinstance(numbers, np.ndarray):
+                absent = frozenset(compress(self._indices, numbers[self._in_array].tolist()))
+            else:
+                absent = frozenset(compress(self._indices, map(numbers.__getitem__, self._places)))
             if absent != self._absent:
                 self._absent = absent
         return self._absent

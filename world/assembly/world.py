@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from foosim.world.components.view import (
     called,
     component_error,
     has_together,
+    some_together,
 )
 from foosim.world.components.watching import watched, watched_actuator
 from foosim.world.edits import parked
@@ -57,6 +58,10 @@ EVENT: Final = "event"
 EVENT_LOOK: Final = MarkKind("away", "events of the world", is_cut=True)
 TOGETHER_MIN: Final = 32
 """Actuators from which on they are asked together: fewer are asked one after the other in less time."""
+
+
+_Alike: TypeAlias = tuple[str, type[Any]]
+"""A motion, and a class of actuators."""
 
 
 class _Moving(NamedTuple):
@@ -268,6 +273,19 @@ class World:
                     self._powers.setdefault(index, []).append((label, rule))
         if is_watched:
             self._watch()
+        self._alike: dict[_Alike, list[Any]] = {}
+        """The actuators that can be asked together."""
+        self._rows: dict[int, tuple[_Alike, int]] = {}
+        """Which of them is that of a robot, by the entity's index."""
+        self._asking: dict[_Alike, Any] = {}
+        """What all of them are together, where some were asked."""
+        for index, one in self._only.items():
+            key = self._motion_of.get(index, ""), type(one.actuator)
+            motion = self._motions.get(key[0])
+            if index not in self._powers and has_together(key[1], "command") and getattr(motion, "takes_arrays", False):
+                members = self._alike.setdefault(key, [])
+                self._rows[index] = key, len(members)
+                members.append(one.actuator)
         self._checks: Mapping[int, Callable[[Sequence[float], Sequence[float]], bool]] = {
             index: check
             for index, model in self.models.items()
@@ -341,20 +359,15 @@ class World:
 
     def _together(self, motion: str, entities: Sequence[Entity]) -> Any:
         """Return what asks the motors of all of these entities at once; None where each is asked by itself."""
-        fitted = [self._only.get(entity.index) for entity in entities]
-        actuators = [one.actuator for one in fitted if one is not None]
-        kinds = {type(one) for one in actuators}
-        if (
-            len(fitted) < TOGETHER_MIN
-            or None in fitted
-            or len(kinds) > 1
-            or not has_together(type(actuators[0]), "command")
-            or not getattr(self._motions[motion], "takes_arrays", False)
-            or any(entity.index in self._powers for entity in entities)
-        ):
+        found = [self._rows.get(entity.index) for entity in entities]
+        rows = [one for one in found if one is not None]
+        if len(rows) < max(TOGETHER_MIN, len(found)) or len({key for key, _ in rows}) > 1:
             return None
-        made: Any = actuators[0]
-        return called(f"actuators of the motion {motion}", "", 0, made.together, actuators)
+        what, (key, _) = f"actuators of the motion {motion}", rows[0]
+        members = self._alike[key]
+        if key not in self._asking:
+            self._asking[key] = called(what, "", 0, type(members[0]).together, members)
+        return some_together(what, 0, self._asking[key], members, np.array([row for _, row in rows]))
 
     def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
         """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""

@@ -12,7 +12,7 @@ from foosim.common.errors import BadValue
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.mounted import Mounted, MountedTogether
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import Mounting, SensingView, View
+from foosim.world.components.view import Mounting, Rows, SensingView, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.shapes import rotated
@@ -32,13 +32,13 @@ class Beams:
         self.directions, self.range_m = np.array(directions).reshape(-1, 3), range_m
 
 
-class BeamsTogether:
+class BeamsTogether(Rows):
     """The beams of several sensors, which all have as many."""
 
     def __init__(self, several: Sequence[Beams]) -> None:
         self._around, self._mounts = several[0].around, MountedTogether([one.mount for one in several])
         self.count = len(several[0].directions)
-        self._directions = np.array([one.directions for one in several]).transpose(2, 0, 1)
+        self._directions = np.array([one.directions for one in several])
         self._ranges = np.array([one.range_m for one in several])
         self._passed = np.array([one.entity.index for one in several], np.int64)
 
@@ -65,7 +65,7 @@ class BeamsTogether:
     def lines(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
         """Return where mounts are (3, sensors) and the ways of beams (3, sensors, beams), in the world frame."""
         places, turns = self._mounts.poses(numbers, values)
-        return places, rotated(turns[:, :, None], self._directions)
+        return places, rotated(turns[:, :, None], self._directions.transpose(2, 0, 1))
 
 
 def body_of(at: Mounting) -> Body:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import Misfit, Mounting, Rows
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats
@@ -47,13 +47,14 @@ class Mounted:
         self.link = link_index(self._body, where.link)
         self.position, self.orientation = where.position, where.orientation
         link = self._body.links[self.link]
-        self.free: tuple[NDArray[np.intp], Floats] | None = None
-        """Where the link moves freely, by itself: the places of its position and orientation in the frame; its
-        principal axes, conjugated, its centre of mass, and the mount's position and orientation."""
-        if link.joint == "free":
-            places = [at.robot.offsets[name] + step for name, size in STATE for step in range(size)]
-            fixed = [*conjugate(link.principal), *link.centre_of_mass, *self.position, *self.orientation]
-            self.free = np.array(places, np.intp), np.array(fixed)
+        self.is_free = link.joint == "free"
+        """Whether the link moves freely, by itself."""
+        starts = [at.robot.offsets[name] if self.is_free else 0 for name, _ in STATE]
+        places = [start + step for start, (_, size) in zip(starts, STATE, strict=True) for step in range(size)]
+        fixed = [*conjugate(link.principal), *link.centre_of_mass, *self.position, *self.orientation]
+        self.free: tuple[NDArray[np.intp], Floats] = np.array(places, np.intp), np.array(fixed)
+        """Of a free link: the places of its position and orientation in the frame; its principal axes, conjugated, its
+        centre of mass, and the mount's position and orientation. Of any other it says nothing."""
 
     def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
         """Return the place (m) and the orientation of the mount, in the world frame, from the frame's numbers."""
@@ -73,34 +74,24 @@ class Mounted:
             raise Misfit(("kind",), what, self.entity.model)
 
 
-class MountedTogether:
+class MountedTogether(Rows):
     """Several places on robots. Those on free links are found at once, with the bits of each by itself."""
 
     def __init__(self, several: Sequence[Mounted]) -> None:
-        self._several = tuple(several)
-        self._free = [place for place, one in enumerate(several) if one.free is not None]
-        self._jointed = [place for place, one in enumerate(several) if one.free is None]
-        if self._free:
-            free = [one.free for one in several if one.free is not None]
-            self._places = np.array([places for places, _ in free]).T.copy()
-            fixed = np.array([numbers for _, numbers in free]).T.copy()
-            self._back, self._centres, *self._mount = np.split(fixed, (4, 7, 10))
+        places, fixed = zip(*[one.free for one in several], strict=True)
+        self._places, self._fixed = np.array(places), np.array(fixed)
+        self._jointed = np.array([None if one.is_free else one for one in several], object)
 
     def poses(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
         """Return places (3, n) (m) and orientations (4, n) of n mounts, in the world frame, from the frame's numbers.
 
         `values` are the same as an array.
         """
-        count = len(self._several)
-        places, orientations = np.empty((3, count)), np.empty((4, count))
-        if self._free:
-            state = (np.array(numbers) if values is None else values)[self._places]
-            place, orientation = self._mount
-            origins, turned = free_poses(state, self._back, self._centres)
-            places[:, self._free] = origins + rotated(turned, place)
-            orientations[:, self._free] = multiplied(turned, orientation)
-        for number in self._jointed:
-            places[:, number], orientations[:, number] = self._several[number].pose(numbers)
+        state, fixed = (np.array(numbers) if values is None else values)[self._places].T, self._fixed.T
+        origins, turned = free_poses(state, fixed[:4], fixed[4:7])
+        places, orientations = origins + rotated(turned, fixed[7:10]), multiplied(turned, fixed[10:])
+        for number in self._jointed.nonzero()[0]:
+            places[:, number], orientations[:, number] = self._jointed[number].pose(numbers)
         return places, orientations
 
 

@@ -6,6 +6,7 @@ Sensors that are due at one tick are due together again, so what is put together
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, cast
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue, NotFinite
 from foosim.world.components.fitted import FittedSensor
-from foosim.world.components.view import SensingView, called, component_error, has_together
+from foosim.world.components.view import SensingView, called, component_error, has_together, some_together
 from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.payloads import as_floats
 
@@ -35,57 +36,112 @@ class Sensing:
 
     def __init__(self) -> None:
         self._plans: dict[tuple[FittedSensor, ...], Plan] = {}
+        self._wholes: dict[tuple[FittedSensor, ...], Plan] = {}
+        """Those from which others are taken."""
 
-    def sample(self, fitted: Sequence[FittedSensor], view: SensingView) -> list[bytes | None]:
+    def sample(
+        self,
+        fitted: Sequence[FittedSensor],
+        view: SensingView,
+        whole: tuple[FittedSensor, ...] = (),
+        rows: NDArray[np.intp] | None = None,
+    ) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
 
+        Where they are some of a `whole` that is asked for again and again, by their `rows` in it, that is planned once.
         `view.not_finite` has the sensors whose readings are dropped since a number in them is not finite.
         """
         key = tuple(fitted)
         plan = self._plans.get(key)
         if plan is None:
-            while len(self._plans) >= PLANS_MAX:
-                self._plans.pop(next(iter(self._plans)))
-            plan = self._plans[key] = Plan(fitted, view.tick)
+            if rows is None:
+                plan = Plan(key, view.tick)
+            else:
+                planned = self._wholes.get(whole) or _keep(self._wholes, whole, Plan(whole, view.tick))
+                plan = planned if key == whole else planned.taken(key, rows, view.tick)
+            _keep(self._plans, key, plan)
         return plan.sample(view)
+
+
+def _keep(plans: dict[tuple[FittedSensor, ...], Plan], key: tuple[FittedSensor, ...], plan: Plan) -> Plan:
+    while len(plans) >= PLANS_MAX:
+        plans.pop(next(iter(plans)))
+    plans[key] = plan
+    return plan
 
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Sensors or modifiers of one class that are computed together: the places of their sensors, what they became, how
-    many numbers each has, their names, for messages, and whether what they compute is what is sent."""
+    """Sensors or modifiers of one class that are computed together: the places of their sensors, themselves, what they
+    became, how many numbers each has, their form and names, for messages, and whether what they compute is what is
+    sent."""
 
     places: list[int]
+    members: list[Any]
     made: Any
     size: int
+    form: str
     what: str
     is_last: bool
+
+    def taken(self, places: NDArray[np.intp], fitted: Sequence[FittedSensor], tick: int) -> _Group | None:
+        """Return those of them that are among some sensors, at these places or -1; None where none is."""
+        there = places[self.places]
+        rows = (there >= 0).nonzero()[0]
+        if not len(rows):
+            return None
+        its = there[rows].tolist()
+        what = _names(self.form, fitted, its)
+        made = some_together(what, tick, self.made, self.members, rows)
+        return _Group(its, [self.members[row] for row in rows.tolist()], made, self.size, self.form, what, self.is_last)
+
+
+_Divided: TypeAlias = tuple[list[_Group], list[int]]
+"""Groups, and the places of the sensors that work alone, or whose modifier does."""
+
+
+def _names(form: str, fitted: Sequence[FittedSensor], places: Sequence[int]) -> str:
+    names = ", ".join([f"{fitted[place].channel} of {fitted[place].robot}" for place in places[:NAMED_MAX]])
+    return f"{form} {names}{', ...' * (len(places) > NAMED_MAX)}"
 
 
 class Plan:
     """What is done for one set of sensors, in which order. Raises ComponentError."""
 
-    def __init__(self, fitted: Sequence[FittedSensor], tick: int) -> None:
-        self._fitted, self._tick = tuple(fitted), tick
+    def __init__(self, fitted: tuple[FittedSensor, ...], tick: int) -> None:
+        self._fitted = fitted
         everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
-        self._together, self._alone = self._divided(everyone, "sensor", 0)
+        self._together, self._alone = self._divided(everyone, "sensor", 0, tick)
         depth = max((len(one.modifiers) for one in fitted), default=0)
-        self._steps = [self._step(place) for place in range(depth)]
+        self._steps = [self._step(place, tick) for place in range(depth)]
+
+    def taken(self, fitted: tuple[FittedSensor, ...], rows: NDArray[np.intp], tick: int) -> Plan:
+        """Return that of some of the sensors, by their rows, with the same bits. Raises ComponentError."""
+        places = np.full(len(self._fitted), -1, np.intp)
+        places[rows] = np.arange(len(rows))
+
+        def some(groups: list[_Group], alone: list[int]) -> _Divided:
+            taken = [group.taken(places, fitted, tick) for group in groups]
+            return [one for one in taken if one is not None], sorted([at for at in places[alone].tolist() if at >= 0])
+
+        found = copy(self)
+        found._fitted = fitted
+        found._together, found._alone = some(self._together, self._alone)
+        found._steps = [some(*step) for step in self._steps]
+        return found
 
     @property
     def groups(self) -> list[_Group]:
         """Those that are computed together."""
         return [*self._together, *(group for groups, _ in self._steps for group in groups)]
 
-    def _step(self, depth: int) -> tuple[list[_Group], list[int]]:
+    def _step(self, depth: int, tick: int) -> _Divided:
         """Return the modifiers at a depth: groups, and the places of the sensors whose modifier works alone."""
         having = [(place, one) for place, one in enumerate(self._fitted) if len(one.modifiers) > depth]
         members = [(place, one.modifiers[depth].modifier, one.size) for place, one in having]
-        return self._divided(members, "modifier", MODIFIED_TOGETHER_MIN)
+        return self._divided(members, "modifier", MODIFIED_TOGETHER_MIN, tick)
 
-    def _divided(
-        self, members: Sequence[tuple[int, Any, int]], form: str, least: int
-    ) -> tuple[list[_Group], list[int]]:
+    def _divided(self, members: Sequence[tuple[int, Any, int]], form: str, least: int, tick: int) -> _Divided:
         """Divide (place, object, numbers) into groups of a class and a length, and the places of those without one.
 
         One that would be a group of its own, and those that have less than `least` numbers together, are computed
@@ -99,16 +155,12 @@ class Plan:
             if len(its) == 1 or len(its) * size < max(1, least) or not has_together(kind, METHODS[form]):
                 alone += [place for place, _ in its]
                 continue
-            first = [self._fitted[place] for place, _ in its[:NAMED_MAX]]
-            names = ", ".join([f"{one.channel} of {one.robot}" for one in first])
-            what = f"{form} {names}{', ...' * (len(its) > NAMED_MAX)}"
-            places = [place for place, _ in its]
+            places, ones = [place for place, _ in its], [one for _, one in its]
+            what = _names(form, self._fitted, places)
             is_last = not any(self._fitted[place].modifiers for place in places)
-            groups.append(_Group(places, self._put_together(kind, its, what), size, what, is_last))
+            made: Any = called(what, "", tick, kind.together, ones)
+            groups.append(_Group(places, ones, made, size, form, what, is_last))
         return groups, sorted(alone)
-
-    def _put_together(self, kind: Any, members: Sequence[tuple[int, Any]], what: str) -> Any:
-        return called(what, "", self._tick, kind.together, [one for _, one in members])
 
     def sample(self, view: SensingView) -> list[bytes | None]:
         """Return the payload of each sensor, None of a reading that is dropped. Raises ComponentError."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from foosim.world.components.view import ModifierMounting, View
+from foosim.world.components.view import ModifierMounting, Rows, View
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.registry import modifier
 from foosim.world.forms.settings import ModifierSettings
@@ -58,7 +58,7 @@ class GaussianNoise:
         return GaussianNoises(modifiers)
 
 
-class GaussianNoises:
+class GaussianNoises(Rows):
     """Several of them, of values of one length."""
 
     def __init__(self, modifiers: Sequence[GaussianNoise]) -> None:

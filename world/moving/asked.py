@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Slot, View
+from foosim.world.components.view import Rows, Slot, View
 from foosim.world.moving.columns import Columns
 from foosim.world.moving.wheels import Wheels
 
@@ -28,7 +28,7 @@ def asked_of(motors: Sequence[Motors] | Floats, without: Motors) -> Floats:
     return numbers.reshape(len(motors), len(without), 2)
 
 
-class MotionsAsked:
+class MotionsAsked(Rows):
     """What the actuators `v_w` of robots that move by kinematics ask of their wheels."""
 
     def __init__(self, set_points: Sequence[Slot], wheels: Sequence[Wheels]) -> None:
@@ -53,7 +53,7 @@ class MotionsAsked:
         return asked
 
 
-class WheelSpeedsAsked:
+class WheelSpeedsAsked(Rows):
     """What the actuators `wheel_speeds` of robots that move by kinematics ask of their wheels."""
 
     def __init__(self, set_points: Sequence[Slot], wheels: Sequence[Wheels]) -> None:

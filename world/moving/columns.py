@@ -31,11 +31,11 @@ class Columns:
         steps = np.concatenate([np.arange(size) for size in sizes])
         self._take(np.repeat(starts, sizes, axis=1) + steps)
 
-    def taken(self, rows: Sequence[int]) -> Columns:
+    def taken(self, rows: NDArray[np.intp]) -> Columns:
         """Return those of some of the entities, by their rows."""
-        found = copy(self)
-        found._rows = [self._rows[row] for row in rows]
-        found._runs_known = [self._runs[row] for row in rows] if self._runs else []
+        found, chosen = copy(self), rows.tolist()
+        found._rows = [self._rows[row] for row in chosen]
+        found._runs_known = [self._runs[row] for row in chosen] if self._runs else []
         found._take(self._places[rows])
         return found
 
@@ -85,7 +85,7 @@ class EntityColumns:
 
     def of(self, entities: Sequence[Entity]) -> Columns:
         """Return those of these entities."""
-        return self._all.taken([self._rows[entity.index] for entity in entities])
+        return self._all.taken(np.array([self._rows[entity.index] for entity in entities]))
 
 
 def _run(slots: Sequence[Slot]) -> Slot | None:

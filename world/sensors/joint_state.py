@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final
+from typing import Annotated, ClassVar, Final
 
 from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import Name
 from foosim.world.components.mounted import joint_indices
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.forms import JOINTS
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
-
-if TYPE_CHECKING:  # numpy is for those who compute a tick
-    import numpy as np
-    from numpy.typing import NDArray
 
 JOINTS_MAX: Final = 256
 Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]
@@ -69,20 +65,6 @@ class JointStates:
         return JointState(tuple(numbers[:count]), tuple(numbers[count : 2 * count]), tuple(numbers[2 * count :]))
 
     @staticmethod
-    def together(sensors: Sequence[JointStates]) -> JointStateBatch:
+    def together(sensors: Sequence[JointStates]) -> SlotReadings:
         """Return these as one; all have as many joints."""
-        return JointStateBatch(sensors)
-
-
-class JointStateBatch:
-    """Several of them, with as many joints."""
-
-    def __init__(self, sensors: Sequence[JointStates]) -> None:
-        import numpy as np
-
-        self._places = np.array([one.places for one in sensors])
-
-    def sample(self, view: View) -> NDArray[np.float64]:
-        """Return the numbers, of shape (sensors, 3 joints)."""
-        numbers: NDArray[np.float64] = view.values[self._places]
-        return numbers
+        return SlotReadings([one.places for one in sensors])

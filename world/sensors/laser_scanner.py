@@ -15,7 +15,7 @@ from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.components.beams import Beams, BeamsTogether
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, Rows, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -86,7 +86,7 @@ class LaserScanner:
         return BeamsTogether([one.beams for one in sensors]).ends(numbers, np.zeros_like(far), far)
 
 
-class LaserScanners:
+class LaserScanners(Rows):
     """Several of them, with as many beams."""
 
     def __init__(self, sensors: Sequence[LaserScanner]) -> None:

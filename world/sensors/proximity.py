@@ -18,7 +18,7 @@ from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity
 from foosim.world.components.beams import Beams, BeamsTogether, body_of, hull_middle, mounted_at, way_out
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.view import Mounting, Rows, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -81,7 +81,7 @@ class Proximity:
         return BeamsTogether([one.beams for one in sensors]).ends(numbers, hulls, farthest)
 
 
-class ProximityBatch:
+class ProximityBatch(Rows):
     """Several of them, with as many rays."""
 
     def __init__(self, sensors: Sequence[Proximity]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import Misfit, Mounting, Rows, View
 from foosim.world.forms.quantities import Amperes
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -59,7 +59,7 @@ class MotorCurrent:
         return MotorCurrents(sensors)
 
 
-class MotorCurrents:
+class MotorCurrents(Rows):
     """Several of them."""
 
     def __init__(self, sensors: Sequence[MotorCurrent]) -> None:
