@@ -47,7 +47,7 @@ EXACT: Final = (
 """One rounding for each operation, and no function of the mathematical library worked out by the compiler."""
 LEVEL: Final = "-O1"
 SILENT: Final = ("-w", "-Wno-all", "-Wno-sign-compare")
-"""By the first alone gcc still looks for what it does not say, which is a seventh of its time where it optimises nothing."""
+"""By the first alone gcc still looks for what it does not say: a seventh of its time where it optimises nothing."""
 LIGHT: Final = ("-fno-tree-dominator-opts", "-fno-tree-pta", "-fno-asynchronous-unwind-tables")
 """Takes passes from gcc that cost it a sixth of its time at this level."""
 ONCE: Final = '__attribute__((cold, optimize("O0")))'

@@ -234,8 +234,8 @@ def test_benches_measure_what_is_compiled(installed: Installed) -> None:
 
 
 def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> None:
-    """Half of the compiled modules would not import. One is tried here, whose package imports nothing, so that mypyc has
-    little to read."""
+    """Half of the compiled modules would not import. One is tried here, whose package imports nothing: mypyc has little
+    to read."""
     source = tmp_path / "source"
     copy_source(source)
     (source / "door" / "__init__.py").write_text("")
