@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from functools import partial
@@ -202,7 +202,7 @@ def _all_broken(check: ComponentCheck, folder: Path) -> Iterator[str]:
     yield from check.broken()
     if not check.has_failed:
         check.begin("in another process")
-        yield from elsewhere(check.text, check.name, check.ticks, folder)
+        yield from elsewhere(check.text, check.name, check.ticks, check.first, folder)
 
 
 def _told_of_step(line: str) -> None:
@@ -211,12 +211,12 @@ def _told_of_step(line: str) -> None:
     sys.stderr.flush()
 
 
-def elsewhere(text: str, name: str, ticks: int, folder: Path | None = None) -> Iterator[str]:
+def elsewhere(text: str, name: str, ticks: int, here: Mapping[str, Any], folder: Path | None = None) -> Iterator[str]:
     """Yield that a process with another seed of Python's hashes computes another world than this one.
 
-    `folder` is the base of the relative paths of the deployment's files (None: the current folder).
+    `here` is the result of a rehearsal by this one, on one node. `folder` is the base of the relative paths of the
+    deployment's files (None: the current folder).
     """
-    here: dict[str, Any] = rehearse(text, name, ticks, 1, folder=folder).json
     with TemporaryDirectory() as temporary:
         file = Path(temporary) / Path(name).name
         file.write_text(text)

@@ -85,6 +85,16 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 
 
 @pytest.fixture(autouse=True, scope="session")
+def _examples_are_of_the_test_alone() -> Iterator[None]:
+    """Those that are the same in every run: hypothesis draws also numbers and words of the modules that are loaded,
+    which are others on another worker. To read them takes each seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        if settings().derandomize:
+            patch.setattr("hypothesis.internal.conjecture.providers.is_local_module_file", lambda path: False)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
 def _bounds_of_messages_are_read() -> None:
     """msgspec reads a message's bounds with its first decoder: before any test lowers a limit."""
     for kind in Message.__subclasses__():

@@ -83,6 +83,8 @@ class ComponentCheck:
     """How many sensors the deployment has, of how many readings were compared, whether it does not even run."""
     notes: list[str] = field(default_factory=list)
     """What breaks no law, and may be meant."""
+    first: Mapping[str, Any] = field(default_factory=dict)
+    """The result of the first rehearsal."""
 
     def __post_init__(self) -> None:
         self._begun = 0
@@ -101,6 +103,7 @@ class ComponentCheck:
         """Yield which laws the deployment's forms break, in words, as each is found."""
         self.begin("on one node")
         first, alone = self._rehearsed(self.text, 1, is_watched=True)
+        self.first = first.json
         self.has_failed = first.json["failed"]
         if self.has_failed:
             yield str(first.json["reason"])

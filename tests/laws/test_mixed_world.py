@@ -7,6 +7,7 @@ Rigid bodies and robots from files are in the yard of `test_yard`; tests/forms h
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -19,6 +20,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.assembly.used_forms import forms_of
+from foosim.world.frame import Frame
 from tests.forms.test_forms import ALONE, HEADS, own
 from tests.forms.worlds import driver, still
 from tests.frames import Frames, broken_laws
@@ -154,10 +156,17 @@ def test_every_form_is_in_a_mixed_world_or_has_its_laws_tested_alone() -> None:
     assert set(own()) - used == ALONE | HEADS
 
 
-def test_all_of_it_moves_and_measures() -> None:
+@cache
+def alone() -> tuple[dict[str, Any], list[Frame]]:
+    """The result and the frames of a rehearsal of it on one node."""
     frames = Frames()
-    assert not rehearse(mixed(), NAME, TICKS, 1, settings=Settings(on_commit=frames)).json["failed"]
-    assert still(load_deployment(mixed(), NAME), frames.frames) == set()
+    return rehearse(mixed(), NAME, TICKS, 1, settings=Settings(on_commit=frames)).json, frames.frames
+
+
+def test_all_of_it_moves_and_measures() -> None:
+    result, frames = alone()
+    assert not result["failed"]
+    assert still(load_deployment(mixed(), NAME), frames) == set()
 
 
 def test_nodes_moves_and_new_objects_change_nothing() -> None:
@@ -165,7 +174,7 @@ def test_nodes_moves_and_new_objects_change_nothing() -> None:
 
 
 def test_another_process_computes_the_same() -> None:
-    assert list(elsewhere(mixed(), NAME, TICKS)) == []
+    assert list(elsewhere(mixed(), NAME, TICKS, alone()[0])) == []
 
 
 def test_a_kit_changes_nothing_of_another() -> None:
@@ -176,19 +185,21 @@ def test_a_kit_changes_nothing_of_another() -> None:
         data["players"].pop(f"{name}-driver", None)
     del data["hall"]
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
-    frames: list[list[list[float | str]]] = []
-    for text in (mixed(), written(data)):
-        seen: list[list[float | str]] = []
+    frames = Frames()
+    result = rehearse(written(data), NAME, TICKS, 1, settings=Settings(on_commit=frames)).json
+    assert not result["failed"], result["reason"]
+    assert told(frames.frames) == told(alone()[1])
 
-        def keep(frame: Any, seen: list[list[float | str]] = seen) -> None:
-            names = ("ball", "red.goal", "blue.attack", "world")
-            numbers = [float(number) for number in frame.numbers]
-            told: list[float | str] = [*numbers]
-            for place in frame.layout.references:
-                told[place] = frame.layout.entities[int(numbers[place])].name if numbers[place] >= 0.0 else ""
-            seen.append([n for name in names for n in told[frame.layout[name].start : frame.layout[name].stop]])
 
-        result = rehearse(text, NAME, TICKS, 1, settings=Settings(on_commit=keep))
-        assert not result.json["failed"], result.json["reason"]
-        frames.append(seen)
-    assert frames[0] == frames[1]
+def told(frames: Sequence[Frame]) -> list[list[float | str]]:
+    """What each frame has of some entities, with the names of those to which it refers."""
+    found = []
+    for frame in frames:
+        layout = frame.layout
+        numbers: list[float | str] = [float(number) for number in frame.numbers]
+        for place in layout.references:
+            number = float(frame.numbers[place])
+            numbers[place] = layout.entities[int(number)].name if number >= 0.0 else ""
+        names = ("ball", "red.goal", "blue.attack", "world")
+        found.append([n for name in names for n in numbers[layout[name].start : layout[name].stop]])
+    return found

@@ -105,7 +105,8 @@ def broken(planted: Path, source: str, sets: str, *, processes: bool = False, ti
     sys.modules.pop("own_form", None)
     invalidate_caches()
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, sets])
-    return [*broken_laws(text, TABLE.name, ticks), *(elsewhere(text, TABLE.name, ticks) if processes else ())]
+    check = ComponentCheck(text, TABLE.name, ticks)
+    return [*check.broken(), *(elsewhere(text, TABLE.name, ticks, check.first) if processes else ())]
 
 
 def test_what_obeys_passes_also_in_another_process(planted: Path) -> None:
