@@ -11,8 +11,9 @@ import numpy as np
 from foosim.common.errors import BadValue
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.mounted import Mounted, MountedTogether
+from foosim.world.components.rows import Rows
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import Mounting, Rows, SensingView, View
+from foosim.world.components.view import Mounting, SensingView, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.shapes import rotated

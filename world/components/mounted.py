@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
-from foosim.world.components.view import Misfit, Mounting, Rows
+from foosim.world.components.rows import Rows
+from foosim.world.components.view import Misfit, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats

@@ -6,7 +6,6 @@ Sensors that are due at one tick are due together again, so what is put together
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, cast
 
@@ -108,8 +107,14 @@ def _names(form: str, fitted: Sequence[FittedSensor], places: Sequence[int]) -> 
 class Plan:
     """What is done for one set of sensors, in which order. Raises ComponentError."""
 
-    def __init__(self, fitted: tuple[FittedSensor, ...], tick: int) -> None:
+    def __init__(
+        self, fitted: tuple[FittedSensor, ...], tick: int, known: tuple[_Divided, list[_Divided]] | None = None
+    ) -> None:
+        """`known` are the groups of sensors and of modifiers, by depth, where they were taken from others."""
         self._fitted = fitted
+        if known is not None:
+            (self._together, self._alone), self._steps = known
+            return
         everyone = [(place, one.sensor, one.size) for place, one in enumerate(fitted)]
         self._together, self._alone = self._divided(everyone, "sensor", 0, tick)
         depth = max((len(one.modifiers) for one in fitted), default=0)
@@ -124,11 +129,8 @@ class Plan:
             taken = [group.taken(places, fitted, tick) for group in groups]
             return [one for one in taken if one is not None], sorted([at for at in places[alone].tolist() if at >= 0])
 
-        found = copy(self)
-        found._fitted = fitted
-        found._together, found._alone = some(self._together, self._alone)
-        found._steps = [some(*step) for step in self._steps]
-        return found
+        steps = [some(groups, alone) for groups, alone in self._steps]
+        return Plan(fitted, tick, (some(self._together, self._alone), steps))
 
     @property
     def groups(self) -> list[_Group]:

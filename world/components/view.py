@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from foosim.common.errors import BadValue, Failed
 from foosim.common.finding import Location
@@ -141,22 +140,6 @@ class View:
         return numbers[slot.at : slot.at + slot.size]
 
 
-class Rows:
-    """What several components became, whose arrays all have a row for each of them first."""
-
-    def taken(self, rows: NDArray[np.intp]) -> Self:
-        """Return those of some of them, by their rows."""
-        import numpy as np
-
-        found = copy(self)
-        for name, its in vars(self).items():
-            if isinstance(its, np.ndarray):
-                setattr(found, name, its[rows])
-            elif hasattr(its, "taken"):
-                setattr(found, name, its.taken(rows))
-        return found
-
-
 def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows: NDArray[np.intp]) -> Any:
     """Return what some of several components are together, by their rows; `made` is what all of them are.
 
@@ -168,14 +151,18 @@ def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows:
     return called(what, "", tick, type(some[0]).together, some)
 
 
-class SlotReadings(Rows):
+class SlotReadings:
     """The readings of several sensors that are numbers of the frame as they are: read as one array."""
 
-    def __init__(self, places: Sequence[Sequence[int]]) -> None:
+    def __init__(self, places: Sequence[Sequence[int]] | NDArray[np.intp]) -> None:
         """`places` are those of each sensor's numbers, of one length."""
         import numpy as np
 
         self._places = np.array(places)
+
+    def taken(self, rows: NDArray[np.intp]) -> SlotReadings:
+        """Return those of some of the sensors, by their rows."""
+        return SlotReadings(self._places[rows])
 
     def sample(self, view: View) -> NDArray[np.float64]:
         """Return the numbers, of shape (sensors, numbers)."""

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from foosim.world.components.view import ModifierMounting, Rows, View
+from foosim.world.components.rows import Rows
+from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.registry import modifier
 from foosim.world.forms.settings import ModifierSettings

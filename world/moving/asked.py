@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Rows, Slot, View
+from foosim.world.components.rows import Rows
+from foosim.world.components.view import Slot, View
 from foosim.world.moving.columns import Columns
 from foosim.world.moving.wheels import Wheels
 

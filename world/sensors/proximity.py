@@ -18,7 +18,8 @@ from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity
 from foosim.world.components.beams import Beams, BeamsTogether, body_of, hull_middle, mounted_at, way_out
-from foosim.world.components.view import Mounting, Rows, View
+from foosim.world.components.rows import Rows
+from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings

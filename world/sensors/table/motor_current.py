@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
-from foosim.world.components.view import Misfit, Mounting, Rows, View
+from foosim.world.components.rows import Rows
+from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.quantities import Amperes
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
