@@ -27,15 +27,13 @@ FINGERPRINT_TICKS: Final = 32
 class Solver:
     """Builds the engine that a node's core needs, and solves its work."""
 
-    def __init__(
-        self, core: NodeCore, factory: Callable[[Deployment, Layout], AnyEngine] | None = None, fingerprint: bytes = b""
-    ) -> None:
-        """`factory` overrides the deployment's engine; `fingerprint` is that of another solver of this process."""
+    def __init__(self, core: NodeCore, factory: Callable[[Deployment, Layout], AnyEngine] | None = None) -> None:
+        """`factory` overrides the deployment's engine."""
         self._core = core
         self._factory = factory
         self._engine: AnyEngine | None = None
-        self.fingerprint = fingerprint
-        """The digest of the fixed small run, empty before the engine is built."""
+        self.fingerprint = b""
+        """The digest of the fixed small run, empty before the engine is built: whoever knows it sets it before that."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 

@@ -139,10 +139,11 @@ class System:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
         core.is_watched = self.settings.is_watched
-        # The processes of a rehearsal are one: the small run of one node is that of all.
-        solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
+        solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
+            # The processes of a rehearsal are one: the small run of one node is that of all.
+            solver.fingerprint = solver.fingerprint or self._simulation
             solver.build()
             self._simulation = self._simulation or solver.fingerprint
             core.advance(now_ns)

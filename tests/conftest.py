@@ -68,8 +68,14 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 
     Then collections are as rare as in the processes of a run. Each worker begins with other folders, since what one has
     compiled the others load: pytest's way of compiling tests takes three times as long as all else of collecting.
+
+    hypothesis would draw also numbers and words of the modules that are loaded, which are others on another worker:
+    examples would not be the same in every run, and to read the modules takes each worker seconds.
     """
     config = session.config
+    if settings().derandomize:
+        nowhere = "hypothesis.internal.conjecture.providers.is_local_module_file"
+        pytest.MonkeyPatch().setattr(nowhere, lambda path: False)
     if hasattr(config, "workerinput") and config.args == config.getini("testpaths"):
         folder = sorted(Path(__file__).parent.iterdir())
         places = [str(path) for path in folder if path.is_dir() or path.name.startswith("test_")]
@@ -82,16 +88,6 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         gc.enable()
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _examples_are_of_the_test_alone() -> Iterator[None]:
-    """Those that are the same in every run: hypothesis draws also numbers and words of the modules that are loaded,
-    which are others on another worker. To read them takes each seconds."""
-    with pytest.MonkeyPatch.context() as patch:
-        if settings().derandomize:
-            patch.setattr("hypothesis.internal.conjecture.providers.is_local_module_file", lambda path: False)
-        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -11,7 +11,7 @@ mkdir -p "$place"
 if ! cmp -s console/page/package-lock.json "$place/installed.json" || [ ! -d "$place/node_modules" ]; then
     rm -f "$place/installed.json"
     cp console/page/package.json console/page/package-lock.json "$place/"
-    npm --prefix "$place" ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2
+    npm --prefix "$place" ci --prefer-offline --ignore-scripts --no-audit --no-fund --loglevel=error >&2
     cp console/page/package-lock.json "$place/installed.json"
 fi
 rm -rf "$place/src" "$place/test"
