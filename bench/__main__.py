@@ -12,7 +12,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import bodies, distributed, env, fleet, lateness, machine, realtime, spares, table_one_process, verdict
+from bench import (
+    answers,
+    bodies,
+    distributed,
+    env,
+    fleet,
+    lateness,
+    machine,
+    realtime,
+    spares,
+    table_one_process,
+    verdict,
+)
 from bench.runs import BenchError
 
 
@@ -50,6 +62,7 @@ BENCHES: Final = (
     Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
+    Bench("answers", "when a job is known to be taken", with_default(answers.answers), answers.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
 )
 
