@@ -20,7 +20,6 @@ ROOT = Path(__file__).parent.parent
 PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LINES_OF_A_FUNCTION_MAX = 70
 
-FILES_OF_A_FOLDER_MAX = 16
 
 # The packages from the top to the bottom: each may import what stands below it. Those in one line do not import each
 # other.
@@ -293,11 +292,6 @@ def test_no_file_and_no_folder_imports_itself_through_others() -> None:
         folders[folder].discard(folder)
     assert circles(files) == []
     assert circles(folders) == []
-
-
-def test_folders_are_small() -> None:
-    counts = Counter(path.parent.relative_to(ROOT).as_posix() for path in SOURCES if path.name != "__init__.py")
-    assert {folder: count for folder, count in counts.items() if count > FILES_OF_A_FOLDER_MAX} == {}
 
 
 def test_imports_are_under_foosim() -> None:
