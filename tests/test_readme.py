@@ -145,10 +145,9 @@ def test_the_readmes_player_plays(house: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "docs/tutorials/first_capture.md",
-        "docs/reference/capture.md",
         "docs/how-to/use_a_capture.md",
-        "docs/tutorials/writing_a_player.md",
+        "docs/reference/capture.md",
+        "docs/how-to/write_a_player.md",
     ],
 )
 def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
@@ -162,8 +161,8 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
 @pytest.mark.parametrize(
     ("name", "number", "shorter"),
     [
-        ("docs/reference/learning.md", 0, {}),
-        ("docs/reference/learning.md", 1, {}),
+        ("docs/reference/python.md", 0, {}),
+        ("docs/reference/python.md", 1, {}),
         ("docs/tutorials/learn_to_defend.md", 0, {"range(20)": "range(2)"}),
     ],
 )
@@ -187,7 +186,7 @@ def test_the_code_of_learning_runs(
 def test_a_players_declaration_is_valid() -> None:
     table = (ROOT / "deploy" / "table.yaml").read_text()
     classes = []
-    for text in blocks(ROOT / "docs" / "tutorials" / "writing_a_player.md", "yaml"):
+    for text in blocks(ROOT / "docs" / "how-to" / "write_a_player.md", "yaml"):
         tree, _ = read_tree(text, locate_in("page"))  # not PyYAML's own: there the key `on` would be true
         assert tree is not None
         content: Any = plain(tree)

@@ -2,7 +2,7 @@
 
 `make test` runs with fixed seeds and small samples at ALPHA; `make stats` with a seed that it prints, the full samples,
 and an alpha of 1e-6 so that a hundred runs of the whole suite do not flake once. Each figure is a row of a table, which
-`make stats` writes (docs/reference/network-validation.md).
+`make stats` writes (captures/network-validation.md).
 """
 
 from __future__ import annotations
