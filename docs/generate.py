@@ -8,8 +8,10 @@ tests/test_readme.py fails when a page and the code differ.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final
 
@@ -129,7 +131,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ),
 }
 """The same for constants, whose names end with their units."""
-_PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
+_PART = re.compile(r"<!-- generated: (?P<name>[\w ]+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
 
 
 def commands() -> Iterator[tuple[str, Any]]:
@@ -165,29 +167,50 @@ def write_commands() -> Iterator[str]:
         yield "\n" if options else ""
 
 
-def write_deployment() -> Iterator[str]:
-    """Yield a table for each kind of mapping in a deployment file, in the order in which they are met."""
-    schema = deployment_schema()
-    definitions = schema["$defs"]
-    waiting, met = ["the file"], {"the file"}
-    while waiting:
-        name = waiting.pop(0)
-        part = schema if name == "the file" else definitions[name]
-        for found in re.findall(r"#/\$defs/(\w+)", "" if "properties" in part else str(part)):
-            if found not in met:
-                met.add(found)
-                waiting.append(found)
+SECTIONS: Final[Mapping[str, Sequence[str]]] = {
+    "network": ("network",),
+    "kits": ("table", "hall"),
+    "components": ("sensors", "actuators"),
+    "entities": ("robots", "objects", "scenery", "scene", "rules", "surfaces", "physics", "origin", "events"),
+    "file": (),
+}
+"""Pages of the deployment's reference, by the keys whose values they describe; the last one has the rest."""
+
+
+def write_deployment(section: str) -> Iterator[str]:
+    """Yield a table for each kind of mapping of a section, in the order in which a deployment leads to it."""
+    definitions = deployment_schema()["$defs"]
+    described = set[str]()
+    for name in takewhile(lambda name: name != section, SECTIONS):
+        described.update(_reached(name, described))
+    for name in _reached(section, described):
+        part = deployment_schema() if name == "the file" else definitions[name]
         if "properties" not in part:
             continue
         yield f"### {name[0].upper() + name[1:]}\n\n{part['description']}\n\n| key | value | default |\n|---|---|---|\n"
         for key, value in part["properties"].items():
             default = "required" if key in part.get("required", ()) else _default(value)
             yield f"| `{key}` | {_cell(_value(value))} | {default} |\n"
-            for found in re.findall(r"#/\$defs/(\w+)", str(value)):
-                if found not in met:
-                    met.add(found)
-                    waiting.append(found)
         yield "\n"
+
+
+def _reached(section: str, described: Collection[str]) -> list[str]:
+    """Return the definitions to which the keys of a section lead, without those of the sections before it."""
+    schema = deployment_schema()
+    definitions = schema["$defs"]
+    keys = SECTIONS[section]
+    parts = [schema, *definitions.values()]
+    starts = [part["properties"][key] for part in parts for key in keys if key in part.get("properties", {})]
+    reached = list(dict.fromkeys(_references(starts))) if keys else ["the file"]
+    reached = [name for name in reached if name not in described]
+    for name in reached:
+        found = _references(schema["properties"] if name == "the file" else definitions[name])
+        reached += [one for one in dict.fromkeys(found) if one not in reached and one not in described]
+    return reached
+
+
+def _references(part: object) -> list[str]:
+    return re.findall(r"#/\$defs/(\w+)", str(part))
 
 
 def _default(value: Mapping[str, Any]) -> str:
@@ -303,7 +326,7 @@ def _cell(text: str) -> str:
 
 WRITERS: Final[Mapping[str, Callable[[], Iterator[str]]]] = {
     "commands": write_commands,
-    "deployment": write_deployment,
+    **{f"deployment {section}": partial(write_deployment, section) for section in SECTIONS},
     "units": write_units,
     "channels": write_channels,
     "rows": write_rows,
