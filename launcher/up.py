@@ -368,8 +368,8 @@ class Up:
 
     def _kill(self, child: Child, why: str) -> None:
         if not child.killed:
-            self.display.say(f"{child.name} does not answer any more: it is killed ({why})")
             child.kill(why)
+            self.display.say(f"{child.name} does not answer any more{child.place}: it is killed ({why})")
 
     def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
         """Restart a supervisor that ended before the run did; False when the run is over, or it is given up."""
@@ -541,7 +541,7 @@ class Up:
             if blamed is None:
                 return []
             has_failed = blamed.exit_code not in (None, DONE) or blamed.left_early
-            how = f"{name} {blamed.ending}; its log is" if has_failed else f"the log of {name} is"
+            how = f"{name} {blamed.ending}{blamed.place}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
         reason = result["reason"]
         is_said = child.ending in reason or child.name in self._restarts.failed

@@ -43,7 +43,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.rejects import Refusals
-from foosim.protocol.retry import Patience
+from foosim.protocol.retry import RetryTimer
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
@@ -134,7 +134,7 @@ class NodeCore:
         self._barrier: Barrier | None = None
         self._input_digest = b""
         self._sensed = False
-        self._patience = Patience(now_ns)
+        self._retry = RetryTimer(now_ns)
         self._not_finite: set[str] = set()
         """Whose readings have been said not to be finite."""
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
@@ -233,12 +233,12 @@ class NodeCore:
     def wake(self, now_ns: int) -> None:
         """Send what is due by time: hello, heartbeat, repeated requests."""
         self.member.wake(now_ns, self._heartbeat)
-        if self._is_in and self._patience.is_over(now_ns) and self.work is None:
+        if self._is_in and self._retry.is_over(now_ns) and self.work is None:
             self._ask_again(now_ns)
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
-        return min(self.member.deadline_ns, self._patience.at_ns) if self._is_in else self.member.deadline_ns
+        return min(self.member.deadline_ns, self._retry.at_ns) if self._is_in else self.member.deadline_ns
 
     @property
     def _is_in(self) -> bool:
@@ -257,18 +257,6 @@ class NodeCore:
             assert self.deployment is not None and self.member.layout is not None
             self._stepper = Stepper(self.deployment, self.member.layout, is_watched=self.is_watched)
         return self._stepper
-
-    def present_tick(self) -> int:
-        """Return the tick that is computed, -1 without one. Any thread may call this."""
-        frame, term = self.frame, self._term
-        return -1 if frame is None or term is None else frame.tick
-
-    def slow_tick(self, text: str) -> Publish:
-        """Return what tells the supervisor of what takes long at a tick. Any thread may call this."""
-        tick = max(0, self.present_tick())
-        text = sendable(text)[: limits.TEXT_LENGTH_MAX]
-        beat = Heartbeat(self.name, tick, self.epoch, "", "", self.busy, b"", slow=text)
-        return Publish(channels.HEARTBEAT, self.name, encode(beat))
 
     def make_anew(self) -> None:
         """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
@@ -384,7 +372,7 @@ class NodeCore:
         self._barrier = None
         self._sensed = False
         assert self.deployment is not None
-        self._patience.progress(self.deployment.tick_ns, now_ns)
+        self._retry.progress(self.deployment.tick_ns, now_ns)
         self._history[frame.tick], old = frame, frame.tick - limits.KEPT_TICKS
         self._history.pop(old, None)
         self._inputs.forget(old)
@@ -462,7 +450,7 @@ class NodeCore:
         else:
             wants = [Want(self.name, channel.name, tick, self.epoch, []) for channel in self._inputs.missing(tick)]
         self.actions += [Publish(channels.WANT, self.name, encode(want)) for want in wants]
-        self._patience.asked(now_ns)
+        self._retry.requested(now_ns)
 
     # --- epochs, start and end ---------------------------------------------------------------------------------------
 
@@ -504,7 +492,7 @@ class NodeCore:
         else:
             message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch, []))
             self.actions.append(Publish(channels.WANT, self.name, message))
-            self._patience.progress(self.deployment.tick_ns, now_ns)
+            self._retry.progress(self.deployment.tick_ns, now_ns)
 
     def _begin_anew(self, epoch: Epoch) -> None:
         """The other nodes continue without this one: its results are void, so it joins again."""

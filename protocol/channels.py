@@ -134,41 +134,8 @@ PLAYED: Final = _replay("played", replay_messages.Played, "replay", "operator", 
 REPLAY_REQUEST: Final = _replay("request", messages.Request, "operator", "replay", "a request", bytes_max=_SMALL)
 REPLAY_ANSWER: Final = _replay("answer", messages.Answer, "replay", "the named one", "an answer")
 
-CHANNELS: Final[tuple[Channel, ...]] = (
-    HELLO,
-    RECALL,
-    BUILD,
-    FETCH,
-    PIECE,
-    REFUSAL,
-    READY,
-    RESUME_STATE,
-    RESUME_GRANT,
-    EPOCH,
-    ORDER,
-    PART,
-    SAMPLES,
-    COMMIT,
-    DELIVERIES,
-    WANT,
-    HEARTBEAT,
-    TEMPO,
-    WATCHED,
-    END,
-    FAREWELL,
-    REQUEST,
-    INQUIRY,
-    ANSWER,
-    VIEW,
-    CLIENT_HELLO,
-    CLIENT_WELCOME,
-    CLIENT_REFUSAL,
-    UP,
-    DOWN,
-    PLAYED,
-    REPLAY_REQUEST,
-    REPLAY_ANSWER,
-)
+CHANNELS: Final[tuple[Channel, ...]] = tuple(value for value in list(globals().values()) if isinstance(value, Channel))
+"""All of the above, in their order."""
 
 _NAMES: Final = {
     channel.key: field

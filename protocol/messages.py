@@ -140,8 +140,7 @@ class Heartbeat(Message, frozen=True):
     run cannot continue (a client is lost, a component has raised), `busy` is its load (0 to 1), `report` is JSON for
     display, `failed` the form that has raised.
 
-    The vHub sends one without a report before late deliveries, to name the clients that these waited for. A node does
-    when its tick takes long: `slow` says where."""
+    The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 
     sender: Name
     tick: Counter
@@ -151,7 +150,6 @@ class Heartbeat(Message, frozen=True):
     busy: float
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
     failed: FailedForm | None = None
-    slow: Text = ""
 
 
 # --- simulation plane: membership -----------------------------------------------------------------------------------

@@ -21,11 +21,13 @@ from typing import Final
 PARENT_VARIABLE: Final = "FOOSIM_PARENT"
 """Process id of the launcher and the number of the pipe's reading end, as `PID:FD`."""
 STACK_SIGNAL: Final = signal.SIGUSR1
+STDERR: Final = 2
 _PR_SET_PDEATHSIG: Final = 1
 
 
 def die_with_parent() -> None:
-    """Tie this process to the launcher that started it; nothing happens when none did."""
+    """Tie this process to the launcher that started it, if one did, and have STACK_SIGNAL show its stack."""
+    end_with_stack()
     parent, _, pipe = os.environ.pop(PARENT_VARIABLE, "").partition(":")
     if not parent:
         return
@@ -49,7 +51,7 @@ def end_with(parent: int) -> None:
 def end_with_stack() -> None:
     """Have STACK_SIGNAL write the stacks of all threads to standard error and end this process, for one that hangs."""
     signal.signal(STACK_SIGNAL, signal.SIG_DFL)
-    faulthandler.register(STACK_SIGNAL, sys.stderr, all_threads=True, chain=True)
+    faulthandler.register(STACK_SIGNAL, STDERR, all_threads=True, chain=True)
 
 
 def _watch(pipe: int) -> None:

@@ -35,8 +35,6 @@ class ProgressMonitor:
         """When `lost` was asked last."""
         self.late = ""
         """The process that the last late tick waited for."""
-        self.late_why = ""
-        """What that process has said of what takes long at the tick; empty without."""
         self.late_tick = -1
         self._busy_ns = 0
         self._begun_ns = self._progress_ns = now_ns
@@ -105,7 +103,6 @@ class ProgressMonitor:
         """A frame is committed, of a tick that was due to be released at `due_ns`; return what is to be logged."""
         if lag_ns > self._lag_ns:
             self.late = self._waited_for(frame_tick - 1, due_ns, now_ns)
-            self.late_why = self._said_of(self.late, frame_tick - 1)
             self.late_tick = frame_tick
         self._lag_ns = lag_ns
         self._committed[frame_tick] = now_ns - self._busy_ns, self._busy_ns
@@ -123,9 +120,7 @@ class ProgressMonitor:
         if now_ns - self._late_said_ns < LATE_EVERY_NS:
             return ""
         self._late_said_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
-        return (
-            f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late}{self.late_why} ({count} late ticks)"
-        )
+        return f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late} ({count} late ticks)"
 
     def _waited_for(self, tick: int, due_ns: int, now_ns: int) -> str:
         """Return the process with the longest share of the time from the commit of frame `tick` to the next one."""
@@ -183,7 +178,7 @@ class ProgressMonitor:
         heartbeat_ns = state.wait_ns(deadlines.heartbeat_ns)
         silent = state.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return {name: f"no heartbeat for {heartbeat_ns / 1e9:g} s{self._said_of(name, tick)}" for name in silent}
+            return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
         if state.is_resuming:
             return {}  # no process is waited for yet
         if state.is_vhub_away:
@@ -201,18 +196,11 @@ class ProgressMonitor:
         if self._waits_for_capture(names):
             lost_ns = max(lost_ns, deadlines.close_ns)
         if overdue_ns > lost_ns:
-            why = f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s"
-            return {name: why + self._said_of(name, tick) for name in names}
+            return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             state.log("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
-
-    def _said_of(self, name: str, tick: int) -> str:
-        """Return what a node has said of what takes long at a tick or later, as a part of a reason."""
-        process = self._state.roster.by_name.get(name)
-        slow = None if process is None else process.slow
-        return f": {slow.slow}" if slow is not None and slow.tick >= tick else ""
 
     def _waits_for_capture(self, names: list[str]) -> bool:
         """Whether only the vHub is waited for, and reports to wait for its disk."""

@@ -42,8 +42,6 @@ class Process:
     """A node's digest of a fixed small run of its engine, once it has one."""
     heard_ns: int = 0
     heartbeat: Heartbeat | None = None
-    slow: Heartbeat | None = None
-    """The last one that names what takes long at a tick."""
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0

@@ -73,7 +73,6 @@ SHELLS = {
     "console/server/serving.py",
     "node/physics/mesh_trial.py",
     "node/main.py",
-    "node/slow_watch.py",
     "deployment/assets.py",
     "door/_capture.py",
     "door/_rehearse.py",

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import time
@@ -24,12 +25,13 @@ from foosim.launcher.children.ending import Ending, OomKills, oom_kills
 from foosim.launcher.hosts.ssh import Remote
 from foosim.runtime.children import GRACE_S, ROLE, child_environment, script
 from foosim.runtime.process import STACK_SIGNAL
+from foosim.world.forms.failures import in_library
 
 POLL_S: Final = 0.02
-SHOW_STACKS: Final = ([*ROLE, "player"], [*ROLE, "roles"])
-"""Commands whose processes run code of users."""
 STACK_S: Final = 1.0
-"""Time for a hanging player to log its stack."""
+"""Time for a hanging process to log its stack."""
+STACK_LINES: Final = 60
+_CALL: Final = re.compile(r'File "(.*)", line (\d+) in (\S+)')
 LINES: Final = 30
 """Size of the log excerpt that is searched for ssh's error."""
 
@@ -81,16 +83,23 @@ class Child:
         return self.how.text
 
     def kill(self, why: str) -> None:
-        """Kill it for a reason that is reported; a player logs its stack before."""
+        """Kill it for a reason that is reported; it logs its stack before."""
         self.killed = why
         if self.ask_for_stack():
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(STACK_S)
         self.process.kill()
 
+    @property
+    def place(self) -> str:
+        """` at FILE:LINE in FUNCTION`: where the last stack in its log was outside of libraries; empty without one."""
+        stack = "\n".join(self._tail(STACK_LINES)).rpartition("(most recent call first):")[2]
+        calls = [call for call in _CALL.findall(stack) if not in_library(call[0])]
+        return f" at {Path(calls[0][0]).name}:{calls[0][1]} in {calls[0][2]}" if calls else ""
+
     def ask_for_stack(self) -> bool:
-        """Make a player on this machine log its stack and end; False for any other process."""
-        shows = list(self.command[:3]) in SHOW_STACKS and self.remote is None
+        """Make a role's process on this machine log its stack and end; False for any other process."""
+        shows = self.command[:2] == ROLE and self.remote is None
         if shows:
             self.process.send_signal(STACK_SIGNAL)
         return shows
@@ -179,7 +188,7 @@ class Launcher:
         return True
 
     def stop(self, grace_s: float = GRACE_S) -> None:
-        """End all children: SIGTERM, then, after the grace period, SIGKILL; hanging players log their stacks before."""
+        """End all children: SIGTERM, then, after the grace period, SIGKILL; hanging roles log their stacks before."""
         self._signal(signal.SIGTERM)
         if not self.wait(grace_s):
             if [child for child in self.alive() if child.ask_for_stack()]:

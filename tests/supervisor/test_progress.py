@@ -21,7 +21,6 @@ from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Hear
 from foosim.rehearsal.run import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
 from foosim.supervisor.progress import ProgressMonitor, _names
-from foosim.supervisor.roster import Process
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
@@ -441,21 +440,6 @@ def test_late_deliveries_are_blamed_on_whom_the_vhub_named(said: str, name: str)
         made.part(10, node, 31 * MS)
     line = made.committed(11, 9 * MS, 20 * MS, 31 * MS)
     assert made.late == name and line == f"tick 11: lag 9.0 ms, waited for {name} (1 late ticks)"
-
-
-def test_what_a_node_has_said_of_a_late_tick_is_named_with_it() -> None:
-    made = monitor()
-    process = made._state.roster.by_name["n2"] = Process("node", "n2", "b")
-    for tick, why in ((10, ""), (11, ": an engine was built"), (12, "")):
-        said_ns = 20 * MS * (tick - 9)
-        made.released(tick, said_ns)
-        if why:
-            process.slow = Heartbeat("n2", tick, 1, "", "", 0, b"", slow=why.removeprefix(": "))
-        made.part(tick, "n1", said_ns + MS)
-        made.part(tick, "n2", said_ns + (tick - 8) * MS)
-        made._late_said_ns = -10_000 * MS
-        line = made.committed(tick + 1, (tick - 1) * MS, said_ns, said_ns + (tick - 8) * MS)
-        assert line == f"tick {tick + 1}: lag {tick - 1}.0 ms, waited for n2{why} (1 late ticks)"
 
 
 def test_the_slowest_node_counts_from_when_it_had_its_inputs() -> None:

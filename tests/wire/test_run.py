@@ -456,7 +456,7 @@ class Dozes:
 
     def sample(self, view):
         if view.tick == 10:
-            time.sleep(1.0)
+            time.sleep(1.5)
         return Nothing(0.0)
 """
 
@@ -473,16 +473,12 @@ def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, mo
     code, out, err = house.end(up)
     assert code == 0, (out, err)
     logs = "".join(path.read_text() for path in (house.folder / "state" / "foosim" / "runs").glob("*/logs/*"))
-    slow = r"dozes\.py:\d+ in sample has taken more than 0\.2 s at tick 10\n"
-    assert re.search(rf"tick 1[01]: lag \d+\.\d ms, waited for red: {slow}", logs), logs
-    assert re.search(rf" red: {slow}", logs), logs
-    assert re.search(rf" supervisor: red: {slow}", logs), logs
+    assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
+    assert re.search(r'Timeout .*\n(.*\n)*  File ".*/dozes\.py", line \d+ in sample\n', logs), logs
 
 
-def test_a_component_that_hangs_is_in_the_reason_of_its_node_s_loss(
-    house: House, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.0)", "sleep(1000.0)"))
+def test_a_component_that_hangs_is_named_with_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.5)", "sleep(1000.0)"))
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
     own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
     up = house.up(
@@ -492,8 +488,8 @@ def test_a_component_that_hangs_is_in_the_reason_of_its_node_s_loss(
     )
     code, out, err = house.end(up)
     assert code == 1, (out, err)
-    named = r": dozes\.py:\d+ in sample has taken more than 0\.2 s at tick 10"
-    assert re.search(f"^lost red: tick 10 is overdue by .* s{named}", last_json(out)["reason"]), (out, err)
+    assert re.search("^lost red: tick 10 is overdue by .* s$", last_json(out)["reason"]), (out, err)
+    assert re.search(r"^red was killed by .* at dozes\.py:\d+ in sample; its log is ", err, re.MULTILINE), (out, err)
 
 
 FACTOR: Final = "FACTOR = {}\n"
