@@ -19,7 +19,7 @@ from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
-from foosim.launcher.children.child_time import ChildTimes, observe
+from foosim.launcher.children.child_time import ChildTimes, waited_s
 from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
 from foosim.launcher.children.processes import Child, Launcher
 from foosim.launcher.children.restarts import Restarts
@@ -102,7 +102,7 @@ class Up:
         self._is_resumed, self._is_killed = resumed is not None, False
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
-        self._child_times = ChildTimes(observe)
+        self._child_times = ChildTimes(waited_s)
         self._beside = self._players(self._process_of[SUPERVISOR])
         """The players that share the supervisor's process."""
         self._hangs = 0
