@@ -4,7 +4,6 @@ import json
 import re
 import sys
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from foosim.deployment.schema import Capture
 from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher import pki as certificates
 from foosim.launcher import plan
-from foosim.launcher.new_capture import check_capture, check_rooms
+from foosim.launcher.new_capture import check_rooms
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.help_text import summary_of
@@ -107,10 +106,6 @@ def test_shells_complete_verbs_and_options(
     typed: Typed, monkeypatch: pytest.MonkeyPatch, words: str, offered: str
 ) -> None:
     assert shell_words(typed, monkeypatch, words).split() == offered.split()
-
-
-def test_the_version_is_that_of_the_package(command: Command) -> None:
-    assert command("--version") == (0, f"foosim {version('foosim')}\n", "")
 
 
 def test_a_valid_file_is_summed_up(command: Command) -> None:
@@ -264,24 +259,12 @@ def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -
         check_rooms(full, at, tmp_path / "runs")
 
 
-def test_the_folder_of_a_capture_is_made_and_left_empty(tmp_path: Path) -> None:
-    path = tmp_path / "far" / "away" / "mine.mcap"
-    assert check_capture(path) == path
-    assert list(path.parent.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     "arguments",
     [("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)],
 )
 def test_without_a_live_run_there_is_nobody_to_control(command: Command, arguments: tuple[str, ...]) -> None:
     assert command(*arguments) == (1, "", "no run is live; foosim up FILE starts one\n")
-
-
-def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
-    for typed in ("many", "0", "-3", "1.5"):
-        done = command("step", typed)
-        assert done.code == 2 and done.err.startswith("foosim step: Invalid value for 'COUNT': Input should be ")
 
 
 @pytest.mark.parametrize(
@@ -327,11 +310,6 @@ def test_a_group_without_words_shows_its_help(typed: Typed, group: tuple[str, ..
     done = typed(*group)("--qqq")
     assert done.code == 2 and done.out == ""
     assert done.err.startswith(f"foosim {' '.join(group)}: No such option: --qqq")
-
-
-def test_what_is_missing_is_named(typed: Typed) -> None:
-    done = typed("role", "node")()
-    assert done == (2, "", "foosim role node: Missing option '--name'\n")
 
 
 @pytest.mark.parametrize(

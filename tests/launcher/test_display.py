@@ -21,7 +21,6 @@ from foosim.launcher.display import (
     render_text,
 )
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.run_status import NO_PACKETS
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 from foosim.world.kits.hall import HallKit
@@ -119,13 +118,6 @@ def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
     assert row_of(text, "22510").split() == ["all", "22510", "22390", "113", "7", "in", "flight"]
 
 
-def test_links_that_nobody_used_are_neither_shown_nor_counted(running: dict[str, Any]) -> None:
-    running["links"].append(["red.goal", "blue.goal", 0, 0, 0, 0, "lan", 0, {}, []])
-    text = render_text(running)
-    assert not [line for line in text.splitlines() if line.startswith("red.goal")]
-    assert " more" not in row_of(text, "all", "22510")
-
-
 def test_of_too_many_links_the_busiest_are_shown(running: dict[str, Any]) -> None:
     rest = [0, 0, "lan", 0, {}, []]
     running["links"] = [["camera", f"player-{n}", n, n, *rest] for n in range(LINKS_SHOWN_MAX + 5)]
@@ -151,19 +143,6 @@ def test_counts_of_a_vhub_that_is_away_are_said_to_be_old(running: dict[str, Any
     assert "delivered, 113 dropped (before the vHub was lost) | load" in plain_line(running)
     assert row_of(render_text(running), "links (before the vHub was lost)")
     assert row_of(render_text(running), "22510").split()[:4] == ["all", "22510", "22390", "113"]
-
-
-def test_a_vhub_that_has_not_told_has_no_count_of_packets(running: dict[str, Any]) -> None:
-    assert "packets" in plain_line(running)
-    running["packets"] = NO_PACKETS
-    assert "packets" not in plain_line(running)
-
-
-def test_fast_has_no_lag_and_a_pause_says_so(running: dict[str, Any]) -> None:
-    running |= {"lag_ms": None, "pace": "fast", "state": "paused"}
-    assert "lag" not in plain_line(running)
-    assert " | fast, paused | " in plain_line(running)
-    assert "lag" not in render_text(running)
 
 
 def test_before_the_first_tick_it_says_who_is_waited_for() -> None:
@@ -227,14 +206,6 @@ def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: 
 )
 def test_losses_and_returns_are_lines(entry: dict[str, Any], text: str) -> None:
     assert recovery_text(entry) == text
-
-
-def test_what_passed_before_the_first_tick_does_not_count_as_slow(running: dict[str, Any]) -> None:
-    stream = io.StringIO()
-    with Display(stream) as display:
-        display.show({**running, "state": "starting", "ticks": 0}, 100.0)
-        display.show(running, 200.0)
-    assert " | 1.00x (wanted realtime) | " in stream.getvalue().splitlines()[1]
 
 
 @pytest.mark.parametrize("height", [17, 18, 24])

@@ -108,23 +108,6 @@ def test_a_corrupt_last_record_ends_the_file(tmp_path: Path, place: int) -> None
     assert records.left_bytes == FRAMING_BYTES + 4
 
 
-def test_zeros_behind_the_records_are_none(tmp_path: Path) -> None:
-    """Some file systems leave zeros where a dead machine had not written yet."""
-    path = written(tmp_path, RECORDS)
-    with path.open("ab") as file:
-        file.write(bytes(4096))
-    records = read_records(path)
-    assert list(records) == RECORDS
-    assert records.left_bytes == 4096
-
-
-def test_a_length_beyond_the_file_is_not_believed(tmp_path: Path) -> None:
-    path = written(tmp_path, [b"first"])
-    with path.open("ab") as file:
-        file.write(b"\xff\xff\xff\xff" + bytes(40))
-    assert list(read_records(path)) == [b"first"]
-
-
 def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "hub-000001.journal"
     with pytest.raises(JournalError, match=r"hub-000001\.journal: cannot be read, No such file"):
