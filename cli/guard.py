@@ -148,7 +148,7 @@ def run_command(
 def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
     """Answer a doctor on another machine how this one is, over standard input and output."""
     _check_version(version_of_launcher)
-    from foosim.launcher.doctor.remote import serve  # a guard of a process starts quickly
+    from foosim.launcher.doctor import serve  # a guard of a process starts quickly
 
     serve(sys.stdin.buffer, sys.stdout.buffer)
     raise typer.Exit(DONE)

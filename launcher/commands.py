@@ -11,7 +11,7 @@ from pathlib import Path
 
 from foosim.common.addresses import parse_address
 from foosim.deployment.processes import Process
-from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher.hosts import CAPTURE, Remote
 from foosim.launcher.plan import Plan
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.children import FOOSIM, ROLE

@@ -19,17 +19,15 @@ from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
-from foosim.launcher.children.child_time import ChildTimes, waited_s
-from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
-from foosim.launcher.children.processes import Child, Launcher
-from foosim.launcher.children.restarts import Restarts
 from foosim.launcher.commands import Commands
 from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
-from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
-from foosim.launcher.hosts.ssh import remotes as remotes_of
+from foosim.launcher.hosts import check_hosts, fetch_capture
+from foosim.launcher.hosts import remotes as remotes_of
+from foosim.launcher.liveness import QUESTION_S, ChildTimes, OwnTime, Restarts, StalledWatch, SupervisorWatch, waited_s
 from foosim.launcher.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
 from foosim.launcher.plan import Plan
+from foosim.launcher.processes import Child, Launcher
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED

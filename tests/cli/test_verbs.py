@@ -19,7 +19,7 @@ from foosim.deployment.schema import Capture
 from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher import pki as certificates
 from foosim.launcher import plan
-from foosim.launcher.new_capture import check_rooms
+from foosim.launcher.plan import check_rooms
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.help_text import summary_of

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from foosim.launcher.children.child_time import EVERY_S, WARNED_EVERY_S, WINDOW_S, ChildTimes, waited_s
+from foosim.launcher.liveness import OBSERVED_EVERY_S, STARVED_S, WARNED_EVERY_S, ChildTimes, waited_s
 
 
 def passed(*looks: tuple[float, float | None]) -> float:
@@ -29,7 +29,7 @@ def test_a_clock_never_runs_back_nor_faster_than_its_launchers() -> None:
     now_s, before_s = 0.0, 0.0
     times = ChildTimes(lambda pid: draw.choice([None, 5.0 * draw.random() * now_s]))
     for _ in range(2_000):
-        step_s = EVERY_S + draw.random()
+        step_s = OBSERVED_EVERY_S + draw.random()
         now_s += step_s
         time_s = times.at(7, now_s)
         assert before_s - 1e-9 <= time_s <= before_s + step_s + 1e-9
@@ -42,18 +42,18 @@ def test_a_starved_process_is_reported_and_no_longer_when_it_has_a_processor_aga
 
     def look(pid: int) -> float:
         nonlocal total_s
-        total_s += next(shares) * WINDOW_S
+        total_s += next(shares) * STARVED_S
         return total_s
 
     times = ChildTimes(look)
     reported = []
     for window in range(5):
-        times.at(7, window * WINDOW_S)
-        reported.append(times.warning({"red": 7, "blue": 8}, window * WINDOW_S))
+        times.at(7, window * STARVED_S)
+        reported.append(times.warning({"red": 7, "blue": 8}, window * STARVED_S))
     warning = "this machine is starved of processor time: red received 0.2 s of processor time in 5 s"
     assert reported == ["", f"{warning}; their deadlines are extended", "", "", ""], "not again so soon"
-    assert times.at(7, 4 * WINDOW_S + EVERY_S / 2) == pytest.approx(EVERY_S / 2 + 1.88 * WINDOW_S)
-    assert times.warning({"red": 7}, WINDOW_S + WARNED_EVERY_S) == "", "it has a processor again"
+    assert times.at(7, 4 * STARVED_S + OBSERVED_EVERY_S / 2) == pytest.approx(OBSERVED_EVERY_S / 2 + 1.88 * STARVED_S)
+    assert times.warning({"red": 7}, STARVED_S + WARNED_EVERY_S) == "", "it has a processor again"
 
 
 def test_what_the_system_reports_of_a_process() -> None:

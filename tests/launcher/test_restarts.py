@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from foosim.launcher.children.restarts import AWAY_S, WAITS_S, WINDOW_S, Restarts
+from foosim.launcher.liveness import AWAY_S, WAITS_S, WINDOW_S, Restarts
 
 
 def test_the_waits_double_and_then_it_is_given_up() -> None:

@@ -14,13 +14,12 @@ import msgspec
 import pytest
 
 from foosim.client import control
-from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
-from foosim.launcher.children.processes import Child
-from foosim.launcher.children.restarts import WAITS_S
 from foosim.launcher.console_child import ADDRESSES
 from foosim.launcher.display import Display
+from foosim.launcher.liveness import QUESTION_S, UNANSWERED_MAX, WAITS_S
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
+from foosim.launcher.processes import Child
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import END_S, Up
 from foosim.protocol.channels import SUPERVISOR, VHUB

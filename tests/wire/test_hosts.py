@@ -14,9 +14,9 @@ import pytest
 
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
-from foosim.launcher.doctor import remote as doctor_remote
-from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher import doctor as doctor_remote
+from foosim.launcher.doctor import LIMIT_S, Question, ask
+from foosim.launcher.hosts import Remote
 from tests.apart import apart
 from tests.wire import sshd
 from tests.wire.conftest import LONG

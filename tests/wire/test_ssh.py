@@ -19,10 +19,9 @@ import pytest
 from foosim.client.control import Control
 from foosim.common.errors import Failed
 from foosim.deployment.hosts import Host
-from foosim.launcher.children.processes import Child, Launcher
-from foosim.launcher.hosts import ssh as remote_module
-from foosim.launcher.hosts.prepare import fetch_capture
-from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher import hosts as remote_module
+from foosim.launcher.hosts import CAPTURE, Remote, fetch_capture
+from foosim.launcher.processes import Child, Launcher
 from foosim.runtime.transport.certificates import operator_credentials
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE, command_path, processes_with, wait_for
