@@ -12,7 +12,7 @@ import typer
 
 from foosim.cli import main
 from foosim.cli.role import RoleVerbs
-from foosim.cli.verbs import Foosim, Verb
+from foosim.cli.verbs import Foosim
 from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Capture
@@ -52,14 +52,8 @@ def test_help_shows_each_verb_with_the_whole_first_paragraph_of_its_own_help(
     for name, verb in [row for verbs in table.values() for row in verbs.items()]:
         own = typed(*group, *name.split())("--help")
         assert own.code == 0 and own.out.startswith(f"Usage: foosim {' '.join((*group, name))} ")
-        assert summary_of(command_of(verb, name)) == verb.summary
-        assert f"{name} {verb.summary}" in shown
-
-
-def command_of(verb: Verb, name: str) -> Any:
-    """What typer knows of a verb."""
-    command = typer.main.get_command(import_module(f"foosim.{verb.module}").app)
-    return getattr(command, "commands", {}).get(verb.name or name, command)
+        command: Any = typer.main.get_command(import_module(f"foosim.{verb}").app)
+        assert f"{name} {summary_of(getattr(command, 'commands', {}).get(name, command))}" in shown
 
 
 @pytest.mark.parametrize("name", Foosim.plumbing)
