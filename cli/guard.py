@@ -72,7 +72,7 @@ def guard(run: str, name: str, command: list[str]) -> int:
             send(signal.SIGKILL)
 
     def watch() -> None:
-        """Wait for the end of the connection, which nobody writes to."""
+        """Wait for the end of the connection, which carries no data."""
         while os.read(sys.stdin.fileno(), 4096):
             pass
         end_process()

@@ -135,7 +135,7 @@ _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end --
 def commands() -> Iterator[tuple[str, Any]]:
     """Yield every command, such as `foosim capture verify`, as typer knows it; second names are left out."""
     foosim = Foosim(name="foosim")
-    names = [*foosim.list_commands(None), *(name for name, verb in foosim.plumbing.items() if not verb.name)]
+    names = [*foosim.list_commands(None), *(name for name, verb in foosim.plumbing.items() if ":" not in verb)]
     for name in names:
         yield from _commands_in(f"foosim {name}", foosim.get_command(None, name))
 

@@ -67,7 +67,7 @@ def begin(
     return Up(plan, path, display, run, console=page)
 
 
-def go_on(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
+def resume_run(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
     """Return a run to be resumed, or the outcome of one that has ended. Raises Refused."""
     if folder.result() is not None:
         _prepare((), None, display)

@@ -120,7 +120,7 @@ class Case:
 
 def examine(case: Case) -> list[Finding]:
     """Return the findings of all checks on this machine, in the order of the checks."""
-    return [Finding(name, *said, host=case.host or HERE) for name, check in CHECKS.items() for said in check(case)]
+    return [Finding(name, *row, host=case.host or HERE) for name, check in CHECKS.items() for row in check(case)]
 
 
 def is_well(findings: Iterable[Finding]) -> bool:
@@ -128,11 +128,11 @@ def is_well(findings: Iterable[Finding]) -> bool:
     return all(finding.state != "problem" for finding in findings)
 
 
-_Said = tuple[str, State, str, str]
+_Row = tuple[str, State, str, str]
 """Subject, state, text, remedy."""
 
 
-def _processes(case: Case) -> Iterator[_Said]:
+def _processes(case: Case) -> Iterator[_Row]:
     """Which roles share a process, on this machine."""
     hosts = places(case.deployment)
     for process in processes_of(case.deployment).values():
@@ -140,7 +140,7 @@ def _processes(case: Case) -> Iterator[_Said]:
             yield process.name, "fine", f"has {', '.join(process.roles)}", ""
 
 
-def _versions(case: Case) -> Iterator[_Said]:
+def _versions(case: Case) -> Iterator[_Row]:
     """Versions of foosim, Python and each library against the requirements; whether the hot path is compiled."""
     yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
     python = platform.python_version()
@@ -157,7 +157,7 @@ def _versions(case: Case) -> Iterator[_Said]:
             yield _library(wanted)
 
 
-def _library(wanted: Requirement) -> _Said:
+def _library(wanted: Requirement) -> _Row:
     try:
         found = importlib.metadata.version(wanted.name)
     except importlib.metadata.PackageNotFoundError:
@@ -167,7 +167,7 @@ def _library(wanted: Requirement) -> _Said:
     return wanted.name, "fine", found, ""
 
 
-def _arithmetic(case: Case) -> Iterator[_Said]:
+def _arithmetic(case: Case) -> Iterator[_Row]:
     """Nodes whose fingerprints differ are refused, unless the deployment has `mixed_cpu: true`."""
     yield "fingerprint", "fine", f"{library_fingerprint().hex()[:16]} on {platform.machine()}", ""
 
@@ -175,7 +175,7 @@ def _arithmetic(case: Case) -> Iterator[_Said]:
 # --- certificates ----------------------------------------------------------------------------------------------------
 
 
-def _certificates(case: Case) -> Iterator[_Said]:
+def _certificates(case: Case) -> Iterator[_Row]:
     """The certificate of each process here: present, of this root, with its key, valid, for this host."""
     folder = case.pki
     if folder is None and case.ca:
@@ -206,7 +206,7 @@ def _certificates(case: Case) -> Iterator[_Said]:
             yield path.name, "problem", "can be read by others", f"chmod 600 {path}"
 
 
-def _certificate(folder: Path, who: str, case: Case) -> _Said:
+def _certificate(folder: Path, who: str, case: Case) -> _Row:
     """Check the certificate of one process of the run."""
     path = certificate_path(folder, who)
     if not path.exists():
@@ -230,7 +230,7 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
 # --- this machine ----------------------------------------------------------------------------------------------------
 
 
-def _ports(case: Case) -> Iterator[_Said]:
+def _ports(case: Case) -> Iterator[_Row]:
     """Whether the processes that listen on this machine can use their addresses."""
     if not case.is_there:
         yield _port("simulation plane", case.address)
@@ -238,14 +238,14 @@ def _ports(case: Case) -> Iterator[_Said]:
         yield _port("radio plane", case.radio)
 
 
-def _port(plane: str, address: Address) -> _Said:
+def _port(plane: str, address: Address) -> _Row:
     why, remedy = why_not_free(address)
     if why:
         return plane, "problem", f"{address}: {why}", remedy
     return plane, "fine", f"{address} is free" if address.port else f"{address}: the system chooses a free port", ""
 
 
-def _network(case: Case) -> Iterator[_Said]:
+def _network(case: Case) -> Iterator[_Row]:
     """Whether processes on this host would reach the supervisor."""
     if not case.reach:
         return
@@ -256,7 +256,7 @@ def _network(case: Case) -> Iterator[_Said]:
         yield "supervisor", "fine", f"{case.reach} is reached", ""
 
 
-def _placement(case: Case) -> Iterator[_Said]:
+def _placement(case: Case) -> Iterator[_Row]:
     """On the supervisor's machine: whether processes on other hosts could connect to it."""
     where = remotes(case.deployment)
     if case.is_there or not where:
@@ -269,7 +269,7 @@ def _placement(case: Case) -> Iterator[_Said]:
         yield PLACEMENT, "fine", f"{len(where)} processes on {len(case.deployment.hosts)} hosts", ""
 
 
-def _clock(case: Case) -> Iterator[_Said]:
+def _clock(case: Case) -> Iterator[_Row]:
     """Clocks of machines need not agree, but certificates and file names go by them."""
     now = wall_clock.now_utc()
     text = f"{now:%Y-%m-%d %H:%M:%S} UTC"
@@ -288,7 +288,7 @@ def _clock_state() -> int:
     return int(ctypes.CDLL(None).adjtimex(nothing_to_set))
 
 
-def _disk(case: Case) -> Iterator[_Said]:
+def _disk(case: Case) -> Iterator[_Row]:
     """Room and the right to write where runs keep journals and captures go."""
     here = {"runs": runs_folder(), "captures": case.captures}
     for subject, folder in ({"runs": hosted_folder()} if case.is_there else here).items():
@@ -305,7 +305,7 @@ def _disk(case: Case) -> Iterator[_Said]:
             yield subject, "fine", text, ""
 
 
-def _commands(case: Case) -> Iterator[_Said]:
+def _commands(case: Case) -> Iterator[_Row]:
     """The command that `up` starts processes with."""
     found = shutil.which(script())
     if found is None:
@@ -314,7 +314,7 @@ def _commands(case: Case) -> Iterator[_Said]:
         yield FOOSIM, "fine", found, ""
 
 
-def _players(case: Case) -> Iterator[_Said]:
+def _players(case: Case) -> Iterator[_Row]:
     """Whether the classes of the players that are to run on this machine can be imported here."""
     deployment, elsewhere = case.deployment, places(case.deployment)
     here = [name for name in sorted(deployment.players) if elsewhere.get(name) == case.host]
@@ -329,7 +329,7 @@ def _players(case: Case) -> Iterator[_Said]:
         yield name, "problem", text, f"correct players.{name}.class, or put the module's folder on PYTHONPATH {where}"
 
 
-CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
+CHECKS: Final[dict[str, Callable[[Case], Iterator[_Row]]]] = {
     "processes": _processes,
     "versions": _versions,
     "arithmetic": _arithmetic,
@@ -383,7 +383,7 @@ class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def examine_all(case: Case, name: str, text: str, limit_s: float = LIMIT_S) -> list[Finding]:
     """Return the findings of this machine, then those of each host in name order.
 
-    `name` and `text` are those of the deployment's file; a host that says nothing for `limit_s` is not waited for.
+    `name` and `text` are those of the deployment's file; a host has `limit_s` to answer.
     """
     found = examine(case)
     hosts = [Remote(host, about) for host, about in sorted(case.deployment.hosts.items())]
@@ -460,16 +460,18 @@ def ask(remote: Remote, question: Question, limit_s: float, mixed_cpu: bool = Fa
     return unanswered(why, f"install foosim {version('foosim')} on host {remote.name}, {folder}")
 
 
-def _converse(remote: Remote, question: Question, given: IO[bytes], said: IO[bytes], mixed_cpu: bool) -> list[Finding]:
+def _converse(
+    remote: Remote, question: Question, requests: IO[bytes], replies: IO[bytes], mixed_cpu: bool
+) -> list[Finding]:
     """Compare clocks, request the checks, test the listener there; return nothing when the other side is silent."""
     try:
-        if not any(said.readline(LINE_BYTES_MAX).strip() == GREETING.encode() for _ in range(GREETING_LINES_MAX)):
+        if not any(replies.readline(LINE_BYTES_MAX).strip() == GREETING.encode() for _ in range(GREETING_LINES_MAX)):
             return []
         before_ns = wall_clock.now_unix_ns()
-        _say(given, msgspec.json.encode(question))
-        there_ns = int(said.readline(LINE_BYTES_MAX))
+        _send(requests, msgspec.json.encode(question))
+        there_ns = int(replies.readline(LINE_BYTES_MAX))
         after_ns = wall_clock.now_unix_ns()
-        answer = msgspec.json.decode(said.readline(LINE_BYTES_MAX), type=Answer)
+        answer = msgspec.json.decode(replies.readline(LINE_BYTES_MAX), type=Answer)
         not_reached = why_not_reached(parse_address(question.radio)) if question.radio else ""
     except (OSError, ValueError, Refused):  # the connection ended, or the line is invalid: the exit code has the reason
         return []
@@ -521,21 +523,21 @@ def compared(  # what was found out of a host
     return [*found, *(replace(finding, host=remote.name) for finding in answer.findings)]
 
 
-def _say(given: IO[bytes], line: bytes) -> None:
-    given.write(line + b"\n")
-    given.flush()
+def _send(stream: IO[bytes], line: bytes) -> None:
+    stream.write(line + b"\n")
+    stream.flush()
 
 
 # --- answering -------------------------------------------------------------------------------------------------------
 
 
-def serve(given: IO[bytes], told: IO[bytes]) -> None:
-    """Answer the requests on `given`. Raises Malformed or DeploymentError for an invalid question."""
-    _say(told, GREETING.encode())
-    line = given.readline(LINE_BYTES_MAX).strip()
+def serve(requests: IO[bytes], replies: IO[bytes]) -> None:
+    """Answer the requests on `requests`. Raises Malformed or DeploymentError for an invalid question."""
+    _send(replies, GREETING.encode())
+    line = requests.readline(LINE_BYTES_MAX).strip()
     if not line:
         return
-    _say(told, str(wall_clock.now_unix_ns()).encode())
+    _send(replies, str(wall_clock.now_unix_ns()).encode())
     try:
         question = msgspec.json.decode(line, type=Question)
     except msgspec.DecodeError as error:
@@ -547,5 +549,5 @@ def serve(given: IO[bytes], told: IO[bytes]) -> None:
     case = Case(deployment, question.listen, question.insecure, folder, host=host, ca=ca, reach=reach)
     findings = examine(case)
     with listening(parse_address(question.radio)) if question.radio else nullcontext():
-        _say(told, msgspec.json.encode(Answer(library_fingerprint().hex(), findings)))
-        given.readline(LINE_BYTES_MAX)
+        _send(replies, msgspec.json.encode(Answer(library_fingerprint().hex(), findings)))
+        requests.readline(LINE_BYTES_MAX)

@@ -105,7 +105,7 @@ class Remote:
             return f"ended with exit code {code} on host {self.name}"
         where = f"host {self.name} ({self.host.destination})"
         for messages, what in ((_REFUSED, ""), (_AWAY, " cannot be reached")):
-            last = [line.strip() for line in lines if any(said in line for said in messages)][-1:]
+            last = [line.strip() for line in lines if any(text in line for text in messages)][-1:]
             if last:
                 return f"{where}{what}: {last[0]}"
         return f"{where}: the connection ended, or the guard there was killed"
@@ -113,7 +113,7 @@ class Remote:
     @staticmethod
     def is_away(code: int, lines: Sequence[str]) -> bool:
         """Whether it was the network: the machine may come back by itself."""
-        return code == SSH_FAILED and any(said in line for line in lines for said in _AWAY)
+        return code == SSH_FAILED and any(text in line for line in lines for text in _AWAY)
 
 
 def remotes(deployment: Deployment) -> dict[str, Remote]:

@@ -137,8 +137,8 @@ class StalledWatch:
 
 def _reason(status: Mapping[str, Any], name: str) -> str:
     """Return the run's recorded reason for the loss of a process."""
-    told = [entry["reason"] for entry in status["recoveries"] if entry["name"] == name and entry["what"] != "join"]
-    return f" ({told[-1]})" if told else ""
+    reasons = [entry["reason"] for entry in status["recoveries"] if entry["name"] == name and entry["what"] != "join"]
+    return f" ({reasons[-1]})" if reasons else ""
 
 
 PROC: Final = Path("/proc")

@@ -1,4 +1,4 @@
-"""What a run is asked for, and the same checked, before anything is started.
+"""The options of a run, checked before anything is started.
 
 What only some runs need is imported where they do: the reader of captures, the trial of meshes, numpy.
 """
@@ -88,8 +88,8 @@ def check_certificates(plan: Plan) -> list[str]:
         for process in plan.processes.values()
         if not {*process.roles} & {*elsewhere} and all(deployment.launch_of(role) == "local" for role in process.roles)
     ]
-    everybody = [who for process in started for who in identity.of_process(process, deployment)]
-    found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
+    identities = [who for process in started for who in identity.of_process(process, deployment)]
+    found = [*(load_credentials(pki, who) for who in identities), operator_credentials(pki)]
     warnings = [credentials.ends_soon(wall_clock.now_utc()) for credentials in found if credentials is not None]
     return [warning for warning in warnings if warning]
 
@@ -227,7 +227,7 @@ class Place:
 def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Place:
     """Return the room for what a run writes to a folder, which need not be there yet; raises OSError.
 
-    `is_capture`: it is the capture, without which a run may go on. Else it is a journal.
+    `is_capture`: it is the capture, without which a run may continue. Else it is a journal.
     """
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     ends_run = not is_capture or settings.on_full != "continue_unlogged"
@@ -237,8 +237,8 @@ def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Pl
 def check_rooms(settings: Capture, capture: Path | None, runs: Path | None) -> list[str]:
     """Return warnings where disks have less than twice the reserve; raises Refused where a run would end at once.
 
-    `capture` is the file, None where none is written here; `runs` is the folder of runs, or of the one to go on, None
-    where no journal is written.
+    `capture` is the file, None where none is written here; `runs` is the folder of runs, or of the run to be resumed,
+    None where no journal is written.
     """
     warnings = []
     for folder in (None if capture is None else capture.parent, runs):

@@ -67,7 +67,7 @@ class Ending:
             return f"was killed by up: {self.killed_by_us}"
         is_signal = self.code < 0
         how = f"was killed by {signal.Signals(-self.code).name}" if is_signal else f"ended with exit code {self.code}"
-        if any(said in line for line in self.log for said in NO_MEMORY):
+        if any(text in line for line in self.log for text in NO_MEMORY):
             return f"{how}: too little memory"
         if is_signal and self.oom_killed:
             why = f"too little memory: the kernel has killed for that {self.oom_killed} while it ran"
@@ -141,7 +141,7 @@ class Child:
     remote: Remote | None = None
     """The remote machine that it runs on, if any: `process` is then its ssh."""
     begin: int = 0
-    """Offset of its log, behind the logs of its predecessors."""
+    """Offset of its log, after the logs of its predecessors."""
     oom_kills: OomKills = field(default_factory=OomKills)
     """How many processes the kernel had killed for want of memory when it was started."""
     oom_killed: str | None = None

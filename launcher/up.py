@@ -241,7 +241,7 @@ class Up:
     def _await(self, ready: Callable[[], RunInfo | None]) -> RunInfo | None:
         """Return the first value of `ready` that is not None; None when the run is over, or is to end, before."""
         held_s = time.monotonic() + HELD_S
-        while self._goes_on():
+        while self._continues():
             if time.monotonic() > held_s:
                 self.display.release()
             found = None if self._ending_s else ready()
@@ -258,7 +258,7 @@ class Up:
         self._console.start()
         exposure = Exposure(self.plan.address, time.monotonic_ns())
         with ExitStack() as stack:
-            while self._goes_on():
+            while self._continues():
                 if reminder := exposure.due(time.monotonic_ns()):
                     self.display.say(reminder)
                 self._console.look()
@@ -288,15 +288,15 @@ class Up:
     def _show(self, control: Control) -> None:
         supervisor = self._supervisor
         done = [child for child in self._launcher.ended() if child.exit_code == DONE]
-        asked_s = self._time_of(supervisor)
+        requested_s = self._time_of(supervisor)
         try:
             status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
-            self._supervisor_watch.unanswered(self._time_of(supervisor) - asked_s)
+            self._supervisor_watch.unanswered(self._time_of(supervisor) - requested_s)
             return
         self._supervisor_watch.answered()
         now_s = self._own_time.at(time.monotonic())
-        self._tell_recoveries(status["recoveries"])
+        self._show_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
         else:  # the supervisor waits as long as there is progress, and so do we
@@ -328,7 +328,7 @@ class Up:
         self._starts = starts
         self._wanted -= {self._process_of.get(name, name) for name in self._stopped}
 
-    def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
+    def _show_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Show new recoveries once they are complete."""
         while self._shown < len(recoveries) and recoveries[self._shown]["outage_ms"] is not None:
             self.display.say(recovery_text(recoveries[self._shown]))
@@ -439,7 +439,7 @@ class Up:
             return is_lost and not is_given_up and all(player.restart for player in players)
         return VHUB in roles or any(role in self.plan.deployment.nodes for role in roles)
 
-    def _goes_on(self) -> bool:
+    def _continues(self) -> bool:
         """Handle ended children and Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
@@ -472,7 +472,7 @@ class Up:
                 return False
             self._ending_s = now_s
         if self._ending_s and not self._end_requested:
-            self._tell(supervisor)
+            self._request_end(supervisor)
         return not self._ending_s or now_s < self._ending_s + END_S
 
     def _ends_run(self, child: Child) -> bool:
@@ -490,7 +490,7 @@ class Up:
             self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
             self._lost_s = now_s
 
-    def _tell(self, supervisor: Child) -> None:
+    def _request_end(self, supervisor: Child) -> None:
         """Request the end of the run, as `down` does; before the run file exists, a signal kills the supervisor."""
         if self.folder.info() is None:
             return

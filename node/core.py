@@ -107,7 +107,7 @@ class NodeCore:
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
         self.is_watched = False
-        """Whether forms that write to the frame otherwise than by their views are errors: a check asks for that."""
+        """Whether forms that write to the frame otherwise than by their views are errors: a check sets this."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -126,17 +126,17 @@ class NodeCore:
         self._pending = PendingEpochMessages()
         self._remembered: dict[int, float] = {}
         """What the sensors of this node remember of the present frame: numbers of the next one, by place."""
-        self._said: tuple[bytes, list[str], bytes] = b"", [], b""
+        self._last_samples: tuple[bytes, list[str], bytes] = b"", [], b""
         """The samples that were published last: the digest of their frame, whose they are, and the payload.
 
-        Whoever waits for a sensor that takes long asks several times, and it measures once.
+        A request that is repeated while a sensor takes long is answered with them: the sensor measures once.
         """
         self._barrier: Barrier | None = None
         self._input_digest = b""
         self._sensed = False
         self._retry = RetryTimer(now_ns)
         self._not_finite: set[str] = set()
-        """Whose readings have been said not to be finite."""
+        """Readings that were logged as not finite."""
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
         self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
             channels.ORDER.name: self._on_order,
@@ -298,9 +298,9 @@ class NodeCore:
         if term.stepper.sampling.is_silent(frame):
             self._remembered = {}
             return
-        self._remembered = self._say_samples(frame, term.mine)
+        self._remembered = self._publish_samples(frame, term.mine)
 
-    def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
+    def _publish_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
         """Publish what these robots send at a frame; return what their sensors remember."""
         stepper = self.stepper
         packets, remembered = stepper.sense(frame, robots)
@@ -309,7 +309,7 @@ class NodeCore:
             self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite, and not sent"))
         names = [robot.name for robot in robots]
         payload = encode(Samples(frame.tick, frame.digest, self.name, names, packets))
-        self._said = frame.digest, names, payload
+        self._last_samples = frame.digest, names, payload
         self.actions.append(Publish(channels.SAMPLES, self.name, payload))
         return remembered
 
@@ -349,7 +349,7 @@ class NodeCore:
             frame = barrier.assemble()
         except BadParts as bad:
             self._refused += 1
-            self.actions.append(Log("error", f"{bad}: asked for again"))
+            self.actions.append(Log("error", f"{bad}: requested again"))
             barrier.drop(node for node in bad.nodes if node != self.name)
             return False
         self._enter(frame, now_ns)
@@ -426,15 +426,15 @@ class NodeCore:
             self._sample_again(want.tick)
 
     def _sample_again(self, tick: int) -> None:
-        """Log what my robots, also those that I had not at that tick, send at a frame; ask for one that I had not."""
+        """Log what my robots, also those that I had not at that tick, send at a frame; request a missing one."""
         frame = self._history.get(tick)
         if frame is not None:
             mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
-            digest, names, payload = self._said
+            digest, names, payload = self._last_samples
             if digest == frame.digest and names == [robot.name for robot in mine]:
                 self.actions.append(Publish(channels.SAMPLES, self.name, payload))
             else:
-                self._say_samples(frame, mine)
+                self._publish_samples(frame, mine)
         elif self.frame is not None and self.frame.tick - limits.KEPT_TICKS <= tick < self.frame.tick:
             self._unsampled = {kept for kept in self._unsampled if kept >= self.frame.tick - limits.KEPT_TICKS} | {tick}
             message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch, []))
@@ -498,7 +498,9 @@ class NodeCore:
         """The other nodes continue without this one: its results are void, so it joins again."""
         if self.epoch == 0:
             return  # it has not been in yet
-        self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
+        self.actions.append(
+            Log("warning", f"epoch {epoch.epoch} is without this node: it sends its hello again")
+        )
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
         self._inputs.begin(epoch)

@@ -156,7 +156,7 @@ class Heartbeat(Message, frozen=True):
 
 
 class Hello(Message, frozen=True, tag="hello"):
-    """A process asks for membership. An empty `world` accepts any world."""
+    """A process requests membership. An empty `world` accepts any world."""
 
     role: Name
     name: Name
@@ -317,7 +317,7 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks for admission. `received` is the last downlink number up to which it has all. `returns` counts how
+    """A client requests admission. `received` is the last downlink number up to which it has all. `returns` counts how
     often it has lost the vHub after a welcome; its own numbers then continue."""
 
     name: Name

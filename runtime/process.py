@@ -1,6 +1,6 @@
 """Around the loop of every process: it dies with its parent, logs lines, and ends in order on a signal.
 
-The environment tells a child of its launcher. It asks the kernel for a signal when the launcher ends, and a thread
+The environment names the launcher of a child. The kernel signals the end of the launcher to the child, and a thread
 reads a pipe that only the launcher can write: its end has the same meaning where the kernel has no such signal.
 """
 
@@ -41,10 +41,10 @@ def has_launcher() -> bool:
 
 
 def end_with(parent: int) -> None:
-    """Have the kernel kill this process when its parent ends, where the kernel can be asked."""
+    """Have the kernel kill this process when its parent ends, where the kernel can do that."""
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it ended before the kernel was asked
+    if os.getppid() != parent:  # it ended before the request to the kernel
         os._exit(1)
 
 

@@ -162,7 +162,7 @@ class SupervisorCore:
     def lacking(self) -> tuple[Channel, int]:
         """The channel, and how many messages of it, without which there is nothing to commit.
 
-        Commits wait for each other as long as nodes can go on without them, less a tick for what a commit takes.
+        Commits wait for each other as long as nodes can continue without them, less a tick for what a commit takes.
         """
         state = self.state
         inputs, tick = state.inputs, state.frame.tick
@@ -211,7 +211,7 @@ class SupervisorCore:
             return
         if failed and state.abandons(reason):
             state.finished = True
-            state.log("error", f"the run does not go on from tick {state.frame.tick}: {reason}")
+            state.log("error", f"the run does not continue from tick {state.frame.tick}: {reason}")
             return
         state.end = End(state.frame.tick if tick is None else tick, reason, failed, form)
         self.closing.ended(self.progress.now_ns)
@@ -297,7 +297,7 @@ class SupervisorCore:
         deliveries = inputs.deliveries.get(tick)
         if parts is None or deliveries is None or len(parts) < len(state.members) or tick not in state.orders:
             return False
-        assert state.members, "parts of nobody"
+        assert state.members, "parts without members"
         edits = state.orders[tick]
         barrier = Barrier(tick + 1, state.members, self._slots)
         digest = input_digest_of(state.frame.digest, edits, deliveries)
@@ -474,7 +474,7 @@ class SupervisorCore:
             self._fail_by(heartbeat)
 
     def _fail_by(self, heartbeat: Heartbeat) -> None:
-        """A process has said why the run cannot go on; the traceback of a form that has raised is logged here, too."""
+        """A process has reported why the run cannot continue; the traceback of a failed form is logged here, too."""
         form = heartbeat.failed
         if form is not None:
             self.state.log("error", f"{heartbeat.lost}\n{form.traceback}")

@@ -2,7 +2,7 @@
 
 A process is waited for when it has all its inputs and has not answered (node: order and deliveries; vHub: commit,
 samples and Dones; lockstep client: Go). Only such a process can be late or overdue. A late tick is blamed on the
-process with the longest share of the time from the last commit to its own, on a clock that stands still while the
+process with the longest share of the time from the last commit to its own, on a clock that stops while the
 supervisor itself is busy; ticks that only catch up keep the blame of the tick that made them late.
 """
 
@@ -19,7 +19,7 @@ from foosim.supervisor.roster import Process
 from foosim.supervisor.state import RunState
 
 DOUBT_NS: Final = 1_000_000_000
-"""For how long behind a standstill of the supervisor connections end that it has itself kept silent on."""
+"""After a standstill of the supervisor, connections that it kept silent end within this time."""
 CUT_SEEN_NS: Final = 1_500_000_000
 """By then the connection of a process that is cut off has closed: a lease, and what it takes to notice its end."""
 LATE_EVERY_NS: Final = 1_000_000_000
@@ -32,7 +32,7 @@ class ProgressMonitor:
     def __init__(self, state: RunState, now_ns: int) -> None:
         self._state = state
         self.now_ns = now_ns
-        """When `lost` was asked last."""
+        """The time of the last call of `lost`."""
         self.late = ""
         """The process that the last late tick waited for."""
         self.late_tick = -1
@@ -43,13 +43,13 @@ class ProgressMonitor:
         self._named = ""
         self._lag_ns = 0
         self._late_ticks = 0
-        self._late_said_ns = now_ns - LATE_EVERY_NS
+        self._late_logged_ns = now_ns - LATE_EVERY_NS
         self._released: dict[int, int] = {}
         self._delivered: dict[int, int] = {0: now_ns}
         self._committed: dict[int, tuple[int, int]] = {}
         """Of each frame: when it was committed, and how long the supervisor had been busy until then."""
         self._parts: dict[int, dict[str, int]] = {}
-        self._told: dict[int, str] = {}
+        self._late_by: dict[int, str] = {}
         """By tick: which process its deliveries waited for, as the vHub reported."""
 
     # --- what came when ----------------------------------------------------------------------------------------------
@@ -92,8 +92,8 @@ class ProgressMonitor:
         """The vHub reports which process its closing waited for: the deliveries of the next tick are late by it."""
         names = _names(heartbeat.waiting_for)
         if names:
-            self._told[heartbeat.tick + 1] = names[0]
-            self._told.pop(heartbeat.tick + 1 - limits.KEPT_TICKS, None)
+            self._late_by[heartbeat.tick + 1] = names[0]
+            self._late_by.pop(heartbeat.tick + 1 - limits.KEPT_TICKS, None)
 
     def part(self, tick: int, node: str, now_ns: int) -> None:
         """A node's part of the frame after `tick` has come."""
@@ -117,9 +117,9 @@ class ProgressMonitor:
         if lag_ns < self._state.deployment.tick_ns:
             return ""
         self._late_ticks += 1
-        if now_ns - self._late_said_ns < LATE_EVERY_NS:
+        if now_ns - self._late_logged_ns < LATE_EVERY_NS:
             return ""
-        self._late_said_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
+        self._late_logged_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
         return f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late} ({count} late ticks)"
 
     def _waited_for(self, tick: int, due_ns: int, now_ns: int) -> str:
@@ -129,7 +129,7 @@ class ProgressMonitor:
         released = max(begun, self._released.get(tick, begun))
         delivered = max(begun, self._delivered.get(tick, begun))
         spans = {SUPERVISOR: self._busy_ns - busy_before_ns + released - begun}
-        hub = self._told.get(tick, VHUB)
+        hub = self._late_by.get(tick, VHUB)
         spans[hub] = spans.get(hub, 0) + delivered - begun
         for node, came in self._parts.get(tick, {}).items():
             spans[node] = spans.get(node, 0) + came - max(released, delivered)

@@ -192,7 +192,7 @@ def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: 
     [
         (
             {"what": "node", "name": "blue", "reason": "it hangs", "outage_ms": 3.14, "tick": 8, "epoch": 2},
-            "tick 8: lost node blue (it hangs), went on after 3.1 ms, epoch 2",
+            "tick 8: lost node blue (it hangs), continued after 3.1 ms, epoch 2",
         ),
         (
             {"what": "join", "name": "blue", "reason": "back", "outage_ms": None, "tick": 9, "epoch": 3},

@@ -238,7 +238,7 @@ def test_json_is_one_object_also_of_a_run_that_was_killed(
     def kill(self: Up) -> Outcome:
         self._interrupts = 2
         self._launch(SUPERVISOR, ["sleep", "100"])
-        monkeypatch.setattr(self, "_start", self._goes_on)
+        monkeypatch.setattr(self, "_start", self._continues)
         return run_whole(self)
 
     run_whole = Up.run

@@ -115,7 +115,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 ) -> None:
     where = damage(folder, stem, 30)
     text = refused(folder)
-    assert text.startswith(f"run rehearsal cannot be resumed: {where} behind it; tick "), text
+    assert text.startswith(f"run rehearsal cannot be resumed: {where} after it; tick "), text
     told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
     assert told is not None and 10 < int(told[1]) <= 30
     words = shlex.split(told[2])

@@ -138,7 +138,7 @@ def test_what_follows_when_the_supervisor_ends(
     assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
     up._launcher.children[SUPERVISOR].process.wait()
     up._interrupts = 2
-    monkeypatch.setattr(up, "_start", up._goes_on)
+    monkeypatch.setattr(up, "_start", up._continues)
     killed = up.run()
     assert killed.is_killed and killed.result.keys() == outcome.result.keys()
     assert killed.result["reason"] == "killed by a second Ctrl-C"
@@ -416,9 +416,9 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
     up._has_begun = up._has_ended = up._end_requested = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
-    assert not up._goes_on(), "it would be cut off"
+    assert not up._continues(), "it would be cut off"
     up._show(closing)  # type: ignore[arg-type]
-    assert up._goes_on() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
+    assert up._continues() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
 
 
 @pytest.mark.parametrize(
@@ -436,8 +436,8 @@ def test_a_player_that_ends_with_exit_code_0_while_the_run_goes_on_is_lost_at_on
     monkeypatch.setattr(up.display, "show", lambda status, now_s: None)
     monkeypatch.setattr(up._stalled_watch, "look", lambda *about: {})
     up._show(SimpleNamespace(status=lambda timeout_s, give_up: told))  # type: ignore[arg-type]
-    up._goes_on()
-    up._goes_on()
+    up._continues()
+    up._continues()
     assert bool(up._ending_s) == lost
     up._launcher.stop()
     reason = "lost player-red: it ended with exit code 0"

@@ -222,7 +222,7 @@ def test_every_bad_bit_before_the_last_record_is_damage(tmp_path: Path) -> None:
         assert str(caught.value).startswith(f"{path}: {told}"), place
         if at >= 0:
             behind = len(RECORDS) - at - 1
-            assert str(caught.value).endswith(f"{behind} whole record{'s' * (behind > 1)} behind it")
+            assert str(caught.value).endswith(f"{behind} whole record{'s' * (behind > 1)} after it")
             assert (caught.value.path, caught.value.byte, caught.value.records) == (path, starts[at], at)
         for read in (read_journal, read_newest):
             with pytest.raises(JournalDamaged):
@@ -241,7 +241,7 @@ def test_a_hole_that_was_not_synced_is_an_end_on_a_machine_that_was_started_agai
     for hole in (bytes(stop - start), content[start : stop - 5] + b"?" * 5):
         content[start:stop] = hole
         path.write_bytes(content)
-        with pytest.raises(JournalDamaged, match="record 41 is damaged, 59 whole records behind it"):
+        with pytest.raises(JournalDamaged, match="record 41 is damaged, 59 whole records after it"):
             list(read_records(path))
         with monkeypatch.context() as patch:
             started_again(patch)
