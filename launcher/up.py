@@ -19,7 +19,7 @@ from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
-from foosim.launcher.commands import Commands
+from foosim.launcher.commands import Commands, kinds_of
 from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
 from foosim.launcher.hosts import check_hosts, fetch_capture
@@ -399,7 +399,7 @@ class Up:
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
-        at_once = SUPERVISOR in self._roles(child.name) or VHUB in self._roles(child.name)
+        at_once = any(kind.is_awaited for kind in kinds_of(self._roles(child.name), self.plan.deployment))
         wait_s = None
         if child.exit_code == REFUSED and child.name not in self._wanted:
             self._restarts.give_up(child.name)
@@ -427,17 +427,18 @@ class Up:
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
         player that is not to be restarted is included: it has not acted, so it loses no state.
         """
-        roles, players = self._roles(child.name), self._players(child.name)
+        roles = self._roles(child.name)
+        restarts = {kind.restart for kind in kinds_of(roles, self.plan.deployment)}
         is_given_up = child.name in self._restarts.failed
         is_lost = child.how.is_by_signal or child.is_away
-        if VHUB in roles and (child.exit_code == REFUSED or is_given_up):
+        if "unless refused" in restarts and (child.exit_code == REFUSED or is_given_up):
             return False
         if not self._has_begun:
             is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
             return (is_lost or is_orphan) and not is_given_up
-        if players:  # one that ends by itself has failed
-            return is_lost and not is_given_up and all(player.restart for player in players)
-        return VHUB in roles or any(role in self.plan.deployment.nodes for role in roles)
+        if "after a signal" in restarts:  # a player that ends by itself has failed
+            return is_lost and not is_given_up and all(player.restart for player in self._players(child.name))
+        return roles != (SUPERVISOR,)  # of which `_supervisor_comes_back` decides
 
     def _continues(self) -> bool:
         """Handle ended children and Ctrl-C; False when the supervisor has ended."""
