@@ -222,4 +222,4 @@ def address_of(run: str, plane: Plane, give_up: Callable[[], bool]) -> str:
         if folder.result() is not None:
             raise ConnectError(f"run {run} has ended")
         time.sleep(LOOK_S)
-    raise ConnectError(f"ended before run {run} had an address")
+    raise ConnectError(f"stopped before run {run} had an address")

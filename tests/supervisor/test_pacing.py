@@ -103,6 +103,13 @@ def test_a_step_grants_so_many_ticks_and_pauses_behind_them(pace: Pace) -> None:
     assert made.may_release(56, 55, START + 10**12 + T)
 
 
+def test_a_step_without_a_pause_pauses_behind_it() -> None:
+    made = pacer()
+    made.step(50, 2)
+    assert made.paused
+    assert [made.may_release(tick, 49, START + 10**12) for tick in range(50, 53)] == [True, True, False]
+
+
 def test_a_pause_takes_back_what_a_step_granted() -> None:
     made = pacer()
     made.step(50, 10)
@@ -144,3 +151,11 @@ def test_quantiles_are_right_to_ten_microseconds_or_to_their_512th(lags: list[in
     if exact_ms < 10_000.0:
         assert exact_ms - 1e-9 <= found_ms <= exact_ms + max(0.01, (exact_ms + 0.01) / 512) + 1e-9
     assert made.max_ns == ordered[-1] and made.count == len(lags)
+
+
+def test_lags_take_bounded_memory() -> None:
+    made = Lags()
+    for lag in range(0, 11 * 10**9, 10**4):
+        made.add(lag)
+    assert len(made.cells) <= 6_200 and made.quantile_ms(1.0) == 10_004.48
+    assert Lags().quantile_ms(0.5) == 0.0

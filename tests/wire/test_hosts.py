@@ -20,9 +20,9 @@ from foosim.launcher.hosts import Remote
 from tests.apart import apart
 from tests.wire import sshd
 from tests.wire.conftest import LONG
-from tests.wire.test_run import last_json
+from tests.wire.test_run import free_port, last_json
 from tests.wire.test_secured_run import certificates
-from tests.wire.test_ssh import There, free_port
+from tests.wire.test_ssh import There
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House

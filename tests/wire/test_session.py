@@ -21,6 +21,7 @@ from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import Publisher, Session
+from tests.wire.test_run import free_port
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -353,10 +354,3 @@ def test_links_presence_and_subscriptions_come_back_with_the_router(inbox: Inbox
             assert inbox.take(LONG_S) == [("alive", "blue", b"+")]
     finally:
         stop(router)
-
-
-def free_port() -> int:
-    """Return a port that was free a moment ago."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
