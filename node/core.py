@@ -498,9 +498,7 @@ class NodeCore:
         """The other nodes continue without this one: its results are void, so it joins again."""
         if self.epoch == 0:
             return  # it has not been in yet
-        self.actions.append(
-            Log("warning", f"epoch {epoch.epoch} is without this node: it sends its hello again")
-        )
+        self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node: it sends its hello again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
         self._inputs.begin(epoch)

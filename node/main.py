@@ -5,7 +5,6 @@ One address is all that it needs: deployment and models come with the handshake.
 
 from __future__ import annotations
 
-import faulthandler
 import time
 from pathlib import Path
 from typing import Annotated, Final
@@ -22,15 +21,11 @@ from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.process import STDERR, Stop, die_with_parent, new_boot
+from foosim.runtime.process import Stop, die_with_parent, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.supervisor_timeout import SupervisorTimeout
 from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.session import Session
-
-BLOCKED_S: Final = 1.0
-"""A tick that takes longer than this has its stack written to the log, once; the launcher quotes the line."""
-REARM_NS: Final = 250_000_000
 
 
 class NodeShell:
@@ -43,7 +38,6 @@ class NodeShell:
         self._supervisor_timeout = SupervisorTimeout()
         self._solver = Solver(self.core)
         self._is_present = self._is_stopped = False
-        self._rearm_ns = 0
         self._shell = RoleShell(process, name, self.core, self._deadline_ns, credentials)
         self.role: Final = self._shell.role
         self.role.turn, self.role.work = self._turn, self._work
@@ -71,7 +65,6 @@ class NodeShell:
 
     def leave(self) -> None:
         """Close the engines."""
-        faulthandler.cancel_dump_traceback_later()
         self._solver.close()
 
     def stop(self) -> None:
@@ -82,9 +75,6 @@ class NodeShell:
         """Compute ticks as far as the inputs allow; a tick's first messages are published before it is solved."""
         core = self.core
         core.busy = self.role.busy
-        if now_ns >= self._rearm_ns:  # each time costs a thread
-            self._rearm_ns = now_ns + REARM_NS
-            faulthandler.dump_traceback_later(BLOCKED_S, file=STDERR)
         self._shell.check(now_ns)
         if core.member.build is not None and not self._is_present:
             self._is_present = True

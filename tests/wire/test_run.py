@@ -420,7 +420,7 @@ class Dozes:
 
     def sample(self, view):
         if view.tick == 10:
-            time.sleep(1.5)
+            time.sleep(1.0)
         return Nothing(0.0)
 """
 
@@ -438,11 +438,10 @@ def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, mo
     assert code == 0, (out, err)
     logs = "".join(path.read_text() for path in (house.folder / "state" / "foosim" / "runs").glob("*/logs/*"))
     assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
-    assert re.search(r'Timeout .*\n(.*\n)*  File ".*/dozes\.py", line \d+ in sample\n', logs), logs
 
 
 def test_a_component_that_hangs_is_named_with_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
-    (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.5)", "sleep(1000.0)"))
+    (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.0)", "sleep(1000.0)"))
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
     own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
     up = house.up(
