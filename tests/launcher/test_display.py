@@ -21,6 +21,7 @@ from foosim.launcher.display import (
     render_text,
 )
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.run_status import NO_PACKETS
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 from foosim.world.kits.hall import HallKit
@@ -143,6 +144,12 @@ def test_counts_of_a_vhub_that_is_away_are_said_to_be_old(running: dict[str, Any
     assert "delivered, 113 dropped (before the vHub was lost) | load" in plain_line(running)
     assert row_of(render_text(running), "links (before the vHub was lost)")
     assert row_of(render_text(running), "22510").split()[:4] == ["all", "22510", "22390", "113"]
+
+
+def test_fast_has_no_lag_and_a_vhub_that_has_not_reported_no_count_of_packets(running: dict[str, Any]) -> None:
+    running |= {"lag_ms": None, "pace": "fast", "state": "paused", "packets": NO_PACKETS}
+    assert "lag" not in plain_line(running) + render_text(running)
+    assert " | fast, paused | " in plain_line(running) and "packets" not in plain_line(running)
 
 
 def test_before_the_first_tick_it_says_who_is_waited_for() -> None:

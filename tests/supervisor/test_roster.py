@@ -9,13 +9,16 @@ import msgspec
 import pytest
 
 from foosim.common import limits
+from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.core import NodeCore, NodeStatistics
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Build, FormVersion, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, FormVersion, Heartbeat, Hello, Ready, Refusal
 from foosim.supervisor import roster as roster_module
+from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.roster import SILENT_NS, Roster
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 from foosim.world.layout import build_layout
 
@@ -175,3 +178,28 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
         account = process.statistics()
         refused = account.refused if isinstance(account, NodeStatistics) else account.malformed
         assert refused == len(wrong)
+
+
+@pytest.mark.parametrize("case", ["built", "not built", "stopped", "others are here", "the run has ended"])
+def test_the_last_node_that_was_lost_goes_on_when_it_is_heard_of_again(case: str) -> None:
+    """But none whose arithmetic was never compared, and nobody once the run is over."""
+    core = SupervisorCore(RunSettings("run", TABLE.name, TEXT, Pace("fast")), PRINT, 0)
+    process = core.state.roster.take(HELLO, 0)
+    if case != "not built":
+        layout = core.state.frame.layout.digest
+        core.state.roster.note_ready(process, Ready("red", HELLO.boot, layout, PRINT), layout)
+    core.state.roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    core.open_epoch(core.state.owners, 0, ["blue", "red"])
+    core.node_loss.lose("red", "silent", 0)
+    if case == "stopped":
+        core.state.roster.stopped.add("red")
+    if case != "others are here":
+        core.node_loss.lose("blue", "silent", 0)
+    if case == "the run has ended":
+        core.finish("enough", failed=False)
+    epoch = core.state.epoch
+    heartbeat = Heartbeat("red", 0, 1, "", "", 0.0, b"{}")
+    core.receive(channels.HEARTBEAT, "red", encode(heartbeat), 0)
+    taken = case == "built"
+    assert (core.state.members == ("red",), process.lost, core.state.epoch - epoch) == (taken, not taken, int(taken))
+    assert not taken or set(core.state.owners.values()) == {"red"}
