@@ -77,10 +77,6 @@ class Roster:
         digests = {process.arithmetic for process in self.by_name.values() if process.arithmetic}
         return digests.pop() if len(digests) == 1 else b""
 
-    @property
-    def nodes(self) -> list[str]:
-        return sorted(name for name, process in self.by_name.items() if process.role == "node")
-
     def reason_against(self, hello: Hello) -> str:
         """Return why this process cannot take part, or an empty string."""
         if hello.version != limits.PROTOCOL_VERSION:
