@@ -13,8 +13,7 @@ from foosim.client.loading import look_in
 from foosim.common.addresses import check_listen
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.launcher.doctor.checks import HERE, Case, Finding, is_well
-from foosim.launcher.doctor.remote import examine_all
+from foosim.launcher.doctor import HERE, Case, Finding, examine_all, is_well
 from foosim.runtime.command import DONE, FAILED, JsonOption, PkiOption, new_app, print_json
 
 app = new_app()

@@ -72,7 +72,7 @@ def guard(run: str, name: str, command: list[str]) -> int:
             send(signal.SIGKILL)
 
     def watch() -> None:
-        """Wait for the end of the connection, which nobody writes to."""
+        """Wait for the end of the connection, which carries no data."""
         while os.read(sys.stdin.fileno(), 4096):
             pass
         end_process()
@@ -148,7 +148,7 @@ def run_command(
 def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
     """Answer a doctor on another machine how this one is, over standard input and output."""
     _check_version(version_of_launcher)
-    from foosim.launcher.doctor.remote import serve  # a guard of a process starts quickly
+    from foosim.launcher.doctor import serve  # a guard of a process starts quickly
 
     serve(sys.stdin.buffer, sys.stdout.buffer)
     raise typer.Exit(DONE)

@@ -17,8 +17,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment, places
 from foosim.deployment.text.files import read_source_file
 from foosim.launcher import pki
-from foosim.launcher.hosts.prepare import send_files
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.hosts import Remote, send_files
 from foosim.launcher.pki import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
 from foosim.protocol import identity
 from foosim.protocol.identity import identities_of

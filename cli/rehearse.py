@@ -24,8 +24,7 @@ from foosim.common.errors import BadValue
 from foosim.common.json_text import decode_json
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.launcher.new_capture import check_rooms
-from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
+from foosim.launcher.plan import Plan, check_models_here, check_players_here, check_rooms, make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.interrupts import Interrupts

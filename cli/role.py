@@ -5,20 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from foosim.cli.verbs import Verb, Verbs
+from foosim.cli.verbs import Verbs
 from foosim.runtime.command import new_app
 
 
 class RoleVerbs(Verbs):
     """The processes of a run, other than `foosim run`, the supervisor alone."""
 
-    table: ClassVar[Mapping[str, Mapping[str, Verb]]] = {
-        "Commands": {
-            "node": Verb("node.main", "Run a simulation node."),
-            "vhub": Verb("vhub.main", "Run the virtual hub of a run."),
-            "player": Verb("client.main", "Run players: the classes that the deployment names for them."),
-            "roles": Verb("cli.roles", "Run several roles of a run in one process: supervisor, vHub, nodes, players."),
-        }
+    table: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "Commands": {"node": "node.main", "vhub": "vhub.main", "player": "client.main", "roles": "cli.roles"}
     }
 
 

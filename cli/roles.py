@@ -14,7 +14,7 @@ from foosim.launcher.run_options import launched_options
 from foosim.process.roles import run_roles
 from foosim.runtime.command import PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.process import die_with_parent, end_with_stack
+from foosim.runtime.process import die_with_parent
 from foosim.runtime.run_folder import open_run
 from foosim.vhub.main import CaptureOption, InsecureOption, NoCaptureOption, RunFolderOption, read_options
 
@@ -50,7 +50,6 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
     Exit codes: 0 the run ended, 1 it failed, 3 refused.
     """
     die_with_parent()
-    end_with_stack()
     if not (run or vhub_listen or node or player):
         raise BadValue("a role is missing: --run, --vhub-listen, --node or --player", name)
     if path is not None:

@@ -70,7 +70,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     begun: Up | Outcome | None = None
     try:
         raise_noted()
-        from foosim.launcher.begin import begin, go_on
+        from foosim.launcher.begin import begin, resume_run
         from foosim.launcher.console_child import page_of
         from foosim.launcher.display import Display, unfailing_output
         from foosim.launcher.outcome import Outcome
@@ -82,7 +82,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         if resumed is not None:
             if given := _given(context, but=BESIDE_RESUME):
                 raise BadValue(f"--resume takes FILE and options from the run, it goes without {', '.join(given)}")
-            begun = go_on(open_run(resumed), display, page)
+            begun = resume_run(open_run(resumed), display, page)
         elif options is None:
             raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
         elif no_capture and capture is not None:

@@ -1,16 +1,18 @@
 """The command `foosim`: the table of its verbs.
 
-The module of a verb is imported when the verb is called, so that help and completion start quickly; each summary is
-the first paragraph of the verb's help, which tests/cli/test_verbs.py compares.
+The module of a verb is imported when the verb is called, so that help and completion start quickly.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import sys
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any, ClassVar, Final, NamedTuple
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, ClassVar, Final
 
 import typer
 from typer.core import CompletionItem  # type: ignore[attr-defined]  # typer makes no name of it public
@@ -33,20 +35,12 @@ COMPLETING: Final = "_FOOSIM_COMPLETE"
 """Set by a shell that wants to know how a word may end."""
 
 
-class Verb(NamedTuple):
-    """Where a verb is: the module with its app, its summary, and its name in the app where that is another one."""
-
-    module: str
-    summary: str = ""
-    name: str = ""
-
-
 class Verbs(Group):
     """A group whose commands are imported when they are called."""
 
-    table: ClassVar[Mapping[str, Mapping[str, Verb]]]
-    """By title, and by verb."""
-    plumbing: ClassVar[Mapping[str, Verb]] = {}
+    table: ClassVar[Mapping[str, Mapping[str, str]]]
+    """By title and by verb: the module with its app, after a colon its name in the app where that is another one."""
+    plumbing: ClassVar[Mapping[str, str]] = {}
     """Not shown in the help."""
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -59,8 +53,9 @@ class Verbs(Group):
         verb = known.get(cmd_name)
         if verb is None:
             return None
-        command: Any = typer.main.get_command(import_module(f"foosim.{verb.module}").app)
-        return getattr(command, "commands", {}).get(verb.name or cmd_name, command)
+        module, _, name = verb.partition(":")
+        command: Any = typer.main.get_command(import_module(f"foosim.{module}").app)
+        return getattr(command, "commands", {}).get(name or cmd_name, command)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Return the verb that the words begin with, which may be two words, its command, and the other words."""
@@ -71,7 +66,9 @@ class Verbs(Group):
 
     def sections(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
         """Return the verbs with their summaries, by title."""
-        return {title: [(name, verb.summary) for name, verb in verbs.items()] for title, verbs in self.table.items()}
+        return {
+            title: [(name, summary(name, verb)) for name, verb in verbs.items()] for title, verbs in self.table.items()
+        }
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[CompletionItem]:
         """Return the verbs that a word may become."""
@@ -79,82 +76,46 @@ class Verbs(Group):
         return [CompletionItem(name, help=summary) for name, summary in rows if name.startswith(incomplete)]
 
 
+def summary(name: str, where: str) -> str:
+    """Return the first paragraph of a verb's help, from the source of its module, which is not imported."""
+    spec = find_spec(f"foosim.{where.partition(':')[0]}")
+    assert spec is not None and spec.origin is not None, where
+    found: dict[str, str | None] = {}
+    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
+        for decorator in node.decorator_list if isinstance(node, ast.FunctionDef) else ():
+            if isinstance(node, ast.FunctionDef) and isinstance(decorator, ast.Call):
+                kind, own = ast.unparse(decorator.func), [*decorator.args, *(one.value for one in decorator.keywords)]
+                names = [str(one.value) for one in own if isinstance(one, ast.Constant)]
+                found[kind if kind == "app.callback" else (names or [node.name])[0]] = ast.get_docstring(node)
+    text = found.get(name, found.get("app.callback", next(iter(found.values())))) or ""
+    return " ".join(text.partition("\n\n")[0].split())
+
+
 class Foosim(Verbs):
     """All verbs."""
 
-    table: ClassVar[Mapping[str, Mapping[str, Verb]]] = {
+    table: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "A run": {
-            "up": Verb("cli.up", "Run a deployment, on this machine and its hosts, until Ctrl-C or --for."),
-            "down": Verb("cli.control", "End a run in order."),
-            "status": Verb("cli.control", "Show the state of a run: time, lag, nodes, links, score."),
-            "view": Verb(
-                "cli.view", "Serve the console: a page that shows and controls a live run, or plays a capture."
-            ),
-            "pause": Verb("cli.control", "Pause simulated time, after the ticks that are released already."),
-            "resume": Verb("cli.control", "Continue after a pause."),
-            "step": Verb("cli.control", "Simulate a number of ticks, then pause."),
-            "rate": Verb("cli.control", "Change how fast simulated time passes."),
-            "add": Verb("cli.control", "Add a spare of the deployment to the world."),
-            "remove": Verb("cli.control", "Remove an entity from the world; it can be added again."),
-            "push": Verb("cli.control", "Apply an impulse to a free body."),
-            "set": Verb("cli.control", "Set a field of an entity, e.g. `crate-1 at=3,1` or `scout down=true`."),
-            "move": Verb("cli.control", "Move a robot to another node; the world stays the same."),
-            "stop": Verb("cli.control", "Stop a node, after its robots have moved to the other nodes."),
-            "start": Verb(
-                "cli.control",
-                "Start a node that was stopped, or that its launcher has given up; its robots move back.",
-            ),
-            "balance": Verb(
-                "cli.control", "Move robots from busy nodes to idle ones, once; prints the robots and the loads."
-            ),
+            "up": "cli.up",
+            "down": "cli.control",
+            "status": "cli.control",
+            "view": "cli.view",
+            **dict.fromkeys(("pause", "resume", "step", "rate", "add", "remove", "push", "set", "move"), "cli.control"),
+            **dict.fromkeys(("stop", "start", "balance"), "cli.control"),
         },
-        "Before a run": {
-            "check": Verb("cli.check", "Check a deployment file, with settings if there are any."),
-            "components": Verb(
-                "cli.check",
-                "Show the models, sensors, rules and other forms that a deployment can name on this machine.",
-            ),
-            "components check": Verb("cli.check", "Check that a form obeys the laws, in a deployment that uses it."),
-            "urdf": Verb(
-                "cli.check",
-                "Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and what a deployment "
-                "says of it.",
-            ),
-            "schema": Verb(
-                "cli.check",
-                "Print the JSON Schema of deployment files, with the components of all installed packages.",
-            ),
-        },
-        "In one process": {
-            "rehearse": Verb(
-                "cli.rehearse", "Simulate a deployment in one process on virtual time, as fast as possible."
-            ),
-            "match": Verb("cli.match.command", "Let two players play many games, and show who is better."),
-        },
-        "Captures and networks": {
-            "capture": Verb(
-                "cli.capture.command",
-                "Look into a capture, play it, compare it, take parts of it, and simulate it again.",
-            ),
-            "net": Verb("cli.net", "Analyse a network, and disturb the network of a live run."),
-        },
-        "Machines and measurements": {
-            "pki": Verb("cli.pki", "Create and check the certificates of a run on several machines."),
-            "doctor": Verb("cli.doctor", "Check whether a deployment can run on this machine and its hosts."),
-            "fit": Verb(
-                "fitting.main",
-                "Fit rolling friction, friction and restitution of a table to measured tracks.",
-            ),
-        },
+        "Before a run": dict.fromkeys(("check", "components", "components check", "urdf", "schema"), "cli.check"),
+        "In one process": {"rehearse": "cli.rehearse", "match": "cli.match.command"},
+        "Captures and networks": {"capture": "cli.capture.command", "net": "cli.net"},
+        "Machines and measurements": {"pki": "cli.pki", "doctor": "cli.doctor", "fit": "fitting.main"},
     }
-    plumbing: ClassVar[Mapping[str, Verb]] = {
-        "run": Verb("cli.run"),
-        "role": Verb("cli.role"),
-        "guard": Verb("cli.guard"),
-        "probe": Verb("runtime.health"),
-        "validate": Verb("cli.check", name="check"),
-        "inspect": Verb("cli.check", name="urdf"),
-        "check-component": Verb("cli.check", name="components check"),
+    plumbing: ClassVar[Mapping[str, str]] = {
+        "run": "cli.run",
+        "role": "cli.role",
+        "guard": "cli.guard",
+        "probe": "runtime.health",
+        "validate": "cli.check:check",
+        "inspect": "cli.check:urdf",
+        "check-component": "cli.check:components check",
     }
 
 

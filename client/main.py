@@ -25,7 +25,7 @@ from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
 from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot
+from foosim.runtime.process import Stop, die_with_parent, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
 from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.session import Session
@@ -149,7 +149,6 @@ def player(
     `deadlines.vhub_back`, 3 when the vHub refused it.
     """
     die_with_parent()
-    end_with_stack()
     if path is not None:
         look_in(str(path.absolute()))
     raise typer.Exit(run_players(name, connect, world, pki, progress_file))

@@ -65,12 +65,12 @@ def parse_address(text: str, secured: bool | None = None) -> Address:
     port = int(match["port"] or 0) if match is not None else 0
     if match is None or port > PORT_MAX:
         raise BadValue("not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT)", text, _in_brackets(text))
-    said = match["protocol"]
-    if secured is True and said == "tcp":
+    protocol = match["protocol"]
+    if secured is True and protocol == "tcp":
         raise BadValue("not an address for certificates", text, f"tls/{match['host']}:{port}")
-    if secured is False and said == "tls":
+    if secured is False and protocol == "tls":
         raise BadValue("an address that needs certificates: give their folder by --pki DIR", text)
-    return Address(match["host"], port, "tls" if secured or said == "tls" else "tcp")
+    return Address(match["host"], port, "tls" if secured or protocol == "tls" else "tcp")
 
 
 def _in_brackets(text: str) -> str | None:

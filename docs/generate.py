@@ -95,21 +95,21 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "supervisor",
         "the nodes, after its restart, in addition to `heartbeat`; then it continues without them",
     ),
-    ("launcher.children.liveness", "QUESTION_S"): (
+    ("launcher.liveness", "QUESTION_S"): (
         "`up`",
         "an answer of the supervisor; after five missing ones in a row, by the clock of its process, it is killed and "
         "started again",
     ),
-    ("launcher.children.liveness", "STALLED_S"): (
+    ("launcher.liveness", "STALLED_S"): (
         "`up`",
         "the recovery of a lost process that lives; then it is killed",
     ),
-    ("launcher.children.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
+    ("launcher.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
     ("runtime.roles.shell", "LOOK_S"): ("node, player, vHub", "the run file, between two looks at it"),
-    ("launcher.children.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; a longer pause is a standstill"),
-    ("launcher.children.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, in this order"),
-    ("launcher.children.restarts", "AWAY_S"): ("`up`", "the same if the machine could not be reached"),
-    ("launcher.children.restarts", "WINDOW_S"): ("`up`", "in which one end more than these waits gives a process up"),
+    ("launcher.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; a longer pause is a standstill"),
+    ("launcher.liveness", "WAITS_S"): ("`up`", "before a process that ended is started again, in this order"),
+    ("launcher.liveness", "AWAY_S"): ("`up`", "the same if the machine could not be reached"),
+    ("launcher.liveness", "WINDOW_S"): ("`up`", "in which one end more than these waits gives a process up"),
     ("launcher.up", "HELD_S"): ("`up`", "the run to come up; lines that wait for the console are shown then"),
     ("launcher.up", "LOST_S"): ("`up`", "the supervisor to detect the end of a process; then the run is ended"),
     ("launcher.up", "END_S"): ("`up`", "the answer of a supervisor to a request to end; then all processes are ended"),
@@ -137,7 +137,7 @@ _PART = re.compile(r"<!-- generated: (?P<name>[\w ]+) -->\n(?P<text>.*?)<!-- end
 def commands() -> Iterator[tuple[str, Any]]:
     """Yield every command, such as `foosim capture verify`, as typer knows it; second names are left out."""
     foosim = Foosim(name="foosim")
-    names = [*foosim.list_commands(None), *(name for name, verb in foosim.plumbing.items() if not verb.name)]
+    names = [*foosim.list_commands(None), *(name for name, verb in foosim.plumbing.items() if ":" not in verb)]
     for name in names:
         yield from _commands_in(f"foosim {name}", foosim.get_command(None, name))
 

@@ -15,15 +15,18 @@ from typing import Final
 from foosim.common.errors import Failed
 from foosim.deployment.schema import places
 from foosim.launcher.display import Display
-from foosim.launcher.hosts.prepare import check_free
-from foosim.launcher.new_capture import check_capture, check_rooms, check_texts, default_capture
+from foosim.launcher.hosts import check_free
 from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome
 from foosim.launcher.plan import (
     Plan,
+    check_capture,
     check_certificates,
     check_descriptors,
     check_models_here,
     check_players_here,
+    check_rooms,
+    check_texts,
+    default_capture,
     make_plan,
 )
 from foosim.launcher.run_options import RunOptions
@@ -64,7 +67,7 @@ def begin(
     return Up(plan, path, display, run, console=page)
 
 
-def go_on(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
+def resume_run(folder: RunFolder, display: Display, page: Sequence[str] | None) -> Up | Outcome:
     """Return a run to be resumed, or the outcome of one that has ended. Raises Refused."""
     if folder.result() is not None:
         _prepare((), None, display)

@@ -1,4 +1,4 @@
-"""The command lines of the processes of a run.
+"""The table of roles, and the command lines of the processes of a run.
 
 A process with one role runs that role's command, one with several runs `foosim role roles`.
 """
@@ -8,15 +8,44 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Final, Literal, NamedTuple
 
 from foosim.common.addresses import parse_address
 from foosim.deployment.processes import Process
-from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.deployment.schema import Deployment
+from foosim.launcher.hosts import CAPTURE, Remote
 from foosim.launcher.plan import Plan
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.children import FOOSIM, ROLE
 from foosim.runtime.roles.shell import RUN
 from foosim.runtime.run_folder import RunFolder, RunInfo
+
+
+class Kind(NamedTuple):
+    """A kind of role."""
+
+    command: tuple[str, ...]
+    """Of a process that has this role alone."""
+    restart: Literal["always", "unless refused", "after a signal"]
+    """When a process with this role is started again before the run has ended."""
+    is_awaited: bool
+    """Whether no tick is computed without it: its first two restarts have no back-off."""
+    liveness: str
+    """The detection of one that hangs."""
+
+
+KINDS: Final = {
+    SUPERVISOR: Kind((FOOSIM, "run"), "always", True, "five status requests of the launcher without an answer"),
+    VHUB: Kind((*ROLE, "vhub"), "unless refused", True, "lost by deadlines of the supervisor, and alive"),
+    "node": Kind((*ROLE, "node"), "always", False, "lost by deadlines of the supervisor, and alive"),
+    "player": Kind((*ROLE, "player"), "after a signal", False, "deadlines of the vHub, which end the run"),
+}
+"""By role: supervisor, vHub, any node, any player."""
+
+
+def kinds_of(roles: Iterable[str], deployment: Deployment) -> list[Kind]:
+    """Return the kinds of some roles of a run."""
+    return [KINDS.get(role, KINDS["node" if role in deployment.nodes else "player"]) for role in roles]
 
 
 class Commands:
@@ -48,14 +77,15 @@ class Commands:
         path = ["--path", str(options.file.parent.absolute())] if players and remote is None else []
         insecure = ["--insecure"] if options.insecure else []
         if players == [*roles]:
-            return [*ROLE, "player", *_each("--name", players), "--connect", radio, *path, *pki]
+            return [*KINDS["player"].command, *_each("--name", players), "--connect", radio, *path, *pki]
         if not process.is_shared:
+            (kind,) = kinds_of(roles, deployment)
             if SUPERVISOR in roles:
-                return [FOOSIM, "run", *options.arguments(), "--run", self._folder.name]
+                return [*kind.command, *options.arguments(), "--run", self._folder.name]
             if nodes:
-                return [*ROLE, "node", *_each("--name", nodes), "--connect", simulation, *pki]
+                return [*kind.command, *_each("--name", nodes), "--connect", simulation, *pki]
             listen = ["--listen", self._radio_address(info, remote)]
-            return [*ROLE, "vhub", "--connect", simulation, *listen, *insecure, *pki, *self._records(remote)]
+            return [*kind.command, "--connect", simulation, *listen, *insecure, *pki, *self._records(remote)]
         command = [*ROLE, "roles", process.name]
         if SUPERVISOR in roles:
             command += ["--run", self._folder.name]

@@ -14,8 +14,8 @@ import msgspec
 
 from foosim.common.errors import BadValue, Failed, read_at
 from foosim.common.units import parse_offset_ns
-from foosim.launcher.children.processes import Launcher
 from foosim.launcher.display import Display
+from foosim.launcher.processes import Launcher
 from foosim.runtime.children import FOOSIM
 from foosim.runtime.run_folder import UNREADABLE, RunFolder
 

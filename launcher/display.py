@@ -58,7 +58,7 @@ def world_texts(status: dict[str, Any]) -> list[str]:
 
 
 def recovery_text(entry: dict[str, Any]) -> str:
-    """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or the process that joined."""
+    """`tick 812: lost node blue (its connection closed), continued after 3.1 ms, epoch 2`; or a return."""
     name = entry["name"]
     texts = {
         "node": f"lost node {name} ({entry['reason']})",
@@ -70,7 +70,7 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "return": f"{name} takes part again",
     }
     what = texts[entry["what"]]
-    after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
+    after = "" if entry["outage_ms"] is None else f", continued after {entry['outage_ms']:.1f} ms"
     return f"tick {entry['tick']}: {what}{after}, epoch {entry['epoch']}"
 
 
@@ -123,7 +123,7 @@ def plain_line(status: dict[str, Any]) -> str:
 
 
 def render(status: dict[str, Any], links_max: int = LINKS_SHOWN_MAX) -> RenderableType:
-    """Return the whole table, with as many links as asked for."""
+    """Return the whole table, with at most `links_max` links."""
     return Group(_head(status), Text(), _processes(status), Text(), _links(status, links_max))
 
 

@@ -47,7 +47,7 @@ RENEW_DAYS: Final = 30
 LEAF_DAYS_MAX: Final = 825
 """More than this some libraries refuse."""
 SLACK: Final = timedelta(hours=1)
-"""How far clocks of machines may be behind: from so long before now a certificate is valid."""
+"""Tolerance for slow clocks of other machines: a certificate is valid from this time before now on."""
 LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "::1")
 LISTENERS: Final = frozenset({SUPERVISOR, VHUB})
 """Identities whose certificates have host names: the others only connect."""
@@ -77,8 +77,8 @@ def provide(
 ) -> list[Path]:
     """Issue the missing files for these identities, and return their names: the root, certificates.
 
-    `hosts`: names and addresses by which others reach supervisor and vHub. A certificate that ends within so many days,
-    lacks such a host or has another root is issued anew. Raises CertificateError, BadValue.
+    `hosts`: names and addresses by which others reach supervisor and vHub. A certificate that ends within
+    `within_days`, lacks such a host or has another root is issued anew. Raises CertificateError, BadValue.
     """
     made: list[Path] = [] if (folder / CA_FILE).exists() else [init(folder)]
     ca, there = read_ca(folder, wall_clock.now_utc()), identities_in(folder)

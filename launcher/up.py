@@ -19,17 +19,15 @@ from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
-from foosim.launcher.children.child_time import ChildTimes, observe
-from foosim.launcher.children.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
-from foosim.launcher.children.processes import Child, Launcher
-from foosim.launcher.children.restarts import Restarts
-from foosim.launcher.commands import Commands
+from foosim.launcher.commands import Commands, kinds_of
 from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
-from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
-from foosim.launcher.hosts.ssh import remotes as remotes_of
+from foosim.launcher.hosts import check_hosts, fetch_capture
+from foosim.launcher.hosts import remotes as remotes_of
+from foosim.launcher.liveness import QUESTION_S, ChildTimes, OwnTime, Restarts, StalledWatch, SupervisorWatch, waited_s
 from foosim.launcher.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
 from foosim.launcher.plan import Plan
+from foosim.launcher.processes import Child, Launcher
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
@@ -102,7 +100,7 @@ class Up:
         self._is_resumed, self._is_killed = resumed is not None, False
         self._restarts = Restarts()
         self._own_time = OwnTime(time.monotonic())
-        self._child_times = ChildTimes(observe)
+        self._child_times = ChildTimes(waited_s)
         self._beside = self._players(self._process_of[SUPERVISOR])
         """The players that share the supervisor's process."""
         self._hangs = 0
@@ -243,7 +241,7 @@ class Up:
     def _await(self, ready: Callable[[], RunInfo | None]) -> RunInfo | None:
         """Return the first value of `ready` that is not None; None when the run is over, or is to end, before."""
         held_s = time.monotonic() + HELD_S
-        while self._goes_on():
+        while self._continues():
             if time.monotonic() > held_s:
                 self.display.release()
             found = None if self._ending_s else ready()
@@ -260,7 +258,7 @@ class Up:
         self._console.start()
         exposure = Exposure(self.plan.address, time.monotonic_ns())
         with ExitStack() as stack:
-            while self._goes_on():
+            while self._continues():
                 if reminder := exposure.due(time.monotonic_ns()):
                     self.display.say(reminder)
                 self._console.look()
@@ -290,15 +288,15 @@ class Up:
     def _show(self, control: Control) -> None:
         supervisor = self._supervisor
         done = [child for child in self._launcher.ended() if child.exit_code == DONE]
-        asked_s = self._time_of(supervisor)
+        requested_s = self._time_of(supervisor)
         try:
             status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
-            self._supervisor_watch.unanswered(self._time_of(supervisor) - asked_s)
+            self._supervisor_watch.unanswered(self._time_of(supervisor) - requested_s)
             return
         self._supervisor_watch.answered()
         now_s = self._own_time.at(time.monotonic())
-        self._tell_recoveries(status["recoveries"])
+        self._show_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
         else:  # the supervisor waits as long as there is progress, and so do we
@@ -330,7 +328,7 @@ class Up:
         self._starts = starts
         self._wanted -= {self._process_of.get(name, name) for name in self._stopped}
 
-    def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
+    def _show_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Show new recoveries once they are complete."""
         while self._shown < len(recoveries) and recoveries[self._shown]["outage_ms"] is not None:
             self.display.say(recovery_text(recoveries[self._shown]))
@@ -368,8 +366,8 @@ class Up:
 
     def _kill(self, child: Child, why: str) -> None:
         if not child.killed:
-            self.display.say(f"{child.name} does not answer any more: it is killed ({why})")
             child.kill(why)
+            self.display.say(f"{child.name} does not answer any more{child.place}: it is killed ({why})")
 
     def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
         """Restart a supervisor that ended before the run did; False when the run is over, or it is given up."""
@@ -401,7 +399,7 @@ class Up:
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
-        at_once = SUPERVISOR in self._roles(child.name) or VHUB in self._roles(child.name)
+        at_once = any(kind.is_awaited for kind in kinds_of(self._roles(child.name), self.plan.deployment))
         wait_s = None
         if child.exit_code == REFUSED and child.name not in self._wanted:
             self._restarts.give_up(child.name)
@@ -429,19 +427,20 @@ class Up:
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
         player that is not to be restarted is included: it has not acted, so it loses no state.
         """
-        roles, players = self._roles(child.name), self._players(child.name)
+        roles = self._roles(child.name)
+        restarts = {kind.restart for kind in kinds_of(roles, self.plan.deployment)}
         is_given_up = child.name in self._restarts.failed
         is_lost = child.how.is_by_signal or child.is_away
-        if VHUB in roles and (child.exit_code == REFUSED or is_given_up):
+        if "unless refused" in restarts and (child.exit_code == REFUSED or is_given_up):
             return False
         if not self._has_begun:
             is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
             return (is_lost or is_orphan) and not is_given_up
-        if players:  # one that ends by itself has failed
-            return is_lost and not is_given_up and all(player.restart for player in players)
-        return VHUB in roles or any(role in self.plan.deployment.nodes for role in roles)
+        if "after a signal" in restarts:  # a player that ends by itself has failed
+            return is_lost and not is_given_up and all(player.restart for player in self._players(child.name))
+        return roles != (SUPERVISOR,)  # of which `_supervisor_comes_back` decides
 
-    def _goes_on(self) -> bool:
+    def _continues(self) -> bool:
         """Handle ended children and Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
@@ -474,7 +473,7 @@ class Up:
                 return False
             self._ending_s = now_s
         if self._ending_s and not self._end_requested:
-            self._tell(supervisor)
+            self._request_end(supervisor)
         return not self._ending_s or now_s < self._ending_s + END_S
 
     def _ends_run(self, child: Child) -> bool:
@@ -492,7 +491,7 @@ class Up:
             self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
             self._lost_s = now_s
 
-    def _tell(self, supervisor: Child) -> None:
+    def _request_end(self, supervisor: Child) -> None:
         """Request the end of the run, as `down` does; before the run file exists, a signal kills the supervisor."""
         if self.folder.info() is None:
             return
@@ -541,7 +540,7 @@ class Up:
             if blamed is None:
                 return []
             has_failed = blamed.exit_code not in (None, DONE) or blamed.left_early
-            how = f"{name} {blamed.ending}; its log is" if has_failed else f"the log of {name} is"
+            how = f"{name} {blamed.ending}{blamed.place}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
         reason = result["reason"]
         is_said = child.ending in reason or child.name in self._restarts.failed

@@ -43,7 +43,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.rejects import Refusals
-from foosim.protocol.retry import Patience
+from foosim.protocol.retry import RetryTimer
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
@@ -107,7 +107,7 @@ class NodeCore:
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
         self.is_watched = False
-        """Whether forms that write to the frame otherwise than by their views are errors: a check asks for that."""
+        """Whether forms that write to the frame otherwise than by their views are errors: a check sets this."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -126,17 +126,17 @@ class NodeCore:
         self._pending = PendingEpochMessages()
         self._remembered: dict[int, float] = {}
         """What the sensors of this node remember of the present frame: numbers of the next one, by place."""
-        self._said: tuple[bytes, list[str], bytes] = b"", [], b""
+        self._last_samples: tuple[bytes, list[str], bytes] = b"", [], b""
         """The samples that were published last: the digest of their frame, whose they are, and the payload.
 
-        Whoever waits for a sensor that takes long asks several times, and it measures once.
+        A request that is repeated while a sensor takes long is answered with them: the sensor measures once.
         """
         self._barrier: Barrier | None = None
         self._input_digest = b""
         self._sensed = False
-        self._patience = Patience(now_ns)
+        self._retry = RetryTimer(now_ns)
         self._not_finite: set[str] = set()
-        """Whose readings have been said not to be finite."""
+        """Readings that were logged as not finite."""
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
         self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
             channels.ORDER.name: self._on_order,
@@ -233,12 +233,12 @@ class NodeCore:
     def wake(self, now_ns: int) -> None:
         """Send what is due by time: hello, heartbeat, repeated requests."""
         self.member.wake(now_ns, self._heartbeat)
-        if self._is_in and self._patience.is_over(now_ns) and self.work is None:
+        if self._is_in and self._retry.is_over(now_ns) and self.work is None:
             self._ask_again(now_ns)
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
-        return min(self.member.deadline_ns, self._patience.at_ns) if self._is_in else self.member.deadline_ns
+        return min(self.member.deadline_ns, self._retry.at_ns) if self._is_in else self.member.deadline_ns
 
     @property
     def _is_in(self) -> bool:
@@ -257,18 +257,6 @@ class NodeCore:
             assert self.deployment is not None and self.member.layout is not None
             self._stepper = Stepper(self.deployment, self.member.layout, is_watched=self.is_watched)
         return self._stepper
-
-    def present_tick(self) -> int:
-        """Return the tick that is computed, -1 without one. Any thread may call this."""
-        frame, term = self.frame, self._term
-        return -1 if frame is None or term is None else frame.tick
-
-    def slow_tick(self, text: str) -> Publish:
-        """Return what tells the supervisor of what takes long at a tick. Any thread may call this."""
-        tick = max(0, self.present_tick())
-        text = sendable(text)[: limits.TEXT_LENGTH_MAX]
-        beat = Heartbeat(self.name, tick, self.epoch, "", "", self.busy, b"", slow=text)
-        return Publish(channels.HEARTBEAT, self.name, encode(beat))
 
     def make_anew(self) -> None:
         """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
@@ -310,9 +298,9 @@ class NodeCore:
         if term.stepper.sampling.is_silent(frame):
             self._remembered = {}
             return
-        self._remembered = self._say_samples(frame, term.mine)
+        self._remembered = self._publish_samples(frame, term.mine)
 
-    def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
+    def _publish_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
         """Publish what these robots send at a frame; return what their sensors remember."""
         stepper = self.stepper
         packets, remembered = stepper.sense(frame, robots)
@@ -321,7 +309,7 @@ class NodeCore:
             self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite, and not sent"))
         names = [robot.name for robot in robots]
         payload = encode(Samples(frame.tick, frame.digest, self.name, names, packets))
-        self._said = frame.digest, names, payload
+        self._last_samples = frame.digest, names, payload
         self.actions.append(Publish(channels.SAMPLES, self.name, payload))
         return remembered
 
@@ -361,7 +349,7 @@ class NodeCore:
             frame = barrier.assemble()
         except BadParts as bad:
             self._refused += 1
-            self.actions.append(Log("error", f"{bad}: asked for again"))
+            self.actions.append(Log("error", f"{bad}: requested again"))
             barrier.drop(node for node in bad.nodes if node != self.name)
             return False
         self._enter(frame, now_ns)
@@ -384,7 +372,7 @@ class NodeCore:
         self._barrier = None
         self._sensed = False
         assert self.deployment is not None
-        self._patience.progress(self.deployment.tick_ns, now_ns)
+        self._retry.progress(self.deployment.tick_ns, now_ns)
         self._history[frame.tick], old = frame, frame.tick - limits.KEPT_TICKS
         self._history.pop(old, None)
         self._inputs.forget(old)
@@ -438,15 +426,15 @@ class NodeCore:
             self._sample_again(want.tick)
 
     def _sample_again(self, tick: int) -> None:
-        """Log what my robots, also those that I had not at that tick, send at a frame; ask for one that I had not."""
+        """Log what my robots, also those that I had not at that tick, send at a frame; request a missing one."""
         frame = self._history.get(tick)
         if frame is not None:
             mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
-            digest, names, payload = self._said
+            digest, names, payload = self._last_samples
             if digest == frame.digest and names == [robot.name for robot in mine]:
                 self.actions.append(Publish(channels.SAMPLES, self.name, payload))
             else:
-                self._say_samples(frame, mine)
+                self._publish_samples(frame, mine)
         elif self.frame is not None and self.frame.tick - limits.KEPT_TICKS <= tick < self.frame.tick:
             self._unsampled = {kept for kept in self._unsampled if kept >= self.frame.tick - limits.KEPT_TICKS} | {tick}
             message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch, []))
@@ -462,7 +450,7 @@ class NodeCore:
         else:
             wants = [Want(self.name, channel.name, tick, self.epoch, []) for channel in self._inputs.missing(tick)]
         self.actions += [Publish(channels.WANT, self.name, encode(want)) for want in wants]
-        self._patience.asked(now_ns)
+        self._retry.requested(now_ns)
 
     # --- epochs, start and end ---------------------------------------------------------------------------------------
 
@@ -504,13 +492,13 @@ class NodeCore:
         else:
             message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch, []))
             self.actions.append(Publish(channels.WANT, self.name, message))
-            self._patience.progress(self.deployment.tick_ns, now_ns)
+            self._retry.progress(self.deployment.tick_ns, now_ns)
 
     def _begin_anew(self, epoch: Epoch) -> None:
         """The other nodes continue without this one: its results are void, so it joins again."""
         if self.epoch == 0:
             return  # it has not been in yet
-        self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
+        self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node: it sends its hello again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
         self._inputs.begin(epoch)

@@ -71,7 +71,7 @@ class DueSensors:
         self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._due: dict[tuple[bool, ...], Turn] = {}
-        """Those of all robots, whoever is in service."""
+        """The sensors of all robots, in service or not."""
         self._turns: dict[tuple[bool, ...], Turn] = {}
         """Of those who are in service now."""
         self._states = np.array([self._down, self._inactive], np.intp)

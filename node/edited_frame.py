@@ -41,7 +41,7 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
 
 
 def kept(remembered: Mapping[int, float], moved: Iterable[Entity]) -> dict[int, float]:
-    """Return what sensors remember of a frame, by place, without what those did that came or left; counters go on."""
+    """Return what sensors remember of a frame, by place, without robots that came or left; counters continue."""
     gone = {at for robot in moved for at in {*range(robot.split, robot.stop)}.difference(counters(robot))}
     return {at: number for at, number in remembered.items() if at not in gone}
 

@@ -33,7 +33,7 @@ class Solver:
         self._factory = factory
         self._engine: AnyEngine | None = None
         self.fingerprint = b""
-        """The digest of the fixed small run, empty before the engine is built: whoever knows it sets it before that."""
+        """The digest of the fixed small run, empty before the engine is built, unless it was set."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 

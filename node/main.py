@@ -6,7 +6,6 @@ One address is all that it needs: deployment and models come with the handshake.
 from __future__ import annotations
 
 import time
-from collections import deque
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -16,7 +15,6 @@ from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
-from foosim.node.slow_watch import SlowWatch
 from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
@@ -25,7 +23,7 @@ from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import Stop, die_with_parent, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
-from foosim.runtime.supervisor_timeout import Orphan
+from foosim.runtime.supervisor_timeout import SupervisorTimeout
 from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.session import Session
 
@@ -37,20 +35,17 @@ class NodeShell:
         self, process: Process, name: str, session: Session, world: str = "", credentials: Credentials | None = None
     ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
-        self._orphan = Orphan()
+        self._supervisor_timeout = SupervisorTimeout()
         self._solver = Solver(self.core)
         self._is_present = self._is_stopped = False
         self._shell = RoleShell(process, name, self.core, self._deadline_ns, credentials)
         self.role: Final = self._shell.role
         self.role.turn, self.role.work = self._turn, self._work
         self.role.lacking = lambda: self.core.lacking
-        self.role.on_alive, self.role.stood = self._on_alive, self._orphan.rest
+        self.role.on_alive, self.role.stood = self._on_alive, self._supervisor_timeout.rest
         self._wire = self._shell.connect(session, Plane.SIMULATION)
         self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._shell.watch_router(self._wire, SUPERVISOR)
-        self._slow: deque[str] = deque()
-        """What the supervisor is to be told of slow ticks at the next turn."""
-        self._watch = SlowWatch(self.core.present_tick, self._name_slow)
 
     def is_over(self) -> bool:
         """Whether the run has ended, or this node leaves it."""
@@ -58,20 +53,18 @@ class NodeShell:
 
     def finish(self) -> int:
         """Perform the last actions; return the exit code."""
-        self._watch.stop()
         ended = self.core.ended
         how = "leaves the run" if ended is None else f"the run has ended at tick {ended.tick}: {ended.reason}"
         if not self.core.member.refusal:
             self.core.actions.append(Log("info", how))
         self.role.perform()
-        self._solver.close()
+        self.leave()
         if self.core.member.refusal:
             return REFUSED
         return DONE if ended is not None else FAILED
 
     def leave(self) -> None:
         """Close the engines."""
-        self._watch.stop()
         self._solver.close()
 
     def stop(self) -> None:
@@ -87,25 +80,11 @@ class NodeShell:
             self._is_present = True
             self._wire.declare_alive()
             core.actions.append(Log("info", f"takes part in run {core.member.build.run}"))
-        if self._orphan.is_over(core.deployment, now_ns) and not self.is_over():
+        if self._supervisor_timeout.is_over(core.deployment, now_ns) and not self.is_over():
             core.actions.append(Log("error", "lost the supervisor, and it has not come back"))
             self.stop()
-        while self._slow:
-            core.actions.append(core.slow_tick(self._slow.popleft()))
         core.advance(now_ns)
         self._solver.build()
-
-    def _name_slow(self, text: str) -> None:
-        """Log where a tick takes long and tell the supervisor, from the thread that watches.
-
-        That is at once, as it may never end, but in a process of several roles, whose bus has one thread.
-        """
-        self._shell.log.warning(text)
-        if self._wire.is_alone:
-            told = self.core.slow_tick(text)
-            self._wire.put(told.channel, told.name, told.payload)
-        else:
-            self._slow.append(text)
 
     def _work(self, now_ns: int) -> bool:
         """Solve the current tick, if there is one to be solved."""
@@ -127,9 +106,9 @@ class NodeShell:
             return
         if not is_alive:
             self.core.actions.append(Log("warning", "lost the supervisor: waits until it is back"))
-        elif self._orphan.is_alone:
+        elif self._supervisor_timeout.is_alone:
             self.core.actions.append(Log("info", "the supervisor is back"))
-        self._orphan.hear(is_alive, time.monotonic_ns())
+        self._supervisor_timeout.hear(is_alive, time.monotonic_ns())
 
 
 def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None) -> int:

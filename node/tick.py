@@ -124,7 +124,7 @@ class Stepper:
         self.not_finite: Counter[str] = Counter()
         """Readings with a number that is not finite, which are not sent, by robot and channel."""
         self.quarantined: list[str] = []
-        """Who came into quarantine, and why, in words; whoever reads it empties it."""
+        """Who came into quarantine, and why, in words; the reader empties it."""
 
     def sense(self, frame: Frame, robots: Sequence[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
         """Return what these robots send at the frame's tick, and what their sensors remember.
@@ -277,12 +277,12 @@ class Stepper:
         view = View(work.tick, numbers, start=start)
         driven = [entity for entity in bodies if entity.index in world.actuators]
         engine.load(bodies, numbers)
-        asked = world.motors(driven, view)
+        commands = world.motors(driven, view)
         try:
-            engine.command(driven, asked)
+            engine.command(driven, commands)
             engine.step(self.substeps)
         except Exception:
-            world.check_motors(driven, asked, work.tick)
+            world.check_motors(driven, commands, work.tick)
             raise
         engine.read(bodies, numbers)
 
@@ -308,7 +308,7 @@ class Stepper:
                 rest.wake(bodies, numbers)
             may_rest = rest.may_rest(bodies, in_the_way, numbers, start)
             drives = world.drives(bodies, view) if is_driven or not may_rest else ()
-            if may_rest and not any(asked.is_moving for asked in drives):
+            if may_rest and not any(drive.is_moving for drive in drives):
                 rest.keep(bodies, numbers)
                 continue
             welds = _welds(grippers, bodies, numbers) if grippers else ()

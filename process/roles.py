@@ -2,7 +2,7 @@
 
 Roles hand each other messages over the in-memory bus, and all others over the planes' sessions, of which the process
 has one each. They take their turns in a fixed order: vHub, supervisor, nodes, players, by name. So after a crash the
-vHub has folded its journal before the supervisor asks for it.
+vHub has folded its journal before the supervisor requests it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The actions that a core asks its shell to perform: journal, publish, log.
+"""The actions of a core, which its shell performs: journal, publish, log.
 
 A core appends actions to its list while it handles a message or the time. The shell performs them in that order, so a
 record is written before the messages that depend on it are published.

@@ -94,7 +94,9 @@ class Slots:
                     claims[index].append(node)
             wrong = {self.layout.entities[i].name: nodes for i, nodes in claims.items() if len(nodes) != 1}
             if wrong:
-                text = "; ".join(f"{name} solved by {' and '.join(nodes) or 'nobody'}" for name, nodes in wrong.items())
+                text = "; ".join(
+                    f"{name} solved by {' and '.join(nodes) or 'no node'}" for name, nodes in wrong.items()
+                )
                 unclaimed = any(not nodes for nodes in wrong.values())
                 blamed = {node for nodes in wrong.values() for node in nodes}
                 raise BadParts(text, [node for node, _ in shares if unclaimed or node in blamed])

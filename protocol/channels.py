@@ -120,55 +120,22 @@ INQUIRY: Final = _simulation(
 )
 ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
 VIEW: Final = _simulation(
-    "view", messages.Commit, "supervisor", "operator, viewer", "what a lease asks for", named=False, blocking=False
+    "view", messages.Commit, "supervisor", "operator, viewer", "by lease", named=False, blocking=False
 )
 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
-_SAID: Final = messages.Join | messages.Up | messages.Done | messages.Failure
-UP: Final = _radio("up", _SAID, "client", "vhub", "the client's rate")
+_UPLINK: Final = messages.Join | messages.Up | messages.Done | messages.Failure
+UP: Final = _radio("up", _UPLINK, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 
 PLAYED: Final = _replay("played", replay_messages.Played, "replay", "operator", "as captured")
 REPLAY_REQUEST: Final = _replay("request", messages.Request, "operator", "replay", "a request", bytes_max=_SMALL)
 REPLAY_ANSWER: Final = _replay("answer", messages.Answer, "replay", "the named one", "an answer")
 
-CHANNELS: Final[tuple[Channel, ...]] = (
-    HELLO,
-    RECALL,
-    BUILD,
-    FETCH,
-    PIECE,
-    REFUSAL,
-    READY,
-    RESUME_STATE,
-    RESUME_GRANT,
-    EPOCH,
-    ORDER,
-    PART,
-    SAMPLES,
-    COMMIT,
-    DELIVERIES,
-    WANT,
-    HEARTBEAT,
-    TEMPO,
-    WATCHED,
-    END,
-    FAREWELL,
-    REQUEST,
-    INQUIRY,
-    ANSWER,
-    VIEW,
-    CLIENT_HELLO,
-    CLIENT_WELCOME,
-    CLIENT_REFUSAL,
-    UP,
-    DOWN,
-    PLAYED,
-    REPLAY_REQUEST,
-    REPLAY_ANSWER,
-)
+CHANNELS: Final[tuple[Channel, ...]] = tuple(value for value in list(globals().values()) if isinstance(value, Channel))
+"""All of the above, in their order."""
 
 _NAMES: Final = {
     channel.key: field

@@ -20,7 +20,7 @@ from foosim.common import keyed_random
 def library_fingerprint() -> bytes:
     """Return the BLAKE2b, 32 bytes, of sin, cos, exp, log, atan2 and hypot at 4,096 fixed points, by `math` and numpy.
 
-    Of numpy also what the world's arithmetic is made of: square roots, quotients, products and sums.
+    Of numpy also the world's arithmetic: square roots, quotients, products and sums.
     """
     import numpy as np  # of those who compute; commands that only read settings do without
 

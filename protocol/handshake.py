@@ -50,7 +50,7 @@ class NotValidHere(Refused):
 
 
 def failed_form(error: ComponentError) -> tuple[str, FailedForm]:
-    """Return the traceback of a form that has raised, and what a heartbeat says of it."""
+    """Return the traceback of a form that has raised, and its report in a heartbeat."""
     trace = sendable("".join(traceback.format_exception(error.cause)))
     component, end = error.component[: limits.TEXT_LENGTH_MAX], trace[-limits.TEXT_LENGTH_MAX :]
     return trace, FailedForm(error.entity, component, error.tick, end)
@@ -76,7 +76,7 @@ class Member:
         self.problem = ""
         """Why the run's deployment cannot be used on this machine."""
         self._not_valid: str | None = None
-        """The deployment of which that is said; another one may still be good."""
+        """The deployment with this problem; another one may still be valid."""
         self.build: Build | None = None
         self._known: Build | None = None
         """The build of the world that is here, also while it takes part in nothing."""

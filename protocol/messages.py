@@ -140,8 +140,7 @@ class Heartbeat(Message, frozen=True):
     run cannot continue (a client is lost, a component has raised), `busy` is its load (0 to 1), `report` is JSON for
     display, `failed` the form that has raised.
 
-    The vHub sends one without a report before late deliveries, to name the clients that these waited for. A node does
-    when its tick takes long: `slow` says where."""
+    The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 
     sender: Name
     tick: Counter
@@ -151,14 +150,13 @@ class Heartbeat(Message, frozen=True):
     busy: float
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
     failed: FailedForm | None = None
-    slow: Text = ""
 
 
 # --- simulation plane: membership -----------------------------------------------------------------------------------
 
 
 class Hello(Message, frozen=True, tag="hello"):
-    """A process asks for membership. An empty `world` accepts any world."""
+    """A process requests membership. An empty `world` accepts any world."""
 
     role: Name
     name: Name
@@ -319,7 +317,7 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks for admission. `received` is the last downlink number up to which it has all. `returns` counts how
+    """A client requests admission. `received` is the last downlink number up to which it has all. `returns` counts how
     often it has lost the vHub after a welcome; its own numbers then continue."""
 
     name: Name

@@ -19,17 +19,17 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 
-TOLD_EACH: Final = 3
+LOGGED_EACH_MAX: Final = 3
 """How many refusals of a sender on a channel are logged."""
-TOLD_MAX: Final = 100
+LOGGED_MAX: Final = 100
 """How many refusals are logged in all."""
-BYTES_TOLD: Final = 32
+LOGGED_BYTES_MAX: Final = 32
 WINDOW_NS: Final = 1_000_000_000
 REFUSALS_MAX: Final = 100
 """Refusals of one sender in one window, above which it is quarantined."""
 QUARANTINE_NS: Final = 10_000_000_000
 OTHERS: Final = "others"
-"""The name for all senders beyond those that are counted separately."""
+"""The name for all senders beyond the separately counted ones."""
 
 
 @dataclass(slots=True)
@@ -50,12 +50,12 @@ class Quarantined(Malformed):
 class Refusals:
     """Decodes messages, and counts refusals."""
 
-    def __init__(self, say: Callable[[Log], object], deployment: Callable[[], Deployment | None]) -> None:
+    def __init__(self, log: Callable[[Log], object], deployment: Callable[[], Deployment | None]) -> None:
         """`deployment` returns the deployment, which declares names; without one, every name counts as declared."""
         self.counts: dict[tuple[str, str], int] = {}
         """Refusals by channel and sender."""
-        self._say = say
-        self._told = 0
+        self._log = log
+        self._logged = 0
         self._senders: dict[str, _Sender] = {}
         self._deployment = deployment
 
@@ -75,11 +75,11 @@ class Refusals:
         count = self.counts[key] = self.counts.get(key, 0) + 1
         if isinstance(error, Quarantined):
             return
-        if count <= TOLD_EACH and self._told < TOLD_MAX:
-            self._told += 1
-            first = payload[:BYTES_TOLD].hex()
+        if count <= LOGGED_EACH_MAX and self._logged < LOGGED_MAX:
+            self._logged += 1
+            first = payload[:LOGGED_BYTES_MAX].hex()
             what = f"{error} ({len(payload)} bytes{': ' if first else ''}{first})"
-            self._say(Log("warning", f"refused from {show_name(name)} on {channel.name}: {what}"))
+            self._log(Log("warning", f"refused from {show_name(name)} on {channel.name}: {what}"))
         self._watch(name, now_ns)
 
     def _watch(self, name: str, now_ns: int) -> None:
@@ -102,7 +102,7 @@ class Refusals:
             much += f": it is in quarantine for {QUARANTINE_NS // 10**9} s"
         if not sender.is_named:
             sender.is_named = True
-            self._say(Log("error", much))
+            self._log(Log("error", much))
 
     def by_sender(self) -> dict[str, int]:
         """Return the counts by `channel sender`, for display."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from foosim.common import limits
 
 
-class Patience:
+class RetryTimer:
     """The time of the next request, `at_ns`."""
 
     def __init__(self, now_ns: int) -> None:
@@ -20,7 +20,7 @@ class Patience:
     def is_over(self, now_ns: int) -> bool:
         return now_ns >= self.at_ns
 
-    def asked(self, now_ns: int) -> None:
+    def requested(self, now_ns: int) -> None:
         """Double the back-off, after a request."""
         self._after_ns = min(2 * self._after_ns, limits.WANT_EVERY_NS_MAX)
         self.at_ns = now_ns + self._after_ns

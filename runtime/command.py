@@ -9,6 +9,7 @@ import atexit
 import contextlib
 import gc
 import os
+import re
 import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -16,9 +17,9 @@ from typing import Annotated, Any, Final, NoReturn, TextIO
 
 import typer
 
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue, Refused
+from foosim.common.names import nearest_name
 from foosim.runtime.help_text import App, Group
-from foosim.runtime.usage import bad_usage
 
 DONE: Final = 0
 FAILED: Final = 1
@@ -135,9 +136,21 @@ def _end(code: int, others: Collection[Any]) -> NoReturn:
 
 
 def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:
-    """Return the exit code of a command. Raises BadUsage for invalid arguments."""
+    """Return the exit code of a command. Raises BadValue for invalid arguments."""
     try:
         code = app(words, prog_name=name, standalone_mode=False)
     except typer.TyperException as error:
-        raise bad_usage(error, typer.main.get_command(app), name, words) from None
+        raise BadValue(_usage_text(error, name)) from None
     return code if isinstance(code, int) else DONE
+
+
+def _usage_text(error: typer.TyperException, name: str) -> str:
+    """Return what is wrong with the arguments, on one line: the command, typer's message, the nearest command."""
+    context: Any = getattr(error, "ctx", None)
+    text = error.format_message()
+    if text.startswith("Usage: "):
+        return text
+    unknown = re.fullmatch(r"No such command '(.*)'\.", text)
+    near = None if unknown is None else nearest_name(unknown[1], context.command.list_commands(context))
+    place = name if context is None else context.command_path
+    return f"{place}: {text.removesuffix('.')}{'' if near is None else f', nearest is {near}'}"

@@ -27,7 +27,7 @@ METAVARS: Final = {
     "vhub_listen": "HOST[:PORT]",
     "worse_for": "WHOM",
 }
-"""What stands for the value of an option that gives no other word, by the name of its parameter."""
+"""The placeholder of an option without a metavar, by the name of its parameter."""
 OF_TYPES: Final = {"int": "N", "float": "NUMBER", "Path": "FILE"}
 F = TypeVar("F", bound=Callable[..., Any])
 

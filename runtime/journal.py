@@ -51,7 +51,7 @@ class JournalDamaged(JournalError):
     """A record is invalid that was valid once: the file, the byte, and the number of valid records before it in the
     file.
 
-    No run goes on from such a journal.
+    No run resumes from such a journal.
     """
 
     exit_code = 3
@@ -133,14 +133,14 @@ class Records(Iterator[bytes]):
     def __next__(self) -> bytes:
         return next(self._records)
 
-    def behind(self, at: int) -> Iterator[Whole]:
+    def after(self, at: int) -> Iterator[Whole]:
         """Yield the valid records from a byte on, at any position."""
         return iter(()) if self.head is None else whole_records(self.head, self.path.read_bytes(), at)
 
     def damaged(self, following: int) -> JournalDamaged:
-        """Return the error for an invalid record that, by so many valid ones after it, was valid once."""
-        behind = f"{following} whole record{'s' if following > 1 else ''}"
-        text = f"{self.path}: byte {self.valid_bytes}: record {self.count + 1} is damaged, {behind} behind it"
+        """Return the error for an invalid record that, by the number of valid records after it, was valid once."""
+        count = f"{following} whole record{'s' if following > 1 else ''}"
+        text = f"{self.path}: byte {self.valid_bytes}: record {self.count + 1} is damaged, {count} after it"
         return JournalDamaged(text, self.path, self.valid_bytes, self.count)
 
     def _read(self, head: Head) -> Iterator[bytes]:
@@ -158,7 +158,7 @@ class Records(Iterator[bytes]):
                 yield content[whole.start : whole.stop]
         if self.left_bytes:
             bad = head.serial, self.valid_bytes
-            following = is_damage(self.same_machine, bad, self.behind(self.valid_bytes))
+            following = is_damage(self.same_machine, bad, self.after(self.valid_bytes))
             if following:
                 raise self.damaged(following)
 
@@ -183,7 +183,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
             opening, torn = head.opening, None
         elif head is not None and torn is not None:
             bad = torn[0], torn[1].valid_bytes
-            following = is_damage(records.same_machine, bad, records.behind(HEAD_BYTES))
+            following = is_damage(records.same_machine, bad, records.after(HEAD_BYTES))
             if following:
                 raise torn[1].damaged(following)
             continue

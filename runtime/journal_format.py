@@ -102,7 +102,7 @@ def whole_records(head: Head, content: bytes, at: int) -> Iterator[Whole]:
         at = at + 1 if found is None else found.stop
 
 
-def is_damage(same_machine: bool, bad: Place, behind: Iterator[Whole]) -> int:
+def is_damage(same_machine: bool, bad: Place, following: Iterator[Whole]) -> int:
     """Return how many valid records after an invalid one show that it was valid once; 0: the journal ends there."""
-    marks = [whole.synced for whole in behind]
+    marks = [whole.synced for whole in following]
     return len(marks) if marks and (same_machine or max(marks) > bad) else 0

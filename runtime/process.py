@@ -1,6 +1,6 @@
 """Around the loop of every process: it dies with its parent, logs lines, and ends in order on a signal.
 
-The environment tells a child of its launcher. It asks the kernel for a signal when the launcher ends, and a thread
+The environment names the launcher of a child. The kernel signals the end of the launcher to the child, and a thread
 reads a pipe that only the launcher can write: its end has the same meaning where the kernel has no such signal.
 """
 
@@ -21,11 +21,13 @@ from typing import Final
 PARENT_VARIABLE: Final = "FOOSIM_PARENT"
 """Process id of the launcher and the number of the pipe's reading end, as `PID:FD`."""
 STACK_SIGNAL: Final = signal.SIGUSR1
+STDERR: Final = 2
 _PR_SET_PDEATHSIG: Final = 1
 
 
 def die_with_parent() -> None:
-    """Tie this process to the launcher that started it; nothing happens when none did."""
+    """Tie this process to the launcher that started it, if one did, and have STACK_SIGNAL show its stack."""
+    end_with_stack()
     parent, _, pipe = os.environ.pop(PARENT_VARIABLE, "").partition(":")
     if not parent:
         return
@@ -39,17 +41,17 @@ def has_launcher() -> bool:
 
 
 def end_with(parent: int) -> None:
-    """Have the kernel kill this process when its parent ends, where the kernel can be asked."""
+    """Have the kernel kill this process when its parent ends, where the kernel can do that."""
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it ended before the kernel was asked
+    if os.getppid() != parent:  # it ended before the request to the kernel
         os._exit(1)
 
 
 def end_with_stack() -> None:
     """Have STACK_SIGNAL write the stacks of all threads to standard error and end this process, for one that hangs."""
     signal.signal(STACK_SIGNAL, signal.SIG_DFL)
-    faulthandler.register(STACK_SIGNAL, sys.stderr, all_threads=True, chain=True)
+    faulthandler.register(STACK_SIGNAL, STDERR, all_threads=True, chain=True)
 
 
 def _watch(pipe: int) -> None:

@@ -46,7 +46,7 @@ UNREADABLE: Final = (OSError, msgspec.DecodeError, UnicodeDecodeError, Recursion
 
 
 class RunInfo(msgspec.Struct, frozen=True):
-    """What a run file says. `radio` is empty until the vHub has told where it listens, `pki` without certificates."""
+    """The content of a run file. `radio` is empty until the vHub reports its address, `pki` without certificates."""
 
     run: str
     world: str

@@ -10,7 +10,7 @@ UNKNOWN_NS: Final = Deadlines().orphan_ns
 """The timeout before the deployment has been received."""
 
 
-class Orphan:
+class SupervisorTimeout:
     """The time since the loss of the supervisor."""
 
     def __init__(self) -> None:

@@ -38,9 +38,9 @@ class Notify:
         """Report that the process takes part in the run; the watchdog begins to supervise its loop."""
         self._is_ready = True
         self._notify("READY=1")
-        self.goes_on(now_ns)
+        self.progress(now_ns)
 
-    def goes_on(self, now_ns: int) -> None:
+    def progress(self, now_ns: int) -> None:
         """Report progress of the loop when that is due."""
         if self._every_ns and self._is_ready and not self._is_stopping and now_ns >= self._next_ns:
             self._next_ns = now_ns + self._every_ns

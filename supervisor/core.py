@@ -37,7 +37,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.rejects import Refusals
-from foosim.protocol.retry import Patience
+from foosim.protocol.retry import RetryTimer
 from foosim.runtime.closed import closed
 from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
@@ -89,7 +89,7 @@ class SupervisorCore:
         """Gets every committed frame, for a rehearsal."""
         self._slots = Slots(state.frame.layout, state.owners)
         self._presence = Presence(state.frame.layout)
-        self._patience = Patience(now_ns)
+        self._retry = RetryTimer(now_ns)
         self._refused = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self.handshake.on_hello,
@@ -155,14 +155,14 @@ class SupervisorCore:
             self._lose(lost, now_ns)
         self.failover.wake(now_ns)
         self._balance(now_ns)
-        if state.lacks_inputs and self._patience.is_over(now_ns):
+        if state.lacks_inputs and self._retry.is_over(now_ns):
             self._ask_again(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
         """The channel, and how many messages of it, without which there is nothing to commit.
 
-        Commits wait for each other as long as nodes can go on without them, less a tick for what a commit takes.
+        Commits wait for each other as long as nodes can continue without them, less a tick for what a commit takes.
         """
         state = self.state
         inputs, tick = state.inputs, state.frame.tick
@@ -176,7 +176,7 @@ class SupervisorCore:
         state = self.state
         deadline = now_ns + limits.HEARTBEAT_NS
         if state.lacks_inputs:
-            deadline = min(deadline, self._patience.at_ns)
+            deadline = min(deadline, self._retry.at_ns)
         if state.is_open and state.end is None and state.released <= state.frame.tick + limits.RELEASE_AHEAD:
             release_ns = state.pacer.release_ns(state.released)
             if release_ns is not None and (not state.stop_at or state.released < state.stop_at):
@@ -211,7 +211,7 @@ class SupervisorCore:
             return
         if failed and state.abandons(reason):
             state.finished = True
-            state.log("error", f"the run does not go on from tick {state.frame.tick}: {reason}")
+            state.log("error", f"the run does not continue from tick {state.frame.tick}: {reason}")
             return
         state.end = End(state.frame.tick if tick is None else tick, reason, failed, form)
         self.closing.ended(self.progress.now_ns)
@@ -277,7 +277,7 @@ class SupervisorCore:
             state.orders[tick] = edits
             state.orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == committed:
-                self._patience.progress(state.deployment.tick_ns, now_ns)
+                self._retry.progress(state.deployment.tick_ns, now_ns)
             if tick == state.first_tick:
                 state.started_ns = now_ns
             self.progress.released(tick, now_ns)
@@ -297,7 +297,7 @@ class SupervisorCore:
         deliveries = inputs.deliveries.get(tick)
         if parts is None or deliveries is None or len(parts) < len(state.members) or tick not in state.orders:
             return False
-        assert state.members, "parts of nobody"
+        assert state.members, "parts without members"
         edits = state.orders[tick]
         barrier = Barrier(tick + 1, state.members, self._slots)
         digest = input_digest_of(state.frame.digest, edits, deliveries)
@@ -333,7 +333,7 @@ class SupervisorCore:
         self.player_losses.committed(state.committed_ns, now_ns)
         self.vhub_loss.committed(state.committed_ns, now_ns)
         state.committed_ns = now_ns
-        self._patience.progress(state.deployment.tick_ns, now_ns)
+        self._retry.progress(state.deployment.tick_ns, now_ns)
         due_ns = pacer.release_ns(frame.tick - 1) or 0
         moved_ns = pacer.committed(frame.tick, now_ns)
         self._publish_commit(edits, solved, now_ns, over)
@@ -341,8 +341,7 @@ class SupervisorCore:
             self.on_commit(frame)
         late = self.progress.committed(frame.tick, pacer.last_lag_ns, due_ns, now_ns)
         if moved_ns:
-            waited = f"{self.progress.late}{self.progress.late_why}"
-            state.log("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {waited}")
+            state.log("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.progress.late}")
         elif late:
             state.log("info", late)
 
@@ -379,7 +378,7 @@ class SupervisorCore:
             wants.append(Want(channels.SUPERVISOR, channels.PART.name, tick + 1, state.epoch, missing))
         for want in wants:
             state.publish(channels.WANT, channels.SUPERVISOR, want)
-        self._patience.asked(now_ns)
+        self._retry.requested(now_ns)
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
@@ -394,7 +393,7 @@ class SupervisorCore:
         for tick in range(state.frame.tick, state.released):
             self._publish_orders(tick, tick + 1)
         self.progress.begun(now_ns)
-        self._patience.progress(state.deployment.tick_ns, now_ns)
+        self._retry.progress(state.deployment.tick_ns, now_ns)
 
     def _start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""
@@ -458,9 +457,6 @@ class SupervisorCore:
         is_hub = process.name == channels.VHUB
         if process.lost and not is_hub:
             self.node_loss.on_heartbeat(process, now_ns)
-        if heartbeat.slow:
-            process.slow = heartbeat
-            state.log("warning", f"{process.name}: {heartbeat.slow}")
         if not heartbeat.report:
             self.progress.on_heartbeat(heartbeat)
             return
@@ -478,7 +474,7 @@ class SupervisorCore:
             self._fail_by(heartbeat)
 
     def _fail_by(self, heartbeat: Heartbeat) -> None:
-        """A process has said why the run cannot go on; the traceback of a form that has raised is logged here, too."""
+        """A process has reported why the run cannot continue; the traceback of a failed form is logged here, too."""
         form = heartbeat.failed
         if form is not None:
             self.state.log("error", f"{heartbeat.lost}\n{form.traceback}")

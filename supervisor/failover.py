@@ -39,7 +39,7 @@ def lacks_inputs(state: RunState, standing: ResumeState) -> bool:
 def why_it_ends(state: RunState, standing: ResumeState) -> tuple[str, int]:
     """Return the reason with which a run ends whose vHub lacks inputs, and the last tick that the vHub has.
 
-    The reason says how a new run begins with the last captured frame.
+    The reason has the command that begins a new run with the last captured frame.
     """
     tick = decode(Commit, standing.commit).tick if standing.commit else state.first_tick
     known = max(state.frame.tick - 1, state.inputs.delivered)
@@ -89,8 +89,10 @@ class Failover:
         state.log("warning", f"started again: the journal ends at tick {state.frame.tick}, epoch {state.epoch}")
 
     def on_standing(self, standing: ResumeState, now_ns: int) -> bool:
-        """The vHub reports its resume position: go on from its last commit when the journal has lost that. False for a
-        repeat."""
+        """The vHub reports its resume position: continue from its last commit when the journal has lost that.
+
+        False for a repeat.
+        """
         state = self._state
         if self._standing is not None and self._standing.boot == standing.boot:
             return False
@@ -122,7 +124,7 @@ class Failover:
         self._standing = None
 
     def wake(self, now_ns: int) -> None:
-        """Begin the epoch when all processes are here, or when those that are not have had their time.
+        """Begin the epoch when all processes are here, or when the deadline of the missing ones is over.
 
         Where the vHub lacks inputs the run ends then, or as soon as it is known that somebody has lived on.
         """
@@ -155,7 +157,7 @@ class Failover:
         # A commit that the journal lost has reported the open outages, with their length: they are not reported again.
         close_outages(state.recovered, state.committed_ns, state.committed_ns)
         state.catch_up(frame, standing.chain, standing.commit)
-        state.log("warning", f"goes on from the vHub's commit {state.frame.tick}, the journal lost what led to it")
+        state.log("warning", f"continues from the vHub's commit {state.frame.tick}, the journal lost what led to it")
 
     def _open(self, standing: ResumeState, here: list[str], missing: list[str], now_ns: int) -> None:
         state = self._state
@@ -176,7 +178,7 @@ class Failover:
             return
         self._publish_commit(now_ns)
         state.grant(standing)
-        state.log("info", f"goes on from tick {state.frame.tick} with {', '.join(here) or 'no node yet'}")
+        state.log("info", f"continues from tick {state.frame.tick} with {', '.join(here) or 'no node yet'}")
         for process in [*state.roster.by_name.values()]:
             is_new = process.role == "node" and process.name not in (*state.members, *state.roster.stopped)
             if is_new and process.ready and not process.lost:  # it was before its time

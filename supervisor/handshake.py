@@ -24,7 +24,7 @@ class Handshake:
         self._process_gone = process_gone
 
     def on_hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
-        """Answer a process that asks to take part with what to build, or with a refusal."""
+        """Answer the hello of a process with a build or a refusal."""
         state = self._state
         if state.roster.has_silent_namesake(hello, now_ns):
             return  # the one before it may have ended; the hello is repeated
@@ -69,7 +69,7 @@ class Handshake:
         return process
 
     def on_heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
-        """Note that a process lives, and what it reports; recall one that takes part and has not said hello to this
+        """Note that a process lives, and what it reports; recall one that takes part and has not sent a hello to this
         supervisor. Return the process."""
         state = self._state
         process = state.roster.by_name.get(heartbeat.sender)

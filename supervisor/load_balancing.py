@@ -45,7 +45,7 @@ class Shift:
 def best_shift(
     loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str], stay: Collection[str]
 ) -> Shift | None:
-    """Return the robot that should move now, if any, but none of those that `stay`: from the busiest to the idlest
+    """Return the robot that should move now, if any, but none in `stay`: from the busiest to the idlest
     node, preferably one whose home that is."""
     source = max(sorted(loads), key=lambda name: loads[name])
     target = min(sorted(loads), key=lambda name: loads[name])

@@ -51,7 +51,7 @@ class NodeLoss:
         if members:
             self._freeze_of(name)
             self.open(self.adopted([name], members), members, now_ns)
-            state.log("warning", f"lost node {name}: {reason}; goes on from tick {state.frame.tick} without it")
+            state.log("warning", f"lost node {name}: {reason}; continues from tick {state.frame.tick} without it")
         else:
             state.hold()
             state.log("error", f"lost node {name}: {reason}; no node is left, the run waits for one")
@@ -103,7 +103,7 @@ class NodeLoss:
         state.log("info", f"node {name} takes part from tick {state.frame.tick}")
 
     def on_heartbeat(self, process: Process, now_ns: int) -> None:
-        """A lost node sends heartbeats. An epoch without it tells it so, but there is none when it was the last member.
+        """A lost node sends heartbeats. An epoch without it shows that, but there is none when it was the last member.
 
         Then it joins again, if it had built the world and its arithmetic was compared.
         """
@@ -125,7 +125,7 @@ class NodeLoss:
         """Open an epoch.
 
         The robots that go back later are journalled before it, so that a crash in between forgets none; the caller
-        strikes off those that are back in it afterwards.
+        removes the returned ones afterwards.
         """
         state = self._state
         state.account.moves += sum(state.owners[robot] != owner for robot, owner in owners.items())
@@ -160,7 +160,7 @@ class NodeLoss:
             self._freeze(robot for robot, owner in self._state.owners.items() if owner == lost)
 
     def _freeze(self, robots: Iterable[str]) -> None:
-        """Take robots out of service from the last commit on, but those that are so already."""
+        """Take robots out of service from the last commit on, except robots that are out of service already."""
         down = self._down()
         edits: list[Edit] = [Set(robot, DOWN, [FROZEN]) for robot in sorted(robots) if down[robot] == 0.0]
         self._state.order(self._state.frame.tick, edits)

@@ -1,7 +1,7 @@
 """Pacing: when the next order may be released, and how late ticks are.
 
 Order k is the permission to compute tick k. It is released once tick k - W is committed; in realtime also not before
-wall time k T (scaled by the factor), so that no command waits behind ticks that ran ahead of the clock; while paused,
+wall time k T (scaled by the factor), so that no command waits for ticks ahead of the clock; while paused,
 not at all, but for the ticks that `step` granted.
 """
 
@@ -84,7 +84,7 @@ class Pacer:
         self.start(now_ns, next_tick)
 
     def step(self, next_tick: int, count: int) -> None:
-        """Grant `count` ticks from `next_tick` on, and stay paused behind them."""
+        """Grant `count` ticks from `next_tick` on, and stay paused after them."""
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 

@@ -2,7 +2,7 @@
 
 A process is waited for when it has all its inputs and has not answered (node: order and deliveries; vHub: commit,
 samples and Dones; lockstep client: Go). Only such a process can be late or overdue. A late tick is blamed on the
-process with the longest share of the time from the last commit to its own, on a clock that stands still while the
+process with the longest share of the time from the last commit to its own, on a clock that stops while the
 supervisor itself is busy; ticks that only catch up keep the blame of the tick that made them late.
 """
 
@@ -19,7 +19,7 @@ from foosim.supervisor.roster import Process
 from foosim.supervisor.state import RunState
 
 DOUBT_NS: Final = 1_000_000_000
-"""For how long behind a standstill of the supervisor connections end that it has itself kept silent on."""
+"""After a standstill of the supervisor, connections that it kept silent end within this time."""
 CUT_SEEN_NS: Final = 1_500_000_000
 """By then the connection of a process that is cut off has closed: a lease, and what it takes to notice its end."""
 LATE_EVERY_NS: Final = 1_000_000_000
@@ -32,11 +32,9 @@ class ProgressMonitor:
     def __init__(self, state: RunState, now_ns: int) -> None:
         self._state = state
         self.now_ns = now_ns
-        """When `lost` was asked last."""
+        """The time of the last call of `lost`."""
         self.late = ""
         """The process that the last late tick waited for."""
-        self.late_why = ""
-        """What that process has said of what takes long at the tick; empty without."""
         self.late_tick = -1
         self._busy_ns = 0
         self._begun_ns = self._progress_ns = now_ns
@@ -45,13 +43,13 @@ class ProgressMonitor:
         self._named = ""
         self._lag_ns = 0
         self._late_ticks = 0
-        self._late_said_ns = now_ns - LATE_EVERY_NS
+        self._late_logged_ns = now_ns - LATE_EVERY_NS
         self._released: dict[int, int] = {}
         self._delivered: dict[int, int] = {0: now_ns}
         self._committed: dict[int, tuple[int, int]] = {}
         """Of each frame: when it was committed, and how long the supervisor had been busy until then."""
         self._parts: dict[int, dict[str, int]] = {}
-        self._told: dict[int, str] = {}
+        self._late_by: dict[int, str] = {}
         """By tick: which process its deliveries waited for, as the vHub reported."""
 
     # --- what came when ----------------------------------------------------------------------------------------------
@@ -94,8 +92,8 @@ class ProgressMonitor:
         """The vHub reports which process its closing waited for: the deliveries of the next tick are late by it."""
         names = _names(heartbeat.waiting_for)
         if names:
-            self._told[heartbeat.tick + 1] = names[0]
-            self._told.pop(heartbeat.tick + 1 - limits.KEPT_TICKS, None)
+            self._late_by[heartbeat.tick + 1] = names[0]
+            self._late_by.pop(heartbeat.tick + 1 - limits.KEPT_TICKS, None)
 
     def part(self, tick: int, node: str, now_ns: int) -> None:
         """A node's part of the frame after `tick` has come."""
@@ -105,7 +103,6 @@ class ProgressMonitor:
         """A frame is committed, of a tick that was due to be released at `due_ns`; return what is to be logged."""
         if lag_ns > self._lag_ns:
             self.late = self._waited_for(frame_tick - 1, due_ns, now_ns)
-            self.late_why = self._said_of(self.late, frame_tick - 1)
             self.late_tick = frame_tick
         self._lag_ns = lag_ns
         self._committed[frame_tick] = now_ns - self._busy_ns, self._busy_ns
@@ -120,12 +117,10 @@ class ProgressMonitor:
         if lag_ns < self._state.deployment.tick_ns:
             return ""
         self._late_ticks += 1
-        if now_ns - self._late_said_ns < LATE_EVERY_NS:
+        if now_ns - self._late_logged_ns < LATE_EVERY_NS:
             return ""
-        self._late_said_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
-        return (
-            f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late}{self.late_why} ({count} late ticks)"
-        )
+        self._late_logged_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
+        return f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late} ({count} late ticks)"
 
     def _waited_for(self, tick: int, due_ns: int, now_ns: int) -> str:
         """Return the process with the longest share of the time from the commit of frame `tick` to the next one."""
@@ -134,7 +129,7 @@ class ProgressMonitor:
         released = max(begun, self._released.get(tick, begun))
         delivered = max(begun, self._delivered.get(tick, begun))
         spans = {SUPERVISOR: self._busy_ns - busy_before_ns + released - begun}
-        hub = self._told.get(tick, VHUB)
+        hub = self._late_by.get(tick, VHUB)
         spans[hub] = spans.get(hub, 0) + delivered - begun
         for node, came in self._parts.get(tick, {}).items():
             spans[node] = spans.get(node, 0) + came - max(released, delivered)
@@ -183,7 +178,7 @@ class ProgressMonitor:
         heartbeat_ns = state.wait_ns(deadlines.heartbeat_ns)
         silent = state.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return {name: f"no heartbeat for {heartbeat_ns / 1e9:g} s{self._said_of(name, tick)}" for name in silent}
+            return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
         if state.is_resuming:
             return {}  # no process is waited for yet
         if state.is_vhub_away:
@@ -201,18 +196,11 @@ class ProgressMonitor:
         if self._waits_for_capture(names):
             lost_ns = max(lost_ns, deadlines.close_ns)
         if overdue_ns > lost_ns:
-            why = f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s"
-            return {name: why + self._said_of(name, tick) for name in names}
+            return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             state.log("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
-
-    def _said_of(self, name: str, tick: int) -> str:
-        """Return what a node has said of what takes long at a tick or later, as a part of a reason."""
-        process = self._state.roster.by_name.get(name)
-        slow = None if process is None else process.slow
-        return f": {slow.slow}" if slow is not None and slow.tick >= tick else ""
 
     def _waits_for_capture(self, names: list[str]) -> bool:
         """Whether only the vHub is waited for, and reports to wait for its disk."""

@@ -228,7 +228,7 @@ class Requests:
         if not free:
             raise Refused("nothing can be pushed: this world has no free bodies")
         name = chosen("free body", _name(arguments, "name", free[0]), free)
-        impulse = _vector(arguments, "impulse", None)
+        impulse = _vector(arguments, "impulse")
         body = body_of(self._state.deployment, layout, layout[name])
         mass, fastest = body.links[0].mass, body.speed_limit
         size, most = hypot(*impulse), mass * fastest
@@ -369,12 +369,8 @@ def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:
     return value
 
 
-def _vector(
-    arguments: dict[str, Any], name: str, default: tuple[float, float, float] | None
-) -> tuple[float, float, float]:
+def _vector(arguments: dict[str, Any], name: str) -> tuple[float, float, float]:
     value = arguments.get(name)
-    if value is None and default is not None:
-        return default
     if isinstance(value, list) and len(value) == 3 and all(_is_small(number) for number in value):
         x, y, z = value
         return float(x), float(y), float(z)

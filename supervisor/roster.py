@@ -42,8 +42,6 @@ class Process:
     """A node's digest of a fixed small run of its engine, once it has one."""
     heard_ns: int = 0
     heartbeat: Heartbeat | None = None
-    slow: Heartbeat | None = None
-    """The last one that names what takes long at a tick."""
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0
@@ -78,10 +76,6 @@ class Roster:
         """The digest of the fixed small run that all nodes share; empty when there is none, or several."""
         digests = {process.arithmetic for process in self.by_name.values() if process.arithmetic}
         return digests.pop() if len(digests) == 1 else b""
-
-    @property
-    def nodes(self) -> list[str]:
-        return sorted(name for name, process in self.by_name.items() if process.role == "node")
 
     def reason_against(self, hello: Hello) -> str:
         """Return why this process cannot take part, or an empty string."""

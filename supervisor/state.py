@@ -1,7 +1,7 @@
 """The state of a run as the supervisor keeps it: one value that the core and its helpers share.
 
 `RunState` holds the last committed frame, the epoch and who owns what in it, orders and commits of the last ticks, what
-requests have asked for, the account, and the actions for the shell. `checkpoint` returns it as the record with which a
+requests have changed, the account, and the actions for the shell. `checkpoint` returns it as the record with which a
 journal file starts, `restore` puts it where a journal ends, `catch_up` at a later frame. Its methods change the
 state and append the records and messages that belong to the change; decisions are those of the core and its helpers.
 """
@@ -106,106 +106,75 @@ class InputBuffer:
 class RunState:
     """The state of one run."""
 
-    actions: list[Action]
-    """What the shell performs next."""
-    run_record: RunRecord
-    roster: Roster
-    pacer: Pacer
-    busy: float
+    busy: float = 0.0
     """The share of its time in which the supervisor's loop does not sleep."""
-    repeated: int
+    repeated: int = 0
     """Messages that came twice, or of a process that does not take part any more."""
-
-    frame: Frame
-    """The last committed one."""
-    chain: bytes
-    """The digest over all frames up to it."""
-    first_tick: int
-    epoch: int
-    epoch_payload: bytes
+    epoch: int = 0
+    epoch_payload: bytes = b""
     """The epoch as it was published."""
-    is_open: bool
+    is_open: bool = False
     """Whether an epoch of this supervisor has begun."""
-    owners: dict[str, str]
-    members: tuple[str, ...]
+    members: tuple[str, ...] = ()
     """The nodes that take part in the epoch, in name order."""
-    inputs: InputBuffer
-    released: int
-    """The first tick whose order is not released."""
-    orders: dict[int, list[Edit]]
-    commits: dict[int, bytes]
-    """The last ones, as they were published."""
-
-    coming_edits: dict[int, list[Edit]]
-    """Edits of ticks that are not released yet."""
-    answers: KeptAnswers
-    """By sender and id of the request."""
-    asked: deque[Asked]
-    """The last requests that change something, for people."""
-    disruptions: int
+    disruptions: int = 0
     """Requested events of the network."""
-    last_disruptions: deque[tuple[int, str]]
-    """The last of them: the tick at which each takes effect, the event as JSON."""
-
-    account: Account
-    recovered: list[Recovered]
-    """Losses and returns, the oldest first."""
-    returns: dict[str, str]
-    """Robots that were adopted: the node that they go back to."""
-    started_ns: int
-    committed_ns: int
-
-    stop_at: int
-    """The tick of the frame that ends the run; 0: none."""
-    end: End | None
-    cut_off: str
+    started_ns: int = 0
+    committed_ns: int = 0
+    end: End | None = None
+    cut_off: str = ""
     """Why the capture has no end; empty where it has one, or where there is none."""
-    finished: bool
-
-    is_resuming: bool
+    finished: bool = False
+    is_resuming: bool = False
     """Whether a supervisor that was started again waits for vHub and nodes (`failover`)."""
-    is_vhub_away: bool
+    is_vhub_away: bool = False
     """Whether the run waits for a vHub that was lost (`vhub_loss`)."""
-    granted_boot: str
+    granted_boot: str = ""
     """Boot of the vHub that was last granted its resume."""
-    found_living: bool
+    found_living: bool = False
     """Whether a process has reported that took part before this supervisor was started."""
-    abandoned: str
+    abandoned: str = ""
     """Why a resumed run does not continue."""
+    _is_resumed: bool = False
 
     def __init__(self, settings: RunSettings, fingerprint: bytes, boot: str, clock: str) -> None:
         """`boot` names this start of the supervisor, `clock` the monotonic clock of its times."""
-        self.settings = settings
-        self.boot = boot
-        self.clock = clock
-        self.actions = []
+        self.settings, self.boot, self.clock = settings, boot, clock
+        self.actions: list[Action] = []
+        """What the shell performs next."""
         self.deployment = settings.load_deployment()
         self._events = Schedule(self.deployment)
         text = settings.deployment_name, settings.deployment_text
         self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock, settings.start)
         self.roster = Roster(self.deployment, fingerprint)
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
-        self.busy, self.repeated = 0.0, 0
-
-        self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
-        self.first_tick = self.released = self.frame.tick
-        self.epoch, self.epoch_payload, self.is_open = 0, b"", False
-        self.owners, self.members = self.deployment.owners(), ()
+        self.frame = first_frame(self.deployment, settings.start)
+        """The last committed one."""
+        self.chain = first_chain(settings.origin)
+        """The digest over all frames up to it."""
+        self.first_tick = self._resumed_tick = self.frame.tick
+        self.owners = self.deployment.owners()
         self.inputs = InputBuffer()
-        self.orders, self.commits = {}, {}
-
-        self.coming_edits, self.disruptions, self.last_disruptions = {}, 0, deque(maxlen=DISRUPTIONS_KEPT)
-        self.answers, self.asked = KeptAnswers(ANSWERS_KEPT), deque(maxlen=ASKED_KEPT)
-
+        self.released = self.frame.tick
+        """The first tick whose order is not released."""
+        self.orders: dict[int, list[Edit]] = {}
+        self.commits: dict[int, bytes] = {}
+        """The last ones, as they were published."""
+        self.coming_edits: dict[int, list[Edit]] = {}
+        """Edits of ticks that are not released yet."""
+        self.answers = KeptAnswers(ANSWERS_KEPT)
+        """By sender and id of the request."""
+        self.asked: deque[Asked] = deque(maxlen=ASKED_KEPT)
+        """The last requests that change something, for people."""
+        self.last_disruptions: deque[tuple[int, str]] = deque(maxlen=DISRUPTIONS_KEPT)
+        """The last of them: the tick at which each takes effect, the event as JSON."""
         self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
-        self.recovered, self.returns = [], {}
-        self.started_ns = self.committed_ns = 0
-
+        self.recovered: list[Recovered] = []
+        """Losses and returns, the oldest first."""
+        self.returns: dict[str, str] = {}
+        """Robots that were adopted: the node that they go back to."""
         self.stop_at = settings.last_tick
-        self.end, self.cut_off, self.finished = None, "", False
-        self.is_resuming = self.is_vhub_away = self.found_living = self._is_resumed = False
-        self.granted_boot = self.abandoned = ""
-        self._resumed_tick = self.first_tick
+        """The tick of the frame that ends the run; 0: none."""
 
     # --- output ------------------------------------------------------------------------------------------------------
 
@@ -337,7 +306,7 @@ class RunState:
         self._resumed_tick, self._is_resumed = self.frame.tick, True
 
     def abandons(self, reason: str) -> bool:
-        """Whether a run that cannot go on, for this reason, is left as it was when it was resumed, with its journals
+        """Whether a run that cannot continue, for this reason, is left as it was when it was resumed, with its journals
         and its capture, so that it can be resumed once more: before its first commit."""
         if self._is_resumed and not self.found_living and self.frame.tick <= self._resumed_tick:
             self.abandoned = reason

@@ -55,7 +55,7 @@ class Viewing:
         """By requester."""
         self._watched = Watched([], [])
         """The set last sent to the vHub."""
-        self._told_at: Heartbeat | None = None
+        self._sent_at: Heartbeat | None = None
         """Its last heartbeat before that."""
         self._period_ns = self._due_ns = 0
         self._unseen = b""
@@ -74,7 +74,7 @@ class Viewing:
         watched = _watched_by(leases.values())
         self._leases = leases
         if watched != self._watched or links or readings:
-            self._say_watched(watched)
+            self._send_watched(watched)
         self._set_rate()
         if hz and not (known is not None and known.hz):
             self._unseen = self._last_commit
@@ -111,7 +111,7 @@ class Viewing:
         if self._leases:
             self._end_leases(now_ns)
         if self._hub_is_wrong():
-            self._say_watched(self._watched)
+            self._send_watched(self._watched)
         if self._unseen and now_ns >= self._due_ns:
             self._show(now_ns)
 
@@ -130,23 +130,23 @@ class Viewing:
             self._set_rate()
             watched = _watched_by(self._leases.values())
             if watched != self._watched:
-                self._say_watched(watched)
+                self._send_watched(watched)
 
     def hub_ready(self) -> None:
         """Send a restarted vHub the links and readings to report."""
         if self._is_watching:
-            self._say_watched(self._watched)
+            self._send_watched(self._watched)
 
     def _hub_is_wrong(self) -> bool:
         """Whether the vHub reports values that no viewer requests, after a missed message or a failover."""
         hub = self._state.roster.by_name.get(channels.VHUB)
-        keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
+        keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._sent_at
         return keeps and not self._is_watching and self._state.end is None
 
-    def _say_watched(self, watched: Watched) -> None:
+    def _send_watched(self, watched: Watched) -> None:
         self._watched = watched
         hub = self._state.roster.by_name.get(channels.VHUB)
-        self._told_at = None if hub is None else hub.heartbeat
+        self._sent_at = None if hub is None else hub.heartbeat
         self._state.publish(channels.WATCHED, channels.SUPERVISOR, watched)
 
     @property

@@ -215,6 +215,9 @@ NO_DEADLINES = {
     "SWITCH_S",
     "FORGET_EVERY_NS",
     "LOOK_EVERY_NS",
+    "OBSERVED_EVERY_S",
+    "STARVED_S",
+    "WARNED_EVERY_S",
 }
 """How often something is done or said again, and what is no wait for another process."""
 

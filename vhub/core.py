@@ -54,9 +54,9 @@ from foosim.protocol.messages import (
     Watched,
 )
 from foosim.protocol.rejects import Refusals
-from foosim.protocol.retry import Patience
+from foosim.protocol.retry import RetryTimer
 from foosim.runtime.roles.standstill import REPORTED_NS, standstill_text
-from foosim.runtime.supervisor_timeout import Orphan
+from foosim.runtime.supervisor_timeout import SupervisorTimeout
 from foosim.vhub.clients import Clients, lost
 from foosim.vhub.network.packet import Flight, received
 from foosim.vhub.paced_release import Releases
@@ -145,7 +145,7 @@ class HubCore:
         self.waits = WaitTimes()
         hooks = self.send_heartbeat, self.give_up
         self.clients = Clients(self.sessions, self.actions, self.waits, *hooks)  # type: ignore[arg-type]
-        self.handshake, self.orphan = ResumeHandshake(machine), Orphan()
+        self.handshake, self.orphan = ResumeHandshake(machine), SupervisorTimeout()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -164,7 +164,7 @@ class HubCore:
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
         self._failed: FailedForm | None = None
-        self._patience = Patience(now_ns)
+        self._retry = RetryTimer(now_ns)
         clients = self.clients
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
@@ -250,7 +250,7 @@ class HubCore:
         self.clients.wake(now_ns, holds=self.orphan.is_alone or self.handshake.waits)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
-        if self._patience.is_over(now_ns) and self.epoch > 0 and not self.finished:
+        if self._retry.is_over(now_ns) and self.epoch > 0 and not self.finished:
             self._ask_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
@@ -260,7 +260,7 @@ class HubCore:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
         if self.epoch > 0 and not self.finished:
-            deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
+            deadline = min(deadline, self._retry.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
         if self.clients.waited:
@@ -414,7 +414,7 @@ class HubCore:
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))
         self.commits.forget(tick - limits.KEPT_TICKS)
-        self._patience.progress(state.tick_ns, world.sent_ns)
+        self._retry.progress(state.tick_ns, world.sent_ns)
 
     def _tell_of_waits(self, now_ns: int) -> None:
         """Before late deliveries, report to the supervisor what they waited for."""
@@ -499,7 +499,7 @@ class HubCore:
         if past.epoch is not None:
             self._take_epoch(past.epoch)
             self.handshake.begin(past.machine, past.published, past.owing)
-        self._patience.progress(self.deployment.tick_ns, now_ns)
+        self._retry.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
         self._repeated += not self.member.recall(recall)
@@ -536,7 +536,7 @@ class HubCore:
             tick = self.state.closed + 1
             self._sent[tick] = encode(Deliveries(tick, []))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
-            self._patience.progress(self.state.tick_ns, now_ns)
+            self._retry.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         taken = [] if self._fences(commit) else self.commits.take(commit, payload)
@@ -635,7 +635,7 @@ class HubCore:
         if (self._world is None or kind == channels.COMMIT.name) and not self.handshake.waits:
             want = Want(channels.VHUB, kind, tick, self.epoch, [])
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
-        self._patience.asked(now_ns)
+        self._retry.requested(now_ns)
 
     def lose(self, name: str, why: str) -> None:
         """End the run, since it has lost what it cannot do without: a client, the capture, space for the journal."""

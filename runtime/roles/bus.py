@@ -62,7 +62,7 @@ class Bus:
                 readers.append(process)
 
     def unsubscribe(self, process: str) -> None:
-        """Forget a process that has ended; messages in flight to it are delivered to nobody."""
+        """Forget a process that has ended; messages in flight to it are dropped."""
         for readers in self._readers.values():
             if process in readers:
                 readers.remove(process)

@@ -88,7 +88,7 @@ class Loop:
         if stood_ns:
             for role in self.roles:
                 role.stood(stood_ns, now_ns)
-        self.notify.goes_on(now_ns)
+        self.notify.progress(now_ns)
         if self._bus is None:
             self._turn_alone(items, now_ns)
         else:

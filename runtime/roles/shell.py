@@ -211,7 +211,7 @@ def client_session(
 def address_of(run: str, plane: Plane, give_up: Callable[[], bool]) -> str:
     """Return where the plane's router of a run listens, as soon as that is known.
 
-    Raises NoRun, ConnectError for a run that has ended or when `give_up` says so.
+    Raises NoRun, ConnectError for a run that has ended or when `give_up` returns True.
     """
     folder = open_run(run)
     while not give_up():
@@ -222,4 +222,4 @@ def address_of(run: str, plane: Plane, give_up: Callable[[], bool]) -> str:
         if folder.result() is not None:
             raise ConnectError(f"run {run} has ended")
         time.sleep(LOOK_S)
-    raise ConnectError(f"told to end before run {run} had an address")
+    raise ConnectError(f"stopped before run {run} had an address")

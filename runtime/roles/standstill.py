@@ -33,4 +33,6 @@ class Standstill:
 
 def standstill_text(stood_ns: int) -> str:
     """Return the log line of a standstill; empty for a short one."""
-    return f"stood still for {stood_ns / 1e9:.1f} s: no other process is blamed" if stood_ns >= REPORTED_NS else ""
+    return (
+        f"event loop was blocked for {stood_ns / 1e9:.1f} s; peer deadlines extended" if stood_ns >= REPORTED_NS else ""
+    )

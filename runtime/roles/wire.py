@@ -69,11 +69,6 @@ class Wire:
         if not self._inbox.has(stem):
             self.session.receive(stem, stem, _read_key, self._inbox)
 
-    @property
-    def is_alone(self) -> bool:
-        """Whether the process has no other role: then other threads may publish, too."""
-        return self._bus is None
-
     def put(self, channel: Channel, name: str, payload: bytes) -> None:
         """Publish on a channel; `name` is the sender, or the receiver where one is addressed."""
         if self._bus is not None:

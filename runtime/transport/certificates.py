@@ -1,6 +1,6 @@
 """The folder of certificates, and how a process proves from it who it is.
 
-    ca.pem                   the root that everybody trusts
+    ca.pem                   the root that all processes trust
     IDENTITY.pem .key        a certificate and its key; the certificate's common name is the identity
 
 A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is

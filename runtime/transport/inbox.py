@@ -1,7 +1,7 @@
 """The inbox of a process: bounded, many writers, one reader.
 
 Receiving threads only offer messages. The loop takes all of them, decides, and sleeps until a message or its deadline.
-A receiving thread does nothing else, because other messages wait behind it.
+A receiving thread does nothing else, because other messages wait for it.
 
 A waiting reader costs a wake-up for each message, and a receiving thread between network and reader a second one: a
 quarter of the cost of a tick's messages (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose queues

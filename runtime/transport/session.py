@@ -95,7 +95,7 @@ class _Attempt:
         self._is_abandoned = False
 
     def session(self, give_up: Callable[[], bool]) -> zenoh.Session | None:
-        """Return the session, or None as soon as `give_up` says so. Raises ZError when there is none."""
+        """Return the session, or None as soon as `give_up` returns True. Raises ZError when there is none."""
         if give_up():
             return None
         _start_inside(self._connect, "connect")
@@ -199,7 +199,7 @@ class Session:
         give_up: Callable[[], bool] = lambda: False,
         security: Security | None = None,
     ) -> Session:
-        """Connect to a router, which may start later. Raises ConnectError at the timeout, or when `give_up` says so.
+        """Connect to a router, which may start later. Raises ConnectError at the timeout, or if `give_up` returns True.
 
         Raises NotAuthorised as soon as the other side, or its certificate, shows a refusal. A link that is lost later
         is restored as soon as the router is back.
@@ -547,8 +547,8 @@ def _close_all(but: Collection[Session] = ()) -> None:
 def _reason(error: zenoh.ZError) -> str:
     """Return the system's error, out of a text that names Zenoh's source files."""
     text = str(error)
-    said = re.search(r"([A-Z][^:()\[\]]*) \(os error \d+\)", text)
-    return said[1] if said is not None else text.partition(" at /")[0][:160]
+    found = re.search(r"([A-Z][^:()\[\]]*) \(os error \d+\)", text)
+    return found[1] if found is not None else text.partition(" at /")[0][:160]
 
 
 atexit.register(_close_all)

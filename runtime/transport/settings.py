@@ -61,13 +61,13 @@ def client_settings(
     return settings if security is None else settings | _certificate_settings(security)
 
 
-def holds(found: Any, said: Any) -> bool:
+def holds(found: Any, given: Any) -> bool:
     """Whether Zenoh returns the settings that it was given; missing keys of a mapping are null."""
-    if isinstance(said, dict) and isinstance(found, dict):
-        return all(holds(value, said.get(key)) for key, value in found.items()) and said.keys() <= found.keys()
-    if isinstance(said, list) and isinstance(found, list):
-        return len(found) == len(said) and all(map(holds, found, said))
-    return bool(found == said)
+    if isinstance(given, dict) and isinstance(found, dict):
+        return all(holds(value, given.get(key)) for key, value in found.items()) and given.keys() <= found.keys()
+    if isinstance(given, list) and isinstance(found, list):
+        return len(found) == len(given) and all(map(holds, found, given))
+    return bool(found == given)
 
 
 def _common_settings(mode: str, message_bytes_max: int, protocol: str) -> dict[str, Any]:

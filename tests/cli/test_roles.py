@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from foosim.cli import roles
 from tests.conftest import Typed
 
 
@@ -30,6 +29,5 @@ from tests.conftest import Typed
 def test_a_process_without_what_its_roles_need_is_refused(
     typed: Typed, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], code: int, problem: str
 ) -> None:
-    monkeypatch.setattr(roles, "end_with_stack", lambda: None)
     done = typed("role", "roles")("main", *options)
     assert done.code == code and problem in done.err

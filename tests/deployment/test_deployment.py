@@ -20,7 +20,7 @@ from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
-from foosim.launcher.children.restarts import WAITS_S
+from foosim.launcher.liveness import WAITS_S
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
 from foosim.world.forms.registry import find_component

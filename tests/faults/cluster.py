@@ -23,7 +23,7 @@ from foosim.capture.reader import open_capture
 from foosim.client.control import Control, NoAnswer
 from foosim.common.units import parse_pace
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.launcher.children.processes import Child, Launcher
+from foosim.launcher.processes import Child, Launcher
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.rehearsal.run import rehearse
 from foosim.replay.verify import verify_capture

@@ -15,10 +15,10 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Capture, Deployment
 from foosim.deployment.text.files import read_deployment_text
+from foosim.launcher import doctor
 from foosim.launcher import pki as certificates
-from foosim.launcher.doctor import checks as doctor
-from foosim.launcher.doctor.checks import CHECKS, Case, Finding, examine, is_well
-from foosim.launcher.new_capture import check_rooms
+from foosim.launcher.doctor import CHECKS, Case, Finding, examine, is_well
+from foosim.launcher.plan import check_rooms
 from foosim.protocol.identity import identities_of
 from foosim.runtime.disk import free_bytes
 from foosim.runtime.run_folder import runs_folder

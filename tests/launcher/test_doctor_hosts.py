@@ -16,9 +16,8 @@ from foosim.deployment.hosts import Host
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher import pki as certificates
-from foosim.launcher.doctor.checks import Case, Finding, examine
-from foosim.launcher.doctor.remote import CLOCK_WARN_NS, GREETING, Answer, Question, compared, serve
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.doctor import CLOCK_WARN_NS, GREETING, Answer, Case, Finding, Question, compared, examine, serve
+from foosim.launcher.hosts import Remote
 from foosim.launcher.pki import files_for, fingerprint
 from foosim.runtime.transport.certificate_files import read_certificate
 
@@ -115,7 +114,7 @@ def test_a_host_answers_a_question_and_tries_to_reach_the_supervisor() -> None:
         where = f"tcp/127.0.0.1:{port}"
         question = Question("radio", "cluster.yaml", text, f"127.0.0.1:{port - 1}", True, "", where, where)
         said = io.BytesIO()
-        serve(io.BytesIO(b"clock\n" + msgspec.json.encode(question) + b"\n"), said)
+        serve(io.BytesIO(msgspec.json.encode(question) + b"\n"), said)
         greeting, clock, line = said.getvalue().splitlines()
         answer = msgspec.json.decode(line, type=Answer)
     assert greeting == GREETING.encode() and clock.isdigit()
@@ -124,7 +123,7 @@ def test_a_host_answers_a_question_and_tries_to_reach_the_supervisor() -> None:
     assert by_subject["radio plane"].state == "problem", "its port is taken"
     said = io.BytesIO()
     serve(io.BytesIO(msgspec.json.encode(question) + b"\n"), said)
-    answer = msgspec.json.decode(said.getvalue().splitlines()[1], type=Answer)
+    answer = msgspec.json.decode(said.getvalue().splitlines()[2], type=Answer)
     by_subject = {finding.subject: finding for finding in answer.findings}
     refused = by_subject["supervisor"]
     assert refused.state == "problem" and refused.text.endswith("is not reached: Connection refused")

@@ -8,10 +8,9 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.launcher.children import ending as endings
-from foosim.launcher.children import processes
-from foosim.launcher.children.ending import Ending, OomKills, oom_kills
-from foosim.launcher.children.processes import Child
+from foosim.launcher import processes
+from foosim.launcher import processes as endings
+from foosim.launcher.processes import Child, Ending, OomKills, oom_kills
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 

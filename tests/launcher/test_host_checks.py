@@ -10,8 +10,7 @@ from foosim.common.errors import Refused
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher import pki as certificates
-from foosim.launcher.hosts.prepare import check_hosts
-from foosim.launcher.hosts.ssh import remotes
+from foosim.launcher.hosts import check_hosts, remotes
 from foosim.launcher.pki import files_for
 from foosim.launcher.plan import check_certificates, make_plan
 from foosim.launcher.run_options import RunOptions

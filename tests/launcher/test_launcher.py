@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.launcher.children.processes import Child, Launcher
+from foosim.launcher.processes import Child, Launcher
 
 HANGS = """
 import signal

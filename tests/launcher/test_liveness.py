@@ -8,7 +8,7 @@ from typing import Any, Final
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.launcher.children.liveness import (
+from foosim.launcher.liveness import (
     CUT_OFF_S,
     LOOK_S_MAX,
     QUESTION_S,

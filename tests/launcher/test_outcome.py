@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -238,7 +240,7 @@ def test_json_is_one_object_also_of_a_run_that_was_killed(
     def kill(self: Up) -> Outcome:
         self._interrupts = 2
         self._launch(SUPERVISOR, ["sleep", "100"])
-        monkeypatch.setattr(self, "_start", self._goes_on)
+        monkeypatch.setattr(self, "_start", self._continues)
         return run_whole(self)
 
     run_whole = Up.run
@@ -252,10 +254,19 @@ def test_json_is_one_object_also_of_a_run_that_was_killed(
     assert content["failed"] and content["reason"] == "killed by a second Ctrl-C"
 
 
-def test_each_tick_of_the_ball_is_somebodys(run: Run) -> None:
-    nodes = run.result["nodes"].values()
-    assert sum(node["free_ticks"] for node in nodes) == TICKS
-    assert all(node["free_ticks"] <= node["solved_ticks"] for node in nodes)
+@contextmanager
+def supervised(left: Left, records: Iterable[bytes] | None = None) -> Iterator[tuple[Process, SupervisorShell]]:
+    """A supervisor's process in a run's folder, whose journal is begun anew; it resumes from `records`."""
+    left.journal(SUPERVISOR).unlink()
+    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
+    thresholds = gc.get_threshold()
+    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
+        history = None if records is None else fold(plan.deployment, records)
+        process = Process(SUPERVISOR)
+        settings = plan.settings(left.folder.name)
+        yield process, SupervisorShell(process, settings, None, left.folder, session, written, history)
+    gc.set_threshold(*thresholds)
+    gc.unfreeze()
 
 
 @pytest.mark.parametrize("is_closed", [True, False])
@@ -264,19 +275,11 @@ def test_a_capture_that_has_its_end_is_not_cut_off_whatever_was_heard_of_its_vhu
 ) -> None:
     """The farewell was lost: the file says whether it was closed."""
     left.capture.write_bytes((run.capture if is_closed else run.cut).read_bytes())
-    left.journal(SUPERVISOR).unlink()
-    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
-    thresholds = gc.get_threshold()
-    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
-        process = Process(SUPERVISOR)
-        settings = plan.settings(left.folder.name)
-        supervisor = SupervisorShell(process, settings, None, left.folder, session, written, None)
+    with supervised(left) as (process, supervisor):
         supervisor.core.finish("stopped", failed=False)
         supervisor.core.state.finished, supervisor.core.state.cut_off = True, "the capture is cut off: nobody said how"
         process.add(supervisor)
         assert process.run() == (DONE if is_closed else FAILED)
-    gc.set_threshold(*thresholds)
-    gc.unfreeze()
     told = left.folder.result()
     assert told is not None and told["failed"] != is_closed
     assert told["reason"] == ("stopped" if is_closed else "stopped; the capture is cut off: nobody said how")
@@ -319,49 +322,22 @@ def test_a_signal_while_the_command_itself_is_imported_leaves_a_result(module: s
     assert (done.returncode, done.stderr, content["reason"], content["run"]) == (FAILED, f"{reason}\n", reason, module)
 
 
-def test_an_import_that_fails_is_reported_as_it_is() -> None:
-    fails = AMID_AN_IMPORT.replace("signal.raise_signal(signal.SIGTERM)", "raise ImportError('it is broken')")
-    words = "up", str(TABLE), "--no-capture", "--run", "foosim.launcher.begin"
-    done = subprocess.run([sys.executable, "-c", fails, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == FAILED and done.stderr.splitlines()[-1] == "ImportError: it is broken"
-
-
 def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_that_is_done(run: Run, left: Left) -> None:
     left.capture.write_bytes(run.capture.read_bytes())
-    journal = left.journal(SUPERVISOR)
-    records = list(read_records(journal))
-    journal.unlink()
-    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
-    thresholds = gc.get_threshold()
-    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
-        history = fold(plan.deployment, iter(records))
-        process = Process(SUPERVISOR)
-        shell = SupervisorShell(process, plan.settings(left.folder.name), None, left.folder, session, written, history)
+    with supervised(left, list(read_records(left.journal(SUPERVISOR)))) as (_, shell):
         assert shell.core.state.end is not None and shell.core.failover.waits_for_hub(time.monotonic_ns())
         assert shell.is_over()
         left.capture.write_bytes(run.cut.read_bytes())
         assert not shell.is_over(), "its vHub may complete it"
         shell.leave()
-    gc.set_threshold(*thresholds)
-    gc.unfreeze()
 
 
 def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> None:
     """So it can be resumed again."""
     journal = left.journal(SUPERVISOR)
     records = [raw for raw in read_records(journal) if not isinstance(decode_any(Record, raw), End)]
-    journal.unlink()
-    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
-    thresholds = gc.get_threshold()
-    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
-        for record in records:
-            written.append(record)
-        history = fold(plan.deployment, iter(records))
-        settings, process = plan.settings(left.folder.name), Process(SUPERVISOR)
-        supervisor = SupervisorShell(process, settings, None, left.folder, session, written, history)
+    with supervised(left, records) as (process, supervisor):
         supervisor.core.finish("lost vhub", failed=True)
         process.add(supervisor)
         assert process.run() == REFUSED and supervisor.core.state.abandoned == "lost vhub"
-    gc.set_threshold(*thresholds)
-    gc.unfreeze()
     assert left.folder.result() is None

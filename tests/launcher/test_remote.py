@@ -7,7 +7,7 @@ import shlex
 import pytest
 
 from foosim.deployment.hosts import Host
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.hosts import Remote
 
 
 def test_a_users_options_come_before_ours_but_ssh_never_asks() -> None:

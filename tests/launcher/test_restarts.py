@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from foosim.launcher.children.restarts import AWAY_S, WAITS_S, WINDOW_S, Restarts
+from foosim.launcher.liveness import AWAY_S, WAITS_S, WINDOW_S, Restarts
 
 
 def test_the_waits_double_and_then_it_is_given_up() -> None:
@@ -23,15 +23,6 @@ def test_an_end_long_ago_does_not_count() -> None:
     for count in range(20):
         assert restarts.ended("blue", count * WINDOW_S) == WAITS_S[0]
         assert restarts.due((count + 0.5) * WINDOW_S) == ["blue"]
-
-
-def test_each_is_counted_for_itself() -> None:
-    restarts = Restarts()
-    for _ in range(3):
-        restarts.ended("blue", 0.0)
-    assert restarts.ended("red", 0.0) == WAITS_S[0]
-    assert restarts.due(10.0) == ["blue", "red"]
-    assert not restarts.is_known("green")
 
 
 def test_one_whose_machine_is_away_is_never_given_up() -> None:

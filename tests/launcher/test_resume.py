@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +15,7 @@ from foosim.capture.start_frame import read_branch
 from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
 from foosim.launcher.plan import make_plan
-from foosim.launcher.resume import check_journals, plan_again, supervisor_records
+from foosim.launcher.resume import check_journals, plan_again
 from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
 from foosim.rehearsal.run import rehearse
@@ -24,7 +23,6 @@ from foosim.rehearsal.system import Settings
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
-from foosim.supervisor.main import serve
 from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -88,11 +86,6 @@ def refused(folder: RunFolder) -> str:
     return str(caught.value)
 
 
-def test_a_whole_journal_is_gone_on_from(folder: RunFolder) -> None:
-    plan, capture = plan_again(folder)
-    assert capture is not None and plan.options.sets == SETS
-
-
 def test_all_options_are_gone_on_with(folder: RunFolder, tmp_path: Path) -> None:
     options = RunOptions(TABLE, "2x", "9 s", 7, "a.mcap@1s", SETS, "pure", "10.0.0.1:7", True, Path("certs"), True)
     folder.write_launch(launch_of(options, None))
@@ -122,7 +115,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 ) -> None:
     where = damage(folder, stem, 30)
     text = refused(folder)
-    assert text.startswith(f"run rehearsal cannot be resumed: {where} behind it; tick "), text
+    assert text.startswith(f"run rehearsal cannot be resumed: {where} after it; tick "), text
     told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
     assert told is not None and 10 < int(told[1]) <= 30
     words = shlex.split(told[2])
@@ -131,15 +124,6 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
     branch = read_branch(words[-1], load_deployment(TABLE.read_text(), TABLE.name))
     assert branch.start.origin.tick == open_capture(tmp_path / "a run.mcap").frame_ticks[-1] > 40
     assert make_plan(RunOptions(TABLE, sets=SETS, branch=words[-1])).start == branch.start
-
-
-def test_a_supervisor_that_is_started_again_does_not_go_on_over_it(folder: RunFolder) -> None:
-    where = damage(folder, channels.SUPERVISOR, 30)
-    plan = make_plan(RunOptions(TABLE, sets=SETS))
-    records = partial(supervisor_records, folder, plan.options)
-    with pytest.raises(Refused, match=re.escape(where)):
-        serve(plan.settings(folder.name), plan.address, None, folder, records)
-    assert len(journal_files(folder.journals, channels.SUPERVISOR)) == 1, "nothing was begun"
 
 
 def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: RunFolder) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import time
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,13 +15,12 @@ import msgspec
 import pytest
 
 from foosim.client import control
-from foosim.launcher.children.liveness import QUESTION_S, UNANSWERED_MAX
-from foosim.launcher.children.processes import Child
-from foosim.launcher.children.restarts import WAITS_S
 from foosim.launcher.console_child import ADDRESSES
 from foosim.launcher.display import Display
+from foosim.launcher.liveness import QUESTION_S, UNANSWERED_MAX, WAITS_S
 from foosim.launcher.outcome import capture_lines
 from foosim.launcher.plan import make_plan
+from foosim.launcher.processes import Child
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import END_S, Up
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -31,12 +31,29 @@ from foosim.runtime.run_folder import RESULT_FILE, RunInfo
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
 
-def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+Launched = Callable[..., tuple[Up, io.StringIO]]
+
+
+@pytest.fixture
+def launched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Launched]:
+    """Makes a launcher of the table with settings, and what it displays; its children end with the test."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
+    made: list[Up] = []
+
+    def make(*sets: str, processes: str = "each") -> tuple[Up, io.StringIO]:
+        said = io.StringIO()
+        made.append(Up(make_plan(RunOptions(TABLE, sets=sets, processes=processes)), None, Display(said), "run"))
+        return made[-1], said
+
+    yield make
+    for up in made:
+        up._launcher.kill()
+        with suppress(OSError):  # it has closed its pipe itself
+            up._launcher.close()
+
+
+def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(launched: Launched, tmp_path: Path) -> None:
+    up, said = launched()
     (tmp_path / "node").write_text('#!/bin/sh\necho started >>"$0.log"\nexit 1\n')
     (tmp_path / "node").chmod(0o755)
     up._launch("red", [str(tmp_path / "node")])
@@ -63,7 +80,6 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     up._start_wanted({"red": 1, "blue": 1})
     assert ends() == 9, "a word is heard once"
     assert said.getvalue().count("restarts in 0.5 s") == 2
-    up._launcher.close()
 
 
 @pytest.mark.parametrize(
@@ -78,12 +94,10 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     ],
 )
 def test_what_follows_when_a_node_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, has_begun: bool, starts: int, ends_run: bool
+    launched: Launched, tmp_path: Path, ends: str, has_begun: bool, starts: int, ends_run: bool
 ) -> None:
     """Before the first tick one that something else has ended is started again; one that is refused never is."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
+    up, said = launched()
     (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
     (tmp_path / "node").chmod(0o755)
     up._launch("red", [str(tmp_path / "node")])
@@ -96,7 +110,6 @@ def test_what_follows_when_a_node_ends(
     assert (tmp_path / "node.log").read_text().count("started") == starts
     is_given_up = has_begun and ends == "exit 3"
     assert ("is given up; foosim start red tries it again" in said.getvalue()) == is_given_up
-    up._launcher.close()
 
 
 @pytest.mark.parametrize(
@@ -111,11 +124,10 @@ def test_what_follows_when_a_node_ends(
     ],
 )
 def test_what_follows_when_the_supervisor_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, listened: bool, comes_back: bool, reason: str
+    launched: Launched, monkeypatch: pytest.MonkeyPatch, ends: str, listened: bool, comes_back: bool, reason: str
 ) -> None:
     """Whatever becomes of it, there is a result, of the shape of any other."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up, _ = launched()
     up._launch(SUPERVISOR, ["sh", "-c", ends])
     supervisor = up._launcher.children[SUPERVISOR]
     supervisor.process.wait()
@@ -126,7 +138,7 @@ def test_what_follows_when_the_supervisor_ends(
     assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
     up._launcher.children[SUPERVISOR].process.wait()
     up._interrupts = 2
-    monkeypatch.setattr(up, "_start", up._goes_on)
+    monkeypatch.setattr(up, "_start", up._continues)
     killed = up.run()
     assert killed.is_killed and killed.result.keys() == outcome.result.keys()
     assert killed.result["reason"] == "killed by a second Ctrl-C"
@@ -190,10 +202,9 @@ def test_the_command_that_is_printed_for_another_machine_has_no_path_of_this_one
     )
 
 
-def test_one_failure_is_printed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_failure_is_printed_once(launched: Launched) -> None:
     """Of a player that fails: in the reason, not again as the end of its log."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up, _ = launched()
     up._has_begun = True
     reason = "player-red failed at tick 5: ValueError: too much (own.py:4: raise)"
     log = f"Traceback (most recent call last):\n{reason}"
@@ -208,7 +219,6 @@ def test_one_failure_is_printed_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
         lines = up._lost_lines({"reason": result})
         assert lines[0] == head
         assert [result, *lines].count(f"    {reason}") == (result != reason) and "    Traceback" in lines[1]
-    up._launcher.close()
 
 
 @pytest.mark.parametrize(
@@ -224,10 +234,9 @@ def test_one_failure_is_printed_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ],
 )
 def test_the_log_of_the_process_that_the_reason_names_is_shown(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, ends_by: str, reason: str, line: str
+    launched: Launched, name: str, ends_by: str, reason: str, line: str
 ) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up, _ = launched()
     up._has_begun = True
     for child, command in ((SUPERVISOR, "true"), (name, ends_by)):
         up._launch(child, [command])
@@ -235,13 +244,10 @@ def test_the_log_of_the_process_that_the_reason_names_is_shown(
     up.folder.write_result({**up.unended(reason), "reason": reason, "failed": True})
     log = up._launcher.children[name].log
     assert up._outcome().lines[:2] == (f"the run has ended: {reason}", f"{line} {log}")
-    up._launcher.close()
 
 
-def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
+def test_a_supervisor_that_hangs_is_killed_and_that_is_said(launched: Launched) -> None:
+    up, said = launched()
     up._launch(SUPERVISOR, ["sleep", "100"])
     supervisor = up._launcher.children[SUPERVISOR]
     for _ in range(3 * UNANSWERED_MAX):
@@ -256,14 +262,13 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
     supervisor.process.wait()
     assert said.getvalue() == ("supervisor does not answer any more: it is killed (it had not answered for 5 s)\n")
     assert up._outcome().result["reason"] == "lost supervisor: it was killed by up: it had not answered for 5 s"
-    up._launcher.close()
 
 
-def test_a_process_with_players_that_hangs_twice_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_with_players_that_hangs_twice_is_given_up(
+    launched: Launched, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It may take as long as a player may; what makes it hang is in a player, which would do so again."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, processes="one")), None, Display(said), "run")
+    up, said = launched(processes="one")
     up._has_begun = True
     for again in (True, False):
         up._launch("one", ["sleep", "100"])
@@ -281,22 +286,19 @@ def test_a_process_with_players_that_hangs_twice_is_given_up(tmp_path: Path, mon
         assert up._supervisor_comes_back(process, 0.0) == again
         up._restarts.forget("one")
     assert "one does not answer any more: it is killed (it had not answered for 15 s)" in said.getvalue()
-    up._launcher.close()
 
 
 @pytest.mark.parametrize(("sets", "comes_back"), [((), True), (("players.player-red.restart=false",), False)])
 def test_a_process_with_a_player_that_must_not_restart_is_not_started_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sets: tuple[str, ...], comes_back: bool
+    launched: Launched, monkeypatch: pytest.MonkeyPatch, sets: tuple[str, ...], comes_back: bool
 ) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, sets=sets, processes="one")), None, Display(io.StringIO()), "run")
+    up, _ = launched(*sets, processes="one")
     up._has_begun = True
     up._launch("one", ["sh", "-c", "kill -9 $$"])
     process = up._launcher.children["one"]
     process.process.wait()
     monkeypatch.setattr(up, "_start_due", lambda now_s: None)
     assert up._supervisor_comes_back(process, 0.0) == comes_back
-    up._launcher.close()
 
 
 @pytest.mark.parametrize(
@@ -310,19 +312,11 @@ def test_a_process_with_a_player_that_must_not_restart_is_not_started_again(
     ],
 )
 def test_a_player_is_started_again_when_a_signal_has_ended_it(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    ends: str,
-    sets: tuple[str, ...],
-    begun: bool,
-    starts: int,
-    ends_run: bool,
+    launched: Launched, tmp_path: Path, ends: str, sets: tuple[str, ...], begun: bool, starts: int, ends_run: bool
 ) -> None:
     """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends. Before the
     first tick `restart: false` says nothing: the player has not acted."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, sets=sets, processes="each")), None, Display(said), "run")
+    up, said = launched(*sets)
     (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
     (tmp_path / "player").chmod(0o755)
     up._launch("player-red", [str(tmp_path / "player")])
@@ -346,15 +340,11 @@ def test_a_player_is_started_again_when_a_signal_has_ended_it(
     if not ends_run:
         assert [go_on() for _ in range(5)][-1] == 6 and ended()
         assert "player-red was killed by SIGKILL" in said.getvalue() and "is given up; its log" in said.getvalue()
-    up._launcher.close()
 
 
-def test_a_node_that_is_started_before_it_has_ended_starts_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_node_that_is_started_before_it_has_ended_starts_again(launched: Launched, tmp_path: Path) -> None:
     """It was stopped, which its process hears as a refusal, and somebody was quick."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up, _ = launched()
     waits = 'while [ ! -e "$0.go" ]; do sleep 0.01; done'
     (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{waits}\nexit {REFUSED}\n')
     (tmp_path / "node").chmod(0o755)
@@ -367,14 +357,10 @@ def test_a_node_that_is_started_before_it_has_ended_starts_again(
         up._restart_ended(now_s, knows=True)
     up._launcher.children["red"].process.wait()
     assert (tmp_path / "node.log").read_text().count("started") == 2, "once for the word, and then it is refused"
-    up._launcher.close()
 
 
-def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(launched: Launched) -> None:
+    up, _ = launched()
     up._launch(SUPERVISOR, ["true"])
     supervisor = up._launcher.children[SUPERVISOR]
     up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
@@ -382,7 +368,6 @@ def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
     with ExitStack() as stack:
         assert up._connect(stack) is None
     up._watch()
-    up._launcher.close()
 
 
 def test_a_supervisor_that_cannot_be_reached_yet_is_tried_again_until_it_counts_as_hanging(
@@ -422,32 +407,27 @@ def test_a_capture_that_was_cut_off_is_named_with_the_command_that_completes_it(
 
 
 def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says_that_it_closes_its_capture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    launched: Launched,
 ) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    said = io.StringIO()
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(said), "run")
+    up, said = launched()
     up._launch(SUPERVISOR, ["sleep", "100"])
     recording = {**NOT_RECORDED, "state": "closing", "offered": 9, "written": 4, "bytes": 1_000_000}
     told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": recording}
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
     up._has_begun = up._has_ended = up._end_requested = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
-    assert not up._goes_on(), "it would be cut off"
+    assert not up._continues(), "it would be cut off"
     up._show(closing)  # type: ignore[arg-type]
-    assert up._goes_on() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
-    up._launcher.kill()
-    up._launcher.close()
+    assert up._continues() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
 
 
 @pytest.mark.parametrize(
     ("state", "stopped", "lost"), [("running", False, True), ("running", True, False), ("ended", False, False)]
 )
 def test_a_player_that_ends_with_exit_code_0_while_the_run_goes_on_is_lost_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, stopped: bool, lost: bool
+    launched: Launched, monkeypatch: pytest.MonkeyPatch, state: str, stopped: bool, lost: bool
 ) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE, processes="each")), None, Display(io.StringIO()), "run")
+    up, _ = launched()
     up._launch(SUPERVISOR, ["sleep", "100"])
     up._launch("player-red", ["sh", "-c", "exit 0"])
     up._launcher.children["player-red"].process.wait()
@@ -456,14 +436,13 @@ def test_a_player_that_ends_with_exit_code_0_while_the_run_goes_on_is_lost_at_on
     monkeypatch.setattr(up.display, "show", lambda status, now_s: None)
     monkeypatch.setattr(up._stalled_watch, "look", lambda *about: {})
     up._show(SimpleNamespace(status=lambda timeout_s, give_up: told))  # type: ignore[arg-type]
-    up._goes_on()
-    up._goes_on()
+    up._continues()
+    up._continues()
     assert bool(up._ending_s) == lost
     up._launcher.stop()
     reason = "lost player-red: it ended with exit code 0"
     ended = "lost supervisor: it was killed by up: the run is over"
     assert up._outcome().result["reason"] == (reason if lost else ended)
-    up._launcher.close()
 
 
 class Fails(Up):

@@ -178,7 +178,7 @@ def test_a_missing_slot_is_named_and_nobody_trusted() -> None:
     owner = next(node for node, part in parts.items() if LAYOUT["camera"].index in part.solved)
     parts[owner] = part_of(owner, [i for i in parts[owner].solved if i != LAYOUT["camera"].index], slots)
     text, nodes = blamed(parts, slots)
-    assert text == f"tick {TICK}: camera solved by nobody" and nodes == NODES
+    assert text == f"tick {TICK}: camera solved by no node" and nodes == NODES
 
 
 @pytest.mark.parametrize("field", ["solver_values", "owner_values"])

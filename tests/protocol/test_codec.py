@@ -319,14 +319,6 @@ def test_json_that_breaks_careless_readers_is_malformed(payload: bytes) -> None:
         decode_json(payload)
 
 
-def test_nothing_else_of_the_codec_is_public() -> None:
-    """One encode, one decode (and its form for unions)."""
-    public = {name for name, value in vars(codec).items() if callable(value) and value.__module__ == codec.__name__}
-    assert {name for name in public if not name.startswith("_")} == {
-        "encode", "decode", "decode_any",
-    }  # fmt: skip
-
-
 def test_decoders_are_made_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two threads that make them at once crash the interpreter, now and then: so who makes one has to hold the lock."""
     made: list[Any] = []

@@ -15,7 +15,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Log
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Want
-from foosim.protocol.rejects import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Quarantined, Refusals
+from foosim.protocol.rejects import LOGGED_MAX, OTHERS, QUARANTINE_NS, REFUSALS_MAX, WINDOW_NS, Quarantined, Refusals
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final[Deployment] = load_deployment(TABLE.read_text(), TABLE.name)
@@ -95,4 +95,4 @@ def test_a_crowd_of_names_costs_no_more_than_a_limit() -> None:
         guard.knock(f"s{number}", number)
     assert len(guard.refusals.counts) == limits.CLIENTS_MAX + 1
     assert guard.refusals.counts["want", OTHERS] == 2 * limits.CLIENTS_MAX
-    assert len(guard.said) == TOLD_MAX
+    assert len(guard.said) == LOGGED_MAX

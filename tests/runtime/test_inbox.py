@@ -87,15 +87,6 @@ BOTH = pytest.mark.parametrize("make", [plain, with_source])
 
 
 @BOTH
-def test_what_was_offered_comes_at_once_and_once(make: Callable[[], Inbox]) -> None:
-    inbox = make()
-    for number in range(3):
-        assert inbox.offer(item("a", number))
-    assert inbox.take(LONG_S) == [item("a", 0), item("a", 1), item("a", 2)]
-    assert inbox.take(0) == []
-
-
-@BOTH
 def test_without_a_message_it_returns_at_its_deadline(make: Callable[[], Inbox]) -> None:
     inbox = make()
     for _ in range(5):
@@ -113,12 +104,6 @@ def test_an_earlier_deadline_is_kept_after_a_later_one(make: Callable[[], Inbox]
     before_s = time.monotonic()
     assert inbox.take(0.01) == []
     assert time.monotonic() - before_s < LONG_S
-
-
-@BOTH
-def test_the_same_deadline_again_and_a_timeout_of_nothing(make: Callable[[], Inbox]) -> None:
-    inbox = make()
-    assert [inbox.take(timeout_s) for timeout_s in (0.001, 0.001, 0, -1.0, 1e-9)] == [[], [], [], [], []]
 
 
 @BOTH
@@ -172,32 +157,6 @@ def test_an_offer_at_the_readers_last_look_is_not_slept_over(make: Callable[[], 
         inbox._items = OfferedWhileLooking(inbox, seen)
         assert inbox.take(None) == [item("late")]
     assert inbox.take(0.001) == []
-
-
-def test_messages_of_the_source_and_offers_share_one_reader() -> None:
-    inbox, source = Inbox(100 * ALL), QueueSource()
-    inbox.attach(source, "part")
-
-    def receive() -> None:
-        for number in range(5 * ALL):
-            source.queue.put(item("wire", number))
-
-    def offer() -> None:
-        for number in range(5 * ALL):
-            inbox.offer(item("timer", number))
-
-    writers = [threading.Thread(target=work) for work in (receive, offer)]
-    for writer in writers:
-        writer.start()
-    read: list[Item] = []
-    while len(read) < 2 * 5 * ALL:
-        items = inbox.take(LONG_S)
-        assert items, "asleep over a message"
-        read += items
-    for writer in writers:
-        writer.join()
-    for name in ("wire", "timer"):
-        assert [found for found in read if found[1] == name] == [item(name, number) for number in range(5 * ALL)]
 
 
 def test_a_full_inbox_drops_the_newest_and_counts() -> None:
@@ -321,9 +280,3 @@ def test_an_offer_wakes_a_reader_whatever_it_lacks() -> None:
     for lacking in ("order", "part", "other", ""):
         threading.Timer(0.01, inbox.offer, [item("timer")]).start()
         assert inbox.take(LONG_S, lacking) == [item("timer")]
-
-
-def test_one_source_for_a_channel() -> None:
-    inbox = with_source()
-    with pytest.raises(AssertionError, match="part"):
-        inbox.attach(QueueSource(), "part")

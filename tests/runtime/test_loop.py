@@ -9,12 +9,12 @@ import pytest
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Log, Publish
-from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
+from foosim.protocol.channels import ALIVE, Channel, Plane
 from foosim.runtime.journal import JournalError
 from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.loop import Loop
 from foosim.runtime.roles.role import Role
-from foosim.runtime.roles.wire import Wire, channel_of, presence_channel
+from foosim.runtime.roles.wire import Wire, presence_channel
 from foosim.runtime.transport.inbox import Inbox
 
 LATER_NS: Final = 2**62
@@ -131,19 +131,6 @@ def test_a_journal_that_fails_keeps_what_comes_after_from_being_said() -> None:
     with pytest.raises(OSError, match="no space left"):
         role.perform()
     assert recorder.did == []
-
-
-@pytest.mark.parametrize("channel", CHANNELS, ids=lambda channel: channel.key)
-def test_a_key_gives_its_channel_and_name_back(channel: Channel) -> None:
-    name = "red" if "{name}" in channel.key else channel.writers
-    assert channel_of(channel.key_for("red")) == (channel, name)
-
-
-@pytest.mark.parametrize(
-    "key", ["", "foosim", "foosim/simulation/part", "foosim/simulation/order/red", "foosim/simulation/part/a/b", "x/y"]
-)
-def test_any_other_key_gives_nothing(key: str) -> None:
-    assert channel_of(key) is None
 
 
 class FullDisk:

@@ -11,7 +11,7 @@ from typing import IO
 import pytest
 
 from foosim.runtime import process
-from foosim.runtime.process import new_boot, start_log
+from foosim.runtime.process import start_log
 
 LIMIT_S = 900.0
 ROLE = "import sys; sys.argv[1:1] = ['role', '{}']; from foosim.cli import main; main()"
@@ -107,10 +107,6 @@ def test_a_line_of_the_log_has_its_time_in_utc(capsys: pytest.CaptureFixture[str
     (line,) = capsys.readouterr().err.splitlines()
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z INFO    red: tick 7", line), line
     assert start_log("red").handlers != [] and len(logging.getLogger("red").handlers) == 1
-
-
-def test_two_starts_have_two_boots() -> None:
-    assert len({new_boot() for _ in range(100)}) == 100
 
 
 def test_a_process_starts_with_what_it_needs() -> None:

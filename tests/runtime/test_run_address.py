@@ -48,7 +48,7 @@ def test_that_of_the_radio_plane_comes_later(folder: RunFolder) -> None:
 
 
 def test_a_run_that_has_ended_or_was_given_up_has_none(folder: RunFolder) -> None:
-    with pytest.raises(ConnectError, match="told to end before run mine had an address"):
+    with pytest.raises(ConnectError, match="stopped before run mine had an address"):
         address_of("mine", Plane.SIMULATION, Looks(folder, None))
     folder.write_result({"reason": "done"})
     with pytest.raises(ConnectError, match="run mine has ended"):

@@ -49,19 +49,6 @@ def test_two_runs_begun_in_the_same_second_have_two_names() -> None:
     assert len({create_run("table").name for _ in range(3)}) == 3
 
 
-def test_a_long_name_of_a_world_leaves_room_for_the_time() -> None:
-    assert all(len(create_run("w" * 32).name) <= 32 for _ in range(2))
-
-
-def test_the_run_file_reads_back_as_it_was_written() -> None:
-    folder = create_run("table", "mine")
-    assert folder.info() is None
-    folder.write_info(info(folder))
-    assert folder.info() == info(folder)
-    (folder.path / "run.json").write_text('{"run": "mine"')
-    assert folder.info() is None, "half a file is none"
-
-
 def test_a_run_is_live_as_long_as_its_supervisor_holds_it() -> None:
     folder = create_run("table", "mine")
     folder.write_info(info(folder))
@@ -122,13 +109,6 @@ def test_a_name_that_is_taken_or_none_is_refused() -> None:
         create_run("table", "mine")
     with pytest.raises(BadValue, match=r"--run: a name is a lower case letter, .*, '\.\./mine'"):
         create_run("table", "../mine")
-
-
-def test_the_result_stays_when_the_run_is_over() -> None:
-    folder = create_run("table", "mine")
-    assert folder.result() is None
-    folder.write_result({"ticks": 7})
-    assert open_run("mine").result() == {"ticks": 7}
 
 
 def test_old_runs_go_and_live_ones_stay() -> None:

@@ -12,7 +12,7 @@ from foosim.runtime.roles import loop as loops
 from foosim.runtime.roles.loop import Loop
 from foosim.runtime.roles.role import Role
 from foosim.runtime.roles.standstill import STOOD_NS, Standstill, standstill_text
-from foosim.runtime.supervisor_timeout import UNKNOWN_NS, Orphan
+from foosim.runtime.supervisor_timeout import UNKNOWN_NS, SupervisorTimeout
 from foosim.runtime.transport.inbox import Inbox
 
 MS: Final = 1_000_000
@@ -30,7 +30,7 @@ def test_only_who_looks_later_than_it_meant_to_has_stood_still() -> None:
 
 
 def test_a_process_that_stood_still_waits_for_its_supervisor_as_long_as_it_was_awake() -> None:
-    orphan = Orphan()
+    orphan = SupervisorTimeout()
     orphan.rest(5 * S, 5 * S)
     assert not orphan.is_alone
     orphan.hear(False, 10 * S)
@@ -43,7 +43,7 @@ def test_a_process_that_stood_still_waits_for_its_supervisor_as_long_as_it_was_a
 def test_only_a_long_standstill_is_worth_a_line() -> None:
     assert (
         standstill_text(999 * MS) == ""
-        and standstill_text(3_140 * MS) == "stood still for 3.1 s: no other process is blamed"
+        and standstill_text(3_140 * MS) == "event loop was blocked for 3.1 s; peer deadlines extended"
     )
 
 

@@ -47,15 +47,15 @@ def test_the_watchdog_hears_of_the_loop_four_times_in_its_time(manager: Manager)
     manager.environment |= {"WATCHDOG_USEC": "4000000", "WATCHDOG_PID": str(os.getpid())}
     notify = Notify(manager.environment)
     assert manager.environment == {"HOME": "/"}, "children are not to think that they are meant"
-    notify.goes_on(0)
+    notify.progress(0)
     assert manager.told() == [], "who is not ready yet is not watched"
     notify.ready(5 * MS)
     assert manager.told() == ["READY=1", "WATCHDOG=1"]
     for now_ms in range(6, 4006):
-        notify.goes_on(now_ms * MS)
+        notify.progress(now_ms * MS)
     assert manager.told() == ["WATCHDOG=1"] * 4
     notify.stopping()
-    notify.goes_on(9_000 * MS)
+    notify.progress(9_000 * MS)
     notify.stopping()
     assert manager.told() == ["STOPPING=1\nWATCHDOG_USEC=300000000"]
 
@@ -66,7 +66,7 @@ def test_without_a_watchdog_of_its_own_it_says_when_it_begins_and_ends(
 ) -> None:
     notify = Notify({**manager.environment, **watchdog})
     notify.ready(0)
-    notify.goes_on(10_000 * MS)
+    notify.progress(10_000 * MS)
     notify.stopping()
     assert manager.told() == ["READY=1", "STOPPING=1"]
 
@@ -75,6 +75,6 @@ def test_nobody_to_tell_is_no_error(manager: Manager) -> None:
     for environment in ({}, {"NOTIFY_SOCKET": "/nowhere/notify", "WATCHDOG_USEC": "1000"}):
         notify = Notify(dict(environment))
         notify.ready(0)
-        notify.goes_on(10_000 * MS)
+        notify.progress(10_000 * MS)
         notify.stopping()
     assert manager.told() == []

@@ -119,13 +119,6 @@ def test_a_push_is_felt_in_the_tick_that_its_answer_names(tick: int) -> None:
     assert faster == pytest.approx(0.01 / 0.021, rel=0.05)
 
 
-def test_two_pushes_in_one_tick_add_up_in_their_order() -> None:
-    both = Run().ask_at(40, "push", impulse=[0.0, 0.004, 0.0]).ask_at(40, "push", impulse=[0.0, 0.006, 0.0]).go()
-    assert [answer.tick for answer in both.answers] == [both.answers[0].tick] * 2
-    one = Run().ask_at(40, "push", impulse=[0.0, 0.01, 0.0]).go()
-    assert both.frames[-1].vector("ball", "position", 3) == pytest.approx(one.frames[-1].vector("ball", "position", 3))
-
-
 @pytest.mark.parametrize(
     ("at", "what"),
     [
@@ -159,15 +152,6 @@ def test_an_added_ball_is_in_the_frame_after_its_tick() -> None:
     assert 0.049 < first.at("ball-2", "position", 2) < 0.05, "solved at once: it falls"
     orders = [decode(Order, payload) for channel, payload in run.said if channel == channels.ORDER.name]
     assert [order.tick for order in orders if order.edits] == [answer.tick]
-
-
-def test_a_removed_ball_is_gone_from_the_frame_after_its_tick() -> None:
-    run = Run().ask_at(20, "add", name="ball-2", at="0.3,0.2,0.05").ask_at(50, "remove", name="ball")
-    added, other, removed = run.ask_at(60, "remove", name="ball-2").go().answers
-    assert other.text == "ball is always in the world: what is fixed, or belongs to a kit, neither comes nor goes"
-    assert removed.text == f"ball-2 removed at tick {removed.tick}"
-    there = [frame.tick for frame in run.frames if "ball-2" in present(frame)]
-    assert there == list(range(added.tick + 1, removed.tick + 1))
 
 
 def busy(nodes: int) -> Run:
@@ -221,16 +205,6 @@ def test_a_node_is_stopped_and_started_again_and_nothing_changes() -> None:
     assert supervisor.state.roster.starts == {"n2": 2}, "which its launcher sees, also of one that is just not here"
 
 
-def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:
-    run = Run(nodes=2).ask_at(30, "stop", node="n2")
-    run.system.at_tick(40, lambda: run.system.kill("n2"))
-    run.system.at_tick(50, lambda: run.system.start("n2"))
-    run.go()
-    assert run.digests == undisturbed().digests and run.system.supervisor.state.members == ("n1",)
-    node = run.system.processes["n2"].core
-    assert node.member.refusal == "n2 is stopped; `foosim start n2` lets it take part again"
-
-
 def test_what_cannot_be_stopped_or_started() -> None:
     run = Run(nodes=2).ask_at(20, "stop", node="n9").ask_at(22, "start", node="n1").ask_at(30, "stop", node="n1")
     run.ask_at(40, "stop", node="n1").ask_at(50, "stop", node="n2").go()
@@ -242,13 +216,6 @@ def test_what_cannot_be_stopped_or_started() -> None:
         (False, "n2 is the only node that is left"),
     ]
     assert run.digests == undisturbed().digests
-
-
-def test_a_move_to_where_it_is_is_no_epoch() -> None:
-    run = Run(nodes=2).ask_at(50, "move", robot="red.goal", node="n1").go()
-    (answer,) = run.answers
-    assert answer.accepted and answer.text == f"red.goal is on n1 already, at tick {answer.tick}"
-    assert run.system.supervisor.state.epoch == 1 and run.system.supervisor.state.account.moves == 0
 
 
 # --- pace ------------------------------------------------------------------------------------------------------------
@@ -270,12 +237,6 @@ def test_a_pause_holds_the_world_before_the_tick_that_its_answer_names(pace: Pac
 
 def _gaps(times_ns: list[int], but: int) -> list[int]:
     return [times_ns[i] - times_ns[i - 1] for i in range(1, len(times_ns)) if i != but]
-
-
-def test_one_tick_is_one() -> None:
-    run = Run(pace=REALTIME).ask_at(40, "pause").ask_after(40, 500 * MS, "step", count=1)
-    run.ask_after(40, 1000 * MS, "resume").go()
-    assert run.answers[1].text == f"1 tick from tick {run.answers[0].tick}, then paused"
 
 
 def test_a_step_computes_so_many_ticks_and_pauses() -> None:
@@ -363,11 +324,6 @@ def test_the_same_id_gets_the_same_answer_and_is_done_once(verb: str) -> None:
     edits = [edit for channel, said in run.said if channel == channels.ORDER.name for edit in decode(Order, said).edits]
     assert len(edits) == (1 if verb in ("push", "add") else 0)
     assert run.system.supervisor.state.epoch == (2 if verb == "move" else 1)
-
-
-def test_a_refusal_is_the_same_too() -> None:
-    _, answers = said_again("remove", name="ball-2")
-    assert len(answers) == 4 and len(set(answers)) == 1 and not decode(Answer, answers[0]).accepted
 
 
 def test_the_same_id_of_another_is_another_request() -> None:

@@ -12,11 +12,9 @@ from foosim.common import limits
 from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.core import NodeCore, NodeStatistics
-from foosim.node.engines_pool import Solver
 from foosim.protocol import channels
-from foosim.protocol.actions import Publish
-from foosim.protocol.codec import decode, encode
-from foosim.protocol.messages import Build, Epoch, FormVersion, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.codec import encode
+from foosim.protocol.messages import Build, FormVersion, Heartbeat, Hello, Ready, Refusal
 from foosim.supervisor import roster as roster_module
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.roster import SILENT_NS, Roster
@@ -132,15 +130,6 @@ def test_the_vhub_has_no_engine_to_compare() -> None:
     assert roster.arithmetic == PRINT
 
 
-def test_missing_is_who_has_not_built_the_world() -> None:
-    roster = Roster(DEPLOYMENT, PRINT)
-    assert roster.missing() == ["blue", "red", "vhub"] == roster.expected
-    red = roster.take(HELLO, 0)
-    assert roster.missing() == ["blue", "red", "vhub"]
-    roster.note_ready(red, Ready("red", "boot-1", LAYOUT, PRINT), LAYOUT)
-    assert roster.missing() == ["blue", "vhub"] and roster.nodes == ["red"]
-
-
 def test_who_has_built_another_layout_cannot_take_part() -> None:
     roster = Roster(DEPLOYMENT, PRINT)
     reason = roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", bytes(32), PRINT), LAYOUT)
@@ -148,35 +137,7 @@ def test_who_has_built_another_layout_cannot_take_part() -> None:
     assert "red" in roster.missing() and "red" not in roster.by_name
 
 
-def test_silent_is_who_was_not_heard_of_for_longer_than_the_deadline() -> None:
-    roster = Roster(DEPLOYMENT, PRINT)
-    roster.take(HELLO, 100)
-    roster.take(msgspec.structs.replace(HELLO, name="blue"), 200)
-    assert roster.silent(1100, 1000) == []
-    assert roster.silent(1101, 1000) == ["red"]
-    roster.by_name["red"].farewell = True
-    assert roster.silent(9999, 1000) == ["blue"]
-
-
 # --- over the cores --------------------------------------------------------------------------------------------------
-
-
-class Table:
-    """A supervisor, and what it says to whom."""
-
-    def __init__(self) -> None:
-        self.core = SupervisorCore(RunSettings("run", TABLE.name, TEXT, Pace("fast")), PRINT, 0)
-
-    def hear(self, process: NodeCore | HubCore, now_ns: int = 0) -> list[Publish]:
-        """Let the supervisor take what a process has to say; return its answers."""
-        for action in process.actions:
-            if isinstance(action, Publish):
-                self.core.receive(action.channel, action.name, action.payload, now_ns)
-        process.actions.clear()
-        self.core.advance(now_ns)
-        said = [action for action in self.core.actions if isinstance(action, Publish)]
-        self.core.actions.clear()
-        return said
 
 
 def node(name: str, fingerprint: bytes = PRINT, world: str = "") -> NodeCore:
@@ -185,73 +146,12 @@ def node(name: str, fingerprint: bytes = PRINT, world: str = "") -> NodeCore:
     return core
 
 
-def give(process: NodeCore | HubCore, said: list[Publish], name: str) -> None:
-    for action in said:
-        if action.name in (name, channels.SUPERVISOR):
-            process.receive(action.channel, action.name, action.payload, 0)
-
-
-@pytest.mark.parametrize(
-    ("core", "reason"),
-    [
-        (lambda: node("rde"), "no node 'rde' is declared; declared are blue, red, nearest is red"),
-        (lambda: node("red", OTHER), "arithmetic fingerprint 0000000000000000, this is 0001020304050607"),
-        (lambda: node("red", world="mars"), "world mars, this is table"),
-    ],
-    ids=["name", "fingerprint", "world"],
-)
-def test_a_refused_process_knows_why_and_asks_no_more(core: Any, reason: str) -> None:
-    table, process = Table(), core()
-    (said,) = table.hear(process)
-    assert said.channel is channels.REFUSAL and decode(Refusal, said.payload).reason.startswith(reason)
-    give(process, [said], process.name)
-    assert process.member.refusal.startswith(reason)
-    process.actions.clear()
-    process.wake(10**9)
-    assert process.actions == []
-
-
 def test_a_refusal_for_another_start_of_the_name_is_not_taken() -> None:
     process = node("red")
     process.receive(channels.REFUSAL, "red", encode(Refusal("red", "another boot", "no")), 0)
     process.receive(channels.REFUSAL, "red", b"\xc1", 0)
     assert process.statistics().refused == 1
     assert process.member.refusal == ""
-
-
-def test_who_is_let_in_gets_all_it_needs_and_the_run_starts_when_all_are_ready() -> None:
-    table = Table()
-    nodes = {name: node(name) for name in ("red", "blue")}
-    hub = HubCore("boot-hub", PRINT, 0)
-    hub.wake(0)
-    processes: dict[str, NodeCore | HubCore] = {**nodes, "vhub": hub}
-    for name, process in processes.items():
-        (said,) = table.hear(process)
-        build = decode(Build, said.payload)
-        assert (said.channel, said.name, build.name, build.deployment) == (channels.BUILD, name, name, TEXT)
-        give(process, [said], name)
-    hub.begin(None, 0)
-    assert table.core.progress.waiting_for() == ["blue", "red", "vhub"]
-    assert hub.member.is_ready, "without lockstep clients there is nobody to wait for"
-    assert not [action for action in table.hear(hub) if action.channel is channels.EPOCH]
-    for name, process in nodes.items():
-        Solver(process).build()
-        said_last = table.hear(process)
-        assert table.core.state.epoch == (1 if name == "blue" else 0)
-    epoch = decode(Epoch, next(action.payload for action in said_last if action.channel is channels.EPOCH))
-    assert (epoch.epoch, epoch.tick, epoch.roster) == (1, 0, ["blue", "red"])
-    assert dict(epoch.owners) == DEPLOYMENT.owners()
-
-
-def test_a_twin_of_a_node_that_takes_part_is_refused_and_the_first_stays() -> None:
-    table, first = Table(), node("red")
-    give(first, table.hear(first), "red")
-    twin = NodeCore("red", "another boot", PRINT, 0)
-    twin.wake(0)
-    (said,) = table.hear(twin)
-    assert decode(Refusal, said.payload) == Refusal("red", "another boot", "a node red is already here")
-    give(first, [said], "red")
-    assert not first.member.refusal and first.member.build is not None
 
 
 def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> None:

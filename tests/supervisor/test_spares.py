@@ -59,14 +59,6 @@ def test_the_name_of_a_fleet_adds_its_spares_in_the_order_of_their_numbers() -> 
     assert run.frames[-1].vector("b-3", "position", 3) == pytest.approx([2.0, 0.0, 0.1], abs=1e-3)
 
 
-def test_one_is_added_by_its_own_name_and_then_it_is_passed_over() -> None:
-    run = yard().ask_at(20, "add", name="b-3")
-    for tick in (30, 40):
-        run.ask_at(tick, "add", name="b")
-    assert [answer.text.split()[0] for answer in run.go().answers] == ["b-3", "b-2", "b-4"]
-    assert came(run) == ["b-2", "b-3", "b-4"]
-
-
 def test_a_place_may_be_said_with_a_heading() -> None:
     run = yard().ask_at(AT, "add", name="b-2", at="-4,1.5,0.1")
     run.ask_at(AT, "add", name="w", at={"x": "4 m", "y": "-20 cm", "yaw": "90 deg"})
@@ -157,15 +149,6 @@ def test_an_answer_counts_with_the_events_of_the_ticks_that_are_released_already
     assert answer.tick > 31, "released at once with the events"
     assert answer.text == f"b-4 added at tick {answer.tick}" and came(run) == ["b-2", "b-3", "b-4"]
     assert [one.text for one in refused] == ["w-2 is absent already", "w-2 is absent: add it first"]
-
-
-def test_what_leaves_is_parked_and_comes_back_as_it_was_at_first() -> None:
-    run = yard().ask_at(20, "push", name="b-1", impulse=[1.0, 0.0, 0.0]).ask_at(30, "remove", name="b-1")
-    _, gone, back = run.ask_at(50, "add", name="b").go().answers
-    absent, box = run.frames[gone.tick], run.frames[0].layout["b-1"]
-    assert absent.numbers[box.start : box.stop] == parked(absent.layout, box)
-    assert back.text == f"b-1 added at tick {back.tick}"
-    assert run.frames[back.tick].vector("b-1", "position", 3) == pytest.approx([0.0, 0.0, 0.1], abs=1e-3)
 
 
 def test_a_removal_clears_references_to_the_entity_in_the_memory_of_others() -> None:

@@ -198,7 +198,7 @@ def test_a_resume_that_fails_leaves_the_run_as_it_was(sets: tuple[str, ...], lat
     run.resume_at(60, {SUPERVISOR: 0.1, "n1": 1.0, "n2": 1.0, VHUB: 1.0, late: 58.0})
     run.go()
     assert run.core.state.end is None and run.core.state.abandoned == reason
-    assert f"the run does not go on from tick {run.core.state.frame.tick}: {reason}" in run.lines
+    assert f"the run does not continue from tick {run.core.state.frame.tick}: {reason}" in run.lines
     assert fold(run.core.state.deployment, run.system.journal).end is None and not run.system.hub.finished
     run.end_all()
     run.system._timers.clear()

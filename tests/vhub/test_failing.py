@@ -125,7 +125,7 @@ def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(hub_run: HubRun, p
     journal.write_bytes(content)
     text = live(plane, hub_run, tmp_path)
     told = re.fullmatch(
-        r"lost vhub: it cannot go on: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* behind it; "
+        r"lost vhub: it cannot go on: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* after it; "
         rf"tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@last",
         text,
     )

@@ -19,7 +19,6 @@ from tests.replay.conftest import SPARE, TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.conftest import in_process
 from tests.wire.served import served
-from tests.wire.test_console import PORTER, addresses_of
 from tests.wire.test_run import NODES, last_json
 
 if TYPE_CHECKING:
@@ -79,6 +78,24 @@ TOASTS = """(window.toasts = [], new MutationObserver((all) => all.forEach(({add
   addedNodes.forEach((one) => window.toasts.push(`${one.className}: ${one.textContent}`)))
 ).observe(document.querySelector("#toasts"), {childList: true}), true)"""
 """Keeps what the page says for some seconds."""
+
+
+PORTER = (
+    "--set", "robots.porter={model: holonomic, at: {x: 3 m}, actuators: {drive: {kind: go_to}}, "
+    "sensors: {jobs: {kind: job, actuator: drive, rate: 5 Hz}}}",
+    "--set", "nodes.blue.robots=[rest]", "--set", "clients={desk: {console: true}}",
+)  # fmt: skip
+"""A robot beside the table that the console can send."""
+
+
+def addresses_of(house: House) -> dict[str, str]:
+    """The addresses of the live run's page, once its console serves it."""
+    path = house.live().path / "console.json"
+
+    def told() -> dict[str, str] | None:
+        return json.loads(path.read_text()) if path.exists() else None
+
+    return house.wait_for("the console's addresses", told)
 
 
 @pytest.fixture(scope="session")

@@ -137,17 +137,6 @@ def assert_wrong_names_are_told(client: Client) -> None:
         client.lockstep()
 
 
-def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:
-    """The launcher is killed, and all with it: nobody starts it again."""
-    up = house.up("--set", CLIENTS, "--set", "engine=pure", "--set", "deadlines.vhub_back=1 s", *ONE)
-    with connect(house.info().radio, "hand", timeout_s=PATIENCE_S) as client:
-        ticks = client.lockstep(100)
-        assert next(ticks) == 0
-        up.kill()
-        with pytest.raises(ConnectionFailed, match="lost the vHub at tcp/"):
-            list(ticks)
-
-
 def test_nobody_at_the_address(house: House) -> None:
     with pytest.raises(ConnectionFailed, match=r"no router answers at tcp/127\.0\.0\.1:1 "):
         connect("tcp/127.0.0.1:1", "hand", timeout_s=0.1)

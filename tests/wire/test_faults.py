@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Final
 import pytest
 
 from foosim.capture.reader import open_capture
-from tests.faults.campaign import ALL, Found, main, p99
 from tests.faults.cluster import Cluster, FaultError
 from tests.faults.digest import FAULTS
-from tests.faults.kinds import KINDS, NODE, Trial, twin_refused
+from tests.faults.kinds import NODE, Trial, twin_refused
 from tests.faults.outside import OUTSIDE
 from tests.faults.outside import SETS as WITH_CLIENT
 from tests.wire.proxy import Weather
@@ -62,28 +61,3 @@ def test_what_comes_from_outside_costs_a_run_nothing_but_packets(house: House) -
     causes = capture.packets.cause[capture.packets.source == "flooder"]
     assert "rx_full" in set(causes) and result["packets"]["refused"] > 0
     assert result["recoveries"] == [] and house.processes_with(str(house.folder)) == {}
-
-
-def test_every_kind_of_make_faults_is_made_here_or_needs_a_world_of_its_own() -> None:
-    """What is done to a whole run is in test_run.py."""
-    faults = {kind.trial for kind in KINDS if not kind.altered}
-    assert faults == {*FAULTS, twin_refused}
-    assert len({kind.name for kind in ALL}) == len(ALL)
-
-
-def test_percentiles_are_those_of_nearest_rank() -> None:
-    assert p99([3.0]) == 3.0
-    assert p99(list(range(1, 101))) == 99
-    assert p99(list(range(1, 202))) == 199
-    found = Found("any")
-    found.take({"outage": 2.0})
-    found.take({"outage": 1.0})
-    assert (found.trials, found.figures) == (2, {"outage": [2.0, 1.0]})
-
-
-@pytest.mark.parametrize("arguments", [["--count", "0"], ["--only", "node_kild"]])
-def test_what_cannot_be_repeated_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 2
-    assert "at least 1" in (said := capsys.readouterr().err) or "choose from 'node_killed'" in said

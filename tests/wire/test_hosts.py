@@ -14,15 +14,15 @@ import pytest
 
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
-from foosim.launcher.doctor import remote as doctor_remote
-from foosim.launcher.doctor.remote import LIMIT_S, Question, ask
-from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher import doctor as doctor_remote
+from foosim.launcher.doctor import LIMIT_S, Question, ask
+from foosim.launcher.hosts import Remote
 from tests.apart import apart
 from tests.wire import sshd
 from tests.wire.conftest import LONG
-from tests.wire.test_run import last_json
+from tests.wire.test_run import free_port, last_json
 from tests.wire.test_secured_run import certificates
-from tests.wire.test_ssh import There, free_port
+from tests.wire.test_ssh import There
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
@@ -63,7 +62,6 @@ def test_a_run_with_certificates_has_the_same_bytes_in_every_shape(house: House,
 
 
 KILLED: Final = {
-    "supervisor, vhub and all nodes": ("supervisor", "vhub", "nodes.red", "nodes.blue"),
     "supervisor and a node": ("supervisor", "nodes.red"),
     "vhub and a node": ("vhub", "nodes.red"),
 }
@@ -104,48 +102,9 @@ def test_a_process_with_all_roles_that_is_killed_goes_on_with_players_of_new_mem
     assert verify_capture(house.folder / content["capture"], 1).equal
 
 
-def test_a_player_that_raises_in_a_process_with_the_others_ends_the_run_in_order(
-    house: House, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "wrong.py").write_text(
-        "from foosim import Player\n"
-        "class Wrong(Player):\n"
-        "    def act(self, tick, samples):\n"
-        "        raise ValueError('too much')\n"
-    )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    sets = ["--set", "players.player-red.class=wrong:Wrong"]
-    up = house.up("--json", "--engine", "pure", *ONE, *sets, players=True)
-    code, out, err = house.end(up)
-    content = last_json(out)
-    assert code == 1 and content["failed"] and content["reason"].startswith("player-red failed at tick ")
-    assert "ValueError: too much" in content["reason"], err
-    (log,) = (house.folder / "state" / "foosim" / "runs").glob("*/logs/one.log")
-    told = [line for line in log.read_text().splitlines() if line.endswith(content["reason"])]
-    assert len([line for line in told if " player-red: " in line or line == content["reason"]]) == 1, told
-    assert open_capture(house.folder / content["capture"]).about.finished
-
-
 def test_a_process_without_its_certificate_is_refused_before_anything_starts(house: House) -> None:
     folder = house.folder / "certs"
     certificates.init(folder)
     certificates.issue(folder, ["supervisor", "vhub", "node.red", "node.blue", "operator.admin"])
     code, _, err = house.end(house.up("--pki", folder, *in_process("main", "vhub", "nodes.red")))
     assert code == 3 and "has no certificate of process.main; it has: node.blue, node.red, operator.admin" in err
-
-
-def test_a_run_of_one_process_whose_launcher_died_is_resumed(house: House) -> None:
-    up = house.up("--engine", "pure", *ONE, "--for", "4 s", players=True)
-    house.ticking(5)
-    name = house.info().run
-    up.kill()
-    house.end(up)
-    house.wait_for("the process to die with it", lambda: not house.processes_with(f"--run {name} "))
-    resumed = house.start("foosim", "up", "--resume", name, "--json")
-    house.ticking(20)
-    assert house.ask("foosim", "down")[0] == 0
-    code, out, err = house.end(resumed)
-    assert code == 0, err
-    content = last_json(out)
-    assert content["ticks"] >= 20 and content["reason"] == "stopped"
-    assert verify_capture(house.folder / content["capture"], 1).equal

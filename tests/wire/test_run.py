@@ -106,14 +106,6 @@ def assert_a_node_of_another_world_is_refused(house: House, address: str) -> Non
     assert code == 3 and "refused by the supervisor: world chess, this is table" in err
 
 
-def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
-    up = house.up("--set", "nodes.blue.launch=manual", *in_process("main", "nodes.red"), "--json")
-    house.read_until(up.stderr, "waiting for node blue")
-    up.send_signal(signal.SIGINT)
-    code, out, err = house.end(up)
-    assert (code, last_json(out)["ticks"]) == (0, 0), err
-
-
 def test_ctrl_c_before_the_supervisor_listens_ends_it_in_order(house: House) -> None:
     up = house.up("--json", *in_process("main", "nodes.red"))
     house.read_until(up.stderr, "run table-")
@@ -184,34 +176,6 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
     assert "Traceback (most recent call last):" in log and "LookupError: tripped" in log
     assert log.count(content["reason"]) == 1
     assert verify_capture(house.folder / content["capture"]).equal
-
-
-FAILS = """
-import sys
-
-from foosim.players.football import Team
-
-if sys.argv[1:3] == ["role", "player"]:
-    raise RuntimeError("no licence here")
-"""
-
-
-def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its class is there when `up` looks; in the player's own process the module cannot be imported.
-
-    The supervisor hears of it from the player, by way of the vHub, and from the launcher: what comes first is the
-    reason, and the last line has what the reason does not say of the player's end.
-    """
-    (house.folder / "fails.py").write_text(FAILS)
-    monkeypatch.setenv("PYTHONPATH", str(house.folder))
-    alone = in_process("null", "players.player-red"), in_process("main", *NODES)
-    up = house.up("--set", "players.player-red.class=fails:Team", *chain(*alone), players=True)
-    code, out, err = house.end(up)
-    assert code == 1, err
-    is_said = "the run has ended: lost player-red: it ended with exit code 1" in out
-    how = "the log of player-red is" if is_said else "player-red ended with exit code 1; its log is"
-    assert re.search(rf"^{how} \S+/player-red\.log$", out, re.MULTILINE), out
-    assert "no licence here" in out
 
 
 NO_HUB = """
@@ -473,15 +437,10 @@ def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, mo
     code, out, err = house.end(up)
     assert code == 0, (out, err)
     logs = "".join(path.read_text() for path in (house.folder / "state" / "foosim" / "runs").glob("*/logs/*"))
-    slow = r"dozes\.py:\d+ in sample has taken more than 0\.2 s at tick 10\n"
-    assert re.search(rf"tick 1[01]: lag \d+\.\d ms, waited for red: {slow}", logs), logs
-    assert re.search(rf" red: {slow}", logs), logs
-    assert re.search(rf" supervisor: red: {slow}", logs), logs
+    assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
 
 
-def test_a_component_that_hangs_is_in_the_reason_of_its_node_s_loss(
-    house: House, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_component_that_hangs_is_named_with_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
     (house.folder / "dozes.py").write_text(DOZES.replace("sleep(1.0)", "sleep(1000.0)"))
     monkeypatch.setenv("PYTHONPATH", str(house.folder))
     own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
@@ -492,8 +451,8 @@ def test_a_component_that_hangs_is_in_the_reason_of_its_node_s_loss(
     )
     code, out, err = house.end(up)
     assert code == 1, (out, err)
-    named = r": dozes\.py:\d+ in sample has taken more than 0\.2 s at tick 10"
-    assert re.search(f"^lost red: tick 10 is overdue by .* s{named}", last_json(out)["reason"]), (out, err)
+    assert re.search("^lost red: tick 10 is overdue by .* s$", last_json(out)["reason"]), (out, err)
+    assert re.search(r"^red was killed by .* at dozes\.py:\d+ in sample; its log is ", err, re.MULTILINE), (out, err)
 
 
 FACTOR: Final = "FACTOR = {}\n"

@@ -4,7 +4,6 @@ Nothing here waits and hopes: what has to happen is waited for with a generous e
 be known to a publisher, the publisher repeats.
 """
 
-import os
 import signal
 import socket
 import subprocess
@@ -22,6 +21,7 @@ from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import Publisher, Session
+from tests.wire.test_run import free_port
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -122,15 +122,6 @@ def test_a_message_comes_with_its_channel_and_the_name_in_its_key(plane: Plane, 
     assert inbox.statistics().dropped == 0
 
 
-def test_messages_of_a_megabyte_arrive_whole(plane: Plane, inbox: Inbox) -> None:
-    plane.client().subscribe("w/commit/*", "commit", inbox)
-    publisher = plane.client().publisher("w/commit/all", express=False)
-    put_until_heard(publisher, inbox)
-    payload = os.urandom(1 << 20)
-    publisher.put(payload)
-    assert take_all(inbox, 1) == [("commit", "all", payload)]
-
-
 def test_a_session_does_not_hear_itself(plane: Plane, inbox: Inbox) -> None:
     """Not a subscriber, and not the reader that waits itself."""
     own = Inbox(1000)
@@ -185,25 +176,6 @@ def test_the_reader_sleeps_until_what_it_lacks_has_come(plane: Plane, inbox: Inb
     reading.join()
     assert read == [[("order", "all", b"1"), ("order", "all", b"2")]]
     assert inbox.take(LONG_S, "part") == [("part", "blue", b"other")]
-
-
-def test_offers_wakes_and_deadlines_end_a_wait_on_the_wire(plane: Plane, inbox: Inbox) -> None:
-    plane.client().receive("w/part/*", "part", read_key, inbox)
-    threading.Timer(0.02, inbox.offer, [("timer", "one", b"")]).start()
-    assert inbox.take(None) == [("timer", "one", b"")]
-    threading.Timer(0.02, inbox.wake).start()
-    assert inbox.take(None) == []
-    assert [inbox.take(0.002) for _ in range(10)] == [[]] * 10
-
-
-def test_a_signal_wakes_the_reader_that_waits_on_the_wire(plane: Plane, inbox: Inbox) -> None:
-    plane.client().receive("w/part/*", "part", read_key, inbox)
-    old = signal.signal(signal.SIGALRM, lambda number, frame: inbox.wake())
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.02)
-        assert inbox.take(None) == []
-    finally:
-        signal.signal(signal.SIGALRM, old)
 
 
 def test_a_key_with_wildcards_is_refused_and_counted(plane: Plane, inbox: Inbox) -> None:
@@ -382,10 +354,3 @@ def test_links_presence_and_subscriptions_come_back_with_the_router(inbox: Inbox
             assert inbox.take(LONG_S) == [("alive", "blue", b"+")]
     finally:
         stop(router)
-
-
-def free_port() -> int:
-    """Return a port that was free a moment ago."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])

@@ -1,7 +1,6 @@
 """How sessions begin and end: routers that are not there, closing, processes that forget to, forks, settings."""
 
 import re
-import socket
 import subprocess
 import sys
 import threading
@@ -20,6 +19,7 @@ from foosim.runtime.roles.wire import Wire
 from foosim.runtime.transport import session as sessions
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.session import ConnectError, ListenError, Session
+from tests.wire.test_run import free_port
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -275,13 +275,6 @@ def test_settings_that_zenoh_does_not_take_as_they_are_stop_us() -> None:
     undone = {"adminspace/permissions": {"read": True, "write": False}, "adminspace/permissions/write": True}
     with pytest.raises(AssertionError, match="adminspace/permissions"):
         sessions._open(undone)
-
-
-def free_port() -> int:
-    """Return a port that was free a moment ago."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return int(listener.getsockname()[1])
 
 
 def test_a_second_control_of_a_process_comes_and_goes_beside_the_first(router: Session) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,15 +18,14 @@ import pytest
 from foosim.client.control import Control
 from foosim.common.errors import Failed
 from foosim.deployment.hosts import Host
-from foosim.launcher.children.processes import Child, Launcher
-from foosim.launcher.hosts import ssh as remote_module
-from foosim.launcher.hosts.prepare import fetch_capture
-from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher import hosts as remote_module
+from foosim.launcher.hosts import CAPTURE, Remote, fetch_capture
+from foosim.launcher.processes import Child, Launcher
 from foosim.runtime.transport.certificates import operator_credentials
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE, command_path, processes_with, wait_for
 from tests.wire.sshd import Sshd, run
-from tests.wire.test_run import last_json
+from tests.wire.test_run import free_port, last_json
 from tests.wire.test_secured_run import certificates
 
 if TYPE_CHECKING:
@@ -48,12 +46,6 @@ print("here", flush=True)
 while True:
     time.sleep(60)
 """
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class There:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import pytest
 
 from foosim.capture.info import capture_info
@@ -18,11 +16,7 @@ from foosim.replay.verify import verify_capture
 from foosim.runtime import disk
 from foosim.vhub.recording.recovery import UNCLEAN
 from tests.wire.conftest import ONE, House
-
-
-def last_json(out: str) -> dict[str, Any]:
-    content: dict[str, Any] = msgspec.json.decode(out.splitlines()[-1])
-    return content
+from tests.wire.test_run import last_json
 
 
 def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:

@@ -23,7 +23,7 @@ export function recoveryText(entry) {
     away: `continues without ${entry.name} (${entry.reason})`,
     return: `${entry.name} takes part again`,
   });
-  const after = entry.outage_ms === null ? "" : `, went on after ${number(entry.outage_ms, 2)} ms`;
+  const after = entry.outage_ms === null ? "" : `, continued after ${number(entry.outage_ms, 2)} ms`;
   return `${texts[entry.what] ?? `${entry.what} ${entry.name}`}${after}, epoch ${entry.epoch}`;
 }
 

@@ -1,1 +1,0 @@
-"""Examines whether a deployment can run, here and on its hosts."""
