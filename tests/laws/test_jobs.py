@@ -161,13 +161,6 @@ def steps(frames: tuple[Frame, ...], robot: str, row: int) -> list[tuple[int, Jo
     return [found[0], *(after for before, after in pairwise(found) if before != after)]
 
 
-def test_one_digest_on_three_nodes_as_on_one() -> None:
-    """Robots move from node to node, and all that the nodes keep is made anew, at drawn ticks. The test of late repeats
-    has two nodes."""
-    assert [frame.digest for frame in ran(3).frames] == [frame.digest for frame in ran(1).frames]
-    assert ran(3).said == ran(1).said
-
-
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("row", [0, 1])
 def test_a_job_begins_once_and_ends_once(robot: str, row: int) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from random import Random
 from typing import Any, Final
 
 import pytest
@@ -19,8 +18,6 @@ from foosim.rehearsal.simulation import Simulation
 from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
-from foosim.world.assembly.event_times import events_by_tick
-from foosim.world.edits import counters, parked
 from foosim.world.frame import Frame
 from foosim.world.sensors.laser_scanner import Scan
 from tests.kinematic_yard import yard_text
@@ -42,7 +39,6 @@ SENSORS: Final = {
     },
 }
 BOX: Final = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg"}
-FLEETS: Final = ("b", "w", "k")
 
 
 def text(events: list[dict[str, Any]], **more: Any) -> str:
@@ -64,98 +60,11 @@ def text(events: list[dict[str, Any]], **more: Any) -> str:
     return yard_text(robots, engine="mujoco", substeps=4, objects=objects, events=events, **more)
 
 
-def drawn_events() -> list[dict[str, Any]]:
-    """Forty events at drawn times: what comes, goes, is put elsewhere, is taken out of service."""
-    draw = Random(SEED)
-    events: list[dict[str, Any]] = []
-    for number in range(40):
-        when = {"at": f"{draw.uniform(0.0, 2.9):.3f} s"} if number % 3 else {"between": ["0.2 s", "2.5 s"]}
-        pose = f"{draw.uniform(-9.0, 9.0):.2f},{draw.uniform(-9.0, 9.0):.2f}"
-        fleet = FLEETS[number % 3]
-        what: list[dict[str, Any]] = [
-            {"choose": f"2 of {fleet}-*", "add": True if fleet == "b" else pose},
-            {"entity": f"{fleet}-{draw.randrange(1, 5)}", "remove": True},
-            {"choose": f"1 of {fleet}-*", "add": {"x": f"{draw.uniform(-2, 2):.2f} m", "yaw": "30 deg"}},
-            {"choose": f"1 of {fleet}-*", "set": {"at": pose}},
-        ]
-        events.append({**when, **what[number // 3 % 4]})
-    return events
-
-
 def frames_of(its: str, nodes: int, **settings: Any) -> tuple[Frame, ...]:
     frames: list[Frame] = []
     print(f"seed {SEED}")
     rehearse(its, NAME, TICKS, nodes, settings=Settings(on_commit=frames.append), **settings)
     return tuple(frames)
-
-
-@cache
-def alone() -> tuple[Frame, ...]:
-    return frames_of(text(drawn_events()), 1)
-
-
-def digests(frames: tuple[Frame, ...]) -> dict[int, bytes]:
-    return {frame.tick: frame.digest for frame in frames}
-
-
-def test_comings_and_goings_are_the_same_on_two_nodes() -> None:
-    assert digests(frames_of(text(drawn_events()), 2)) == digests(alone())
-
-
-def test_comings_and_goings_are_the_same_on_three_whoever_crashes() -> None:
-    """Nodes and the vHub are killed at the ticks of events and beside them, and robots move."""
-    ticks = sorted(events_by_tick(load_deployment(text(drawn_events()), NAME)))
-    draw = Random(SEED)
-
-    def prepare(system: System) -> None:
-        for number, tick in enumerate(ticks):
-            system.at_tick(tick + draw.randrange(2), partial(disturb, system, number))
-
-    def disturb(system: System, number: int) -> None:
-        node = f"n{1 + number % 3}"
-        if number % 7 == 3:
-            system.kill_hub("torn")
-        elif node not in system.processes:
-            system.start(node)
-        elif number % 3 == 1 and len(system.supervisor.state.members) > 1:
-            system.kill(node)
-        else:
-            robots = sorted(system.supervisor.state.owners)
-            system.request("move", robot=robots[number % len(robots)], node=node)
-
-    frames = frames_of(text(drawn_events()), 3, prepare=prepare)
-    assert frames[-1].tick == TICKS and digests(frames) == digests(alone())
-
-
-def test_who_is_absent_is_nowhere_and_remembers_nothing() -> None:
-    """Its slots are those of any absent entity, but for the counters of its samples, which never go back."""
-    layout = alone()[0].layout
-    seen = 0
-    counted = dict.fromkeys((at for entity in layout.entities for at in counters(entity)), 0.0)
-    for frame in alone():
-        for entity in layout.entities:
-            for at in counters(entity):
-                assert frame.numbers[at] >= counted[at]
-                counted[at] = frame.numbers[at]
-            if entity.is_absent(frame.numbers):
-                seen += 1
-                places = [at for at in range(entity.start, entity.stop) if at not in counters(entity)]
-                of_absent = parked(layout, entity)
-                assert [frame.numbers[at] for at in places] == [of_absent[at - entity.start] for at in places]
-                assert entity.index not in frame.outboxes
-    assert seen > 1000
-
-
-def test_an_addition_changes_no_draw_of_anybody_else() -> None:
-    """Of a robot that comes far from all others, these see nothing: what never rests is as it would be."""
-    comes = {"at": "0.5 s", "entity": "k-4", "add": "90,90"}
-    goes = {"at": "1.5 s", "entity": "k-4", "remove": True}
-    without, beside = frames_of(text([]), 1), frames_of(text([comes, goes]), 1)
-    assert beside[100].at("k-4", "absent") == 0.0
-    for here, there in zip(without, beside, strict=True):
-        for robot in here.layout.robots:
-            if robot.name in ("k-1", "k-2", "k-3"):
-                assert here.entity_digest(robot) == there.entity_digest(robot), (here.tick, robot.name)
 
 
 def test_what_leaned_on_what_is_removed_falls_and_it_comes_back() -> None:

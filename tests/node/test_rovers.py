@@ -1,21 +1,19 @@
-"""The engine of a hall: where rovers go, what stops them, what they live on; whoever computes them."""
+"""The engine of a hall: where rovers go, what stops them, what they live on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import cos, hypot, pi, sin, sqrt
 from typing import Final
 
 import numpy as np
 import pytest
 
-from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.forms.registry import names
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.moving.wheels import slips_of, wheels_of
@@ -59,26 +57,9 @@ class Hall:
 
     def step(self, ticks: int = 1) -> None:
         for tick in range(ticks):
-            self._solve(self.rovers, self.numbers, tick)
-
-    def _solve(self, rovers: Sequence[Entity], numbers: list[float], tick: int, stepper: Stepper | None = None) -> None:
-        islands = tuple((rover,) for rover in rovers)
-        work = Work(tick, self.layout, islands, tuple(rover.index for rover in rovers), numbers, {})
-        (stepper or self.stepper).solve(self.engine, work)
-
-    def shared(self, tick: int, steppers: list[Stepper]) -> list[float]:
-        """The next numbers, each rover computed by a node that is drawn."""
-        before = self.numbers.copy()
-        joined = before.copy()
-        owner = [draw_words(draw_key(3, rover.name), tick)[0] % len(steppers) for rover in self.rovers]
-        for number, stepper in enumerate(steppers):
-            mine = [rover for rover, of in zip(self.rovers, owner, strict=True) if of == number]
-            numbers = before.copy()
-            if mine:
-                self._solve(mine, numbers, tick, stepper)
-            for rover in mine:
-                joined[rover.start : rover.split] = numbers[rover.start : rover.split]
-        return joined
+            islands = tuple((rover,) for rover in self.rovers)
+            work = Work(tick, self.layout, islands, tuple(rover.index for rover in self.rovers), self.numbers, {})
+            self.stepper.solve(self.engine, work)
 
     def strays(self) -> list[str]:
         return strays(self.deployment, Frame(0, self.layout, np.array(self.numbers)))
@@ -217,61 +198,6 @@ def test_two_that_meet_stop_before_they_touch_and_pass_on_when_they_can(fleet_te
     hall.step(50)
     assert hall.at(one, "position") == pytest.approx(2.0 - 0.3 - 0.5, abs=0.01), "it can go back"
     assert hall.at(other, "position") < 2.2, "and the other one follows"
-
-
-CROWD: Final = (
-    "scenery={pillar: {shape: box, z: 1 m, length: 1 m, width: 1 m, height: 2 m, yaw: 30 deg}}",
-    "hall.length=6 m",
-    "hall.width=5 m",
-    "robots.base.x=-2 m",
-)
-
-
-def crowd(fleet_text: Callable[..., str]) -> Hall:
-    """Ten rovers with hardly any room."""
-    places = [(x, y) for y in (-2.0, 1.9) for x in (-2.4, -1.2, 0.0, 1.2, 2.4)]
-    sets = [
-        f"robots.rover{n:02d}.{axis}={v} m" for n, p in enumerate(places, 1) for axis, v in zip("xy", p, strict=True)
-    ]
-    return Hall(fleet_text(10, *CROWD, *sets))
-
-
-def drive_at_random(hall: Hall, tick: int) -> None:
-    """Each rover gets new speeds every half second, at a tick of its own."""
-    for number, rover in enumerate(hall.rovers):
-        if (tick + 3 * number) % 25 == 0:
-            words = draw_words(draw_key(9, rover.name), tick)
-            hall.want(rover, *(2.4 * unit_interval(word) - 0.8 for word in words[:2]))
-
-
-def test_in_a_crowd_nobody_is_ever_in_anything_else_whoever_computes_whom(fleet_text: Callable[..., str]) -> None:
-    """Law 1 for rovers: three nodes that share them, one of them new now and then, give what one gives."""
-    hall = crowd(fleet_text)
-    steppers = [Stepper(hall.deployment, hall.layout) for _ in range(3)]
-    blocked = near = 0
-    for tick in range(600):
-        drive_at_random(hall, tick)
-        if tick % 37 == 0:
-            steppers[tick % 3] = Stepper(hall.deployment, hall.layout)
-        shared = hall.shared(tick, steppers)
-        hall.step()
-        assert shared == hall.numbers, f"tick {tick}"
-        assert hall.strays() == [], f"tick {tick}"
-        blocked += sum(hall.at(rover, "blocked") for rover in hall.rovers) > 0
-        places = [(hall.at(rover, "position"), hall.at(rover, "position", 1)) for rover in hall.rovers]
-        near += sum(0 < hypot(x - u, y - v) < 0.61 for x, y in places for u, v in places) > 0
-    assert blocked > 300 and near > 200, "without contacts nothing is proved"
-
-
-def test_both_engines_that_a_deployment_can_name_move_rovers_alike(fleet_text: Callable[..., str]) -> None:
-    frames = []
-    for engine in names("engine"):
-        hall = Hall(fleet_text(2, f"engine={engine}"))
-        for rover in hall.rovers:
-            hall.want(rover, 0.4, 0.5)
-        hall.step(50)
-        frames.append(hall.numbers)
-    assert frames[0] == frames[1]
 
 
 # --- batteries -------------------------------------------------------------------------------------------------------

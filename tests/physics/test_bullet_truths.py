@@ -2,7 +2,6 @@
 
 Each is a formula from a textbook, with the tolerance to which the engine keeps it; its source and what Bullet does with
 other settings is said beside it. Speeds, angles and phases are drawn; a test that fails prints the seed of its draws.
-What each setting of the engine does for them is in test_engine_settings.py.
 """
 
 from __future__ import annotations

@@ -66,10 +66,6 @@ def test_a_light_cube_drifts_by_the_drag_of_a_box_and_a_heavy_one_stays() -> Non
     assert last.vector("k", "position", 2) == [-9.0, 0.0]
 
 
-def test_it_is_the_same_on_three_nodes() -> None:
-    assert [frame.digest for frame in sliding(3)] == [frame.digest for frame in sliding(1)]
-
-
 @pytest.mark.parametrize("lift", [0.0, 1.0])
 def test_what_falls_comes_to_its_terminal_speed(lift: float) -> None:
     """v = sqrt(2 m g / (density A)) relative to the air."""

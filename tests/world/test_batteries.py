@@ -9,7 +9,6 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
@@ -197,16 +196,3 @@ def test_a_rover_of_a_hall_has_the_halls_battery() -> None:
     rover = "robots: {r: {model: rover, x: 1 m, y: 1 m, rules: {battery: {kind: battery, capacity: 1 kJ}}}}\n"
     (problem,) = problems_of(hall(rover))
     assert "robots.r.rules.battery.capacity: not of a rover of the hall" in problem
-
-
-def test_batteries_are_one_world_on_any_number_of_nodes() -> None:
-    rules = battery(capacity="30 J", chargers=[{"tag": "tanker", "radius": "1 m", "power": "100 W"}, CIRCLE])
-    path = ("-2 m", "60 cm"), ("2 m", "60 cm")
-    robots = {
-        "a": {"model": "holonomic", "rules": rules, "sensors": {"gauge": {"kind": "battery", "rate": "7 Hz"}}},
-        "b": mover(*path, tags=["tanker"], rules=battery(), loop=True),
-        "c": mover(("3 m", "0 m"), ("3 m", "5 m"), rules=rules),
-    }
-    one, *others = (rehearse(yard_text(robots), "yard.yaml", 200, nodes) for nodes in (1, 2, 3))
-    assert not one.json["failed"]
-    assert all(other.digests == one.digests for other in others)
