@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from random import Random
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pytest
@@ -34,6 +34,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.replay.verify import verify_capture
 from foosim.replay.what_if import what_if
 from foosim.runtime.roles.bus import CALM, Weather
+from foosim.vhub.state.records import Closing
 from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.rest import Rest
 from foosim.world.assembly.used_forms import forms_of
@@ -68,6 +69,18 @@ class World:
     """Slots of which some entity's is not zero at some time: without that a world proves nothing."""
 
 
+class Ran(NamedTuple):
+    """A run: its result, its frames and the fates of all packets."""
+
+    result: Rehearsed
+    frames: list[Frame]
+    fates: list[Any]
+
+    @property
+    def digests(self) -> list[bytes]:
+        return self.result.digests
+
+
 def deployed(name: str, ticks: int, *happens: str, sets: Sequence[str] = (), folder: Path = DEPLOY) -> World:
     return World(apply_sets((folder / name).read_text(), str(folder / name), sets), folder, ticks, happens)
 
@@ -97,22 +110,31 @@ WORLDS: Final = (
 )
 
 
-def run(world: World, nodes: int, sets: Sequence[str] = (), **how: Any) -> tuple[Rehearsed, list[Frame]]:
-    frames = Frames()
-    settings = Settings(on_commit=frames, weather=how.pop("weather", CALM))
+def run(world: World, nodes: int, sets: Sequence[str] = (), **how: Any) -> Ran:
+    """Rehearse a world; return the result with all frames and the fates of all packets."""
+    frames, fates = Frames(), list[Any]()
+
+    def close(closing: Closing) -> None:
+        fates.extend(
+            (one.source, one.destination, one.channel, one.sequence, one.copy, one.cause, one.due_ns, one.payload)
+            for one in closing.fates
+        )
+
+    settings = Settings(on_commit=frames, on_closing=close, weather=how.pop("weather", CALM))
     found = rehearse(world.text, NAME, world.ticks, nodes, sets, settings, folder=world.folder, **how)
     assert not found.json["failed"] and found.json["ticks"] == world.ticks, found.json["reason"]
-    return found, frames.frames
+    return Ran(found, frames.frames, fates)
 
 
 @cache
-def alone(name: str) -> tuple[Rehearsed, list[Frame]]:
+def alone(name: str) -> Ran:
     """Return a world on one node, where nothing is lost; enough happens in it."""
-    found, frames = run(world_of(name), 1, PATIENT)
+    found = run(world_of(name), 1, PATIENT)
+    frames = found.frames
     for slot in world_of(name).happens:
         places = [entity.offsets[slot] for entity in frames[0].layout.entities if slot in entity.offsets]
         assert any(frame.numbers[at] for frame in frames for at in places), f"{name}: {slot}"
-    return found, frames
+    return found
 
 
 def disturb(system: System, seed: int, ticks: int) -> None:
@@ -136,22 +158,23 @@ def disturb(system: System, seed: int, ticks: int) -> None:
 @pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 9))])
 def test_whoever_computes_it_and_whoever_is_lost_the_world_is_the_same(name: str, seed: int, tmp_path: Path) -> None:
     """To the last bit and packet, and so is its capture: simulated again on three nodes, and judged again."""
-    world, (usual, _) = world_of(name), alone(name)
+    world, usual = world_of(name), alone(name)
     path, weather = tmp_path / "run.mcap", Weather(seed, delay_ns=100_000, spread_ns=2_000_000, loss=0.01, repeat=0.05)
     prepare = partial(disturb, seed=seed, ticks=world.ticks)
-    many, _ = run(world, 3, PATIENT, weather=weather, prepare=prepare, capture=path)
+    many = run(world, 3, PATIENT, weather=weather, prepare=prepare, capture=path)
     where = next((at + 1 for at, (a, b) in enumerate(zip(usual.digests, many.digests, strict=True)) if a != b), None)
     assert where is None, f"seed {seed}"
-    assert many.json["packets"] == usual.json["packets"]
-    assert many.json["handovers"] + many.json["moves"] > 0
-    assert {entry["what"] for entry in many.json["recoveries"]} >= {"node", "join", "vhub"}
+    assert many.fates == usual.fates and len(usual.fates) > 100
+    told = many.result.json
+    assert told["packets"] == usual.result.json["packets"] and told["handovers"] + told["moves"] > 0
+    assert {entry["what"] for entry in told["recoveries"]} >= {"node", "join", "vhub"}
     assert verify_capture(path, 3).equal and what_if(open_capture(path)).changed == 0
 
 
 def test_on_many_nodes_without_losses() -> None:
     """Objects that are not made anew have other pasts than those that are."""
     for name in ("table", "everything"):
-        assert run(world_of(name), 8, PATIENT)[0].digests == alone(name)[0].digests, name
+        assert run(world_of(name), 8, PATIENT).digests == alone(name).digests, name
 
 
 # --- every form ------------------------------------------------------------------------------------------------------
@@ -172,7 +195,7 @@ def test_all_of_it_moves_measures_and_obeys_the_laws(name: str) -> None:
     """Other names, further robots, what comes and goes, readings alone and together."""
     world = world_of(name)
     text, files = pin_assets(world.text, NAME, world.folder)
-    assert still(load_deployment(text, NAME).with_assets(files), alone(name)[1]) == set()
+    assert still(load_deployment(text, NAME).with_assets(files), alone(name).frames) == set()
     check = ComponentCheck(text, NAME, world.ticks, files=files, run=partial(rehearse, folder=world.folder))
     assert list(check.broken()) == []
     assert name != "mixed" or list(elsewhere(text, NAME, world.ticks, check.first)) == []
@@ -182,7 +205,7 @@ def test_who_is_absent_is_nowhere_and_remembers_nothing() -> None:
     """Its slots are those of any absent entity, but for the counters of its samples, which never go back."""
     seen = 0
     for name in ("everything", "living"):
-        frames = alone(name)[1]
+        frames = alone(name).frames
         layout = frames[0].layout
         counted = dict.fromkeys((at for entity in layout.entities for at in counters(entity)), 0.0)
         for frame in frames:
@@ -207,8 +230,8 @@ def test_a_kit_changes_nothing_of_another() -> None:
         data["players"].pop(f"{name}-driver", None)
     del data["hall"]
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
-    _, frames = run(World(written(data)), 1)
-    assert of_table(frames) == of_table(alone("mixed")[1])
+    frames = run(World(written(data)), 1).frames
+    assert of_table(frames) == of_table(alone("mixed").frames)
 
 
 def of_table(frames: Sequence[Frame]) -> list[list[float | str]]:
@@ -233,7 +256,7 @@ def holders(frame: Frame) -> str:
 
 def test_what_is_held_is_in_the_island_of_its_holders_and_is_handed_over() -> None:
     text, files = pin_assets(yard(), NAME, assets())
-    frames = alone("everything")[1]
+    frames = alone("everything").frames
     assert list(dict.fromkeys(map(holders, frames))) == ["", "1", "12", "2"] and holders(frames[-1]) == ""
     deployment, layout = load_deployment(text, NAME).with_assets(files), frames[0].layout
     kept, nearest = Volumes(deployment, layout), set[str]()
@@ -259,7 +282,7 @@ def rebuild_all(system: System) -> None:
 
 def differs(name: str) -> bool:
     """Return whether a world on two nodes whose engines are made anew differs from the one on one node."""
-    return run(world_of(name), 2, PATIENT, prepare=rebuild_all)[0].digests != alone(name)[0].digests
+    return run(world_of(name), 2, PATIENT, prepare=rebuild_all).digests != alone(name).digests
 
 
 def test_without_a_fault_nothing_differs() -> None:
@@ -316,8 +339,8 @@ def test_rest_that_is_not_in_the_frame_is_caught(monkeypatch: pytest.MonkeyPatch
 
     slow: dict[tuple[Rest, int], int] = {}
     monkeypatch.setattr(Rest, "may_rest", may_rest)
-    one = run(world_of("yard"), 1, PATIENT)[0].digests
-    assert run(world_of("yard"), 2, PATIENT, prepare=rebuild_all)[0].digests != one
+    one = run(world_of("yard"), 1, PATIENT).digests
+    assert run(world_of("yard"), 2, PATIENT, prepare=rebuild_all).digests != one
 
 
 @pytest.mark.parametrize(("nodes", "caught"), [(1, Malformed), (3, Stuck)])

@@ -209,11 +209,6 @@ def chain(nodes: int, *, moves: bool = False) -> str:
     return str(done["digest"]["chain"])
 
 
-def test_the_world_is_the_same_on_any_nodes_and_whoever_owns_a_robot() -> None:
-    alone = chain(1)
-    assert chain(2) == alone and chain(3, moves=True) == alone
-
-
 FAILING: Final = '''
 from msgspec import Struct
 
