@@ -170,10 +170,9 @@ def living(what: str) -> Rows:
     data["network"]["links"] = [{"id": "all", "from": "*", "to": "*", **yaml.safe_load(f"{{{LINK}}}")}]
     if not grips:
         data["players"]["script"]["parameters"]["steps"] = []
+    noise = {"kind": "gaussian_noise", "std": {"angular_rate": "0.1 rad/s"}}
     for robot in ("scout", "quad"):
-        data["robots"][robot]["sensors"]["imu"]["modifiers"] = [
-            {"kind": "gaussian_noise", "std": {"angular_rate": "0.1 rad/s"}}
-        ]
+        data["robots"][robot]["sensors"]["imu"]["modifiers"] = [noise]
     data["players"]["ear"] = {**data["players"]["flight"], "robots": {"quad": ["imu"], "scout": ["imu", "pose"]}}
     flights: list[Flight] = []
     frames: list[Frame] = []
