@@ -187,20 +187,11 @@ def kinematic() -> dict[str, Any]:
     return found
 
 
-@cache
-def yard() -> str:
-    """Return a deployment with rigid bodies of all kinds and what moves by kinematics; `files()` has its files."""
+def robots_of_yard() -> dict[str, Any]:
+    """Return robots of all kinds, in places of their own."""
     scan = {"kind": "laser_scanner", "rate": "10 Hz", "rays": 31, "range": "8 m"}
     arm = {"model": "urdf", "file": "arm.urdf", "fixed": True}
-    objects: dict[str, Any] = {
-        name: {**shape, "mass": "1 kg", "at": {"x": "-2 m", "y": "2 m", "z": f"{20 + number * 35} cm"}}
-        for number, (name, shape) in enumerate(SHAPES.items())
-    }
-    place = {"x": "5 cm", "y": "-12 cm", "z": "1.6 m"}
-    light = {"model": "box", "size": ["20 cm"] * 3, "mass": "500 g", "speed_limit": "8 m/s"}
-    objects["crate"] = {**light, "at": place, "count": 5, "spare": 1, "spacing": {"y": "6 cm", "z": "30 cm"}}
-    objects |= {"load": crate(0.0, y=-6.0), "fallen": crate(5.1, y=7.1, z=0.8)}
-    robots: dict[str, Any] = {
+    return {
         **kinematic(),
         "arm": {
             **arm,
@@ -233,6 +224,10 @@ def yard() -> str:
         "eye": head("look_at", {"x": "2 m", "y": "-9 m"}, patience="0.5 s"),
         "head": head("pan_tilt", {"x": "4 m", "y": "-9 m"}),
     }
+
+
+def players_of_yard() -> dict[str, Any]:
+    """Return a driver of each kind of actuator, and the script of the cranes."""
     script = {
         "class": f"{Script.__module__}:Script",
         "rate": "100 Hz",
@@ -241,7 +236,7 @@ def yard() -> str:
         "parameters": {"steps": [list(step) for step in GRIPS]},
     }
     drives = [f"drive-{n}" for n in range(1, 5)]
-    players = {
+    return {
         "efforts": driver(["limp"], "joint_torque", (20.0, 20.0, 10.0, 10.0, 4.0, 4.0, 2.0), "10 Hz")["driver"],
         "flight": driver(["quad"], "rotor_speeds", (900.0,) * 4, "50 Hz")["driver"],
         "push": driver(["pushed"], "force", (20.0, 20.0, 20.0, 0.1, 0.1, 0.1), "50 Hz")["driver"],
@@ -255,6 +250,19 @@ def yard() -> str:
         "script": script,
         **driver(["arm"], "joint_position", (2.5, 1.8, 2.5, 2.0, 2.5, 1.5, 2.5), "5 Hz"),
     }
+
+
+@cache
+def yard() -> str:
+    """Return a deployment with rigid bodies of all kinds and what moves by kinematics; `files()` has its files."""
+    objects: dict[str, Any] = {
+        name: {**shape, "mass": "1 kg", "at": {"x": "-2 m", "y": "2 m", "z": f"{20 + number * 35} cm"}}
+        for number, (name, shape) in enumerate(SHAPES.items())
+    }
+    place = {"x": "5 cm", "y": "-12 cm", "z": "1.6 m"}
+    light = {"model": "box", "size": ["20 cm"] * 3, "mass": "500 g", "speed_limit": "8 m/s"}
+    objects["crate"] = {**light, "at": place, "count": 5, "spare": 1, "spacing": {"y": "6 cm", "z": "30 cm"}}
+    objects |= {"load": crate(0.0, y=-6.0), "fallen": crate(5.1, y=7.1, z=0.8)}
     boxes = {
         f"b{n}": {"at": {"x": f"{n + 4.5} m", "y": "6.5 m"}, "length": "10 cm", "width": "30 cm", "height": "50 cm"}
         for n in range(4)
@@ -274,8 +282,8 @@ def yard() -> str:
             "scene": {"kind": "boxes", "boxes": boxes},
             "surfaces": {"floor": {"friction": 0.9, "restitution": 0.2}},
             "objects": objects,
-            "robots": robots,
-            "players": players,
+            "robots": robots_of_yard(),
+            "players": players_of_yard(),
             "nodes": {"n": {"robots": ["*"]}},
             "network": {"links": [{"id": "all", "from": "*", "to": "*", "delay": "3 ms", "order": "fifo"}]},
             "events": list(EVENTS),
