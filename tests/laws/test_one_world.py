@@ -41,6 +41,7 @@ from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import counters, parked
+from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, build_layout
 from foosim.world.parameters.table import table_of
@@ -218,6 +219,8 @@ def test_who_is_absent_is_nowhere_and_remembers_nothing() -> None:
                     of_absent = parked(layout, entity)
                     for at in sorted({*range(entity.start, entity.stop)} - {*counters(entity)}):
                         assert frame.numbers[at] == of_absent[at - entity.start], (frame.tick, entity.name)
+                    refers = [at for at in layout.references if entity.start <= at < entity.stop]
+                    assert [frame.numbers[at] for at in refers] == [NO_ENTITY] * len(refers)
                     assert entity.index not in frame.outboxes
     assert seen > 500
 
