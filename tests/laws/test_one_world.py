@@ -22,6 +22,7 @@ from foosim.common.batched.noise import NoiseKeys
 from foosim.common.errors import Malformed
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -49,6 +50,7 @@ from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import DEPLOY, still
 from tests.frames import Frames
 from tests.placing import place_ball
+from tests.swarm.world_bounds import strays
 from tests.whole_worlds import NAME, assets, mixed, written, yard
 
 TABLE: Final = DEPLOY / "table.yaml"
@@ -138,6 +140,12 @@ def alone(name: str) -> Ran:
     return found
 
 
+def loaded(name: str) -> Deployment:
+    """Return a world's deployment with its files."""
+    text, files = pin_assets(world_of(name).text, NAME, world_of(name).folder)
+    return load_deployment(text, NAME).with_assets(files)
+
+
 def disturb(system: System, seed: int, ticks: int) -> None:
     """Move robots and make engines anew, lose nodes and the vHub and bring them back, at drawn ticks."""
     shuffle(system, seed=seed, ticks=ticks)
@@ -170,6 +178,8 @@ def test_whoever_computes_it_and_whoever_is_lost_the_world_is_the_same(name: str
     assert told["packets"] == usual.result.json["packets"] and told["handovers"] + told["moves"] > 0
     assert {entry["what"] for entry in told["recoveries"]} >= {"node", "join", "vhub"}
     assert verify_capture(path, 3).equal and what_if(open_capture(path)).changed == 0
+    deployment = loaded(name)
+    assert [wrong for frame in usual.frames[::4] for wrong in strays(deployment, frame)] == [], "out of bounds"
 
 
 def test_on_many_nodes_without_losses() -> None:
@@ -186,8 +196,7 @@ WHOLE: Final = ("mixed", "everything")
 def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
     used: set[tuple[str, str]] = set()
     for name in WHOLE:
-        text, files = pin_assets(world_of(name).text, NAME, world_of(name).folder)
-        used |= {(form.form, form.name) for form in forms_of(load_deployment(text, NAME).with_assets(files))}
+        used |= {(form.form, form.name) for form in forms_of(loaded(name))}
     assert set(own()) - used == ALONE
 
 
@@ -195,8 +204,8 @@ def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
 def test_all_of_it_moves_measures_and_obeys_the_laws(name: str) -> None:
     """Other names, further robots, what comes and goes, readings alone and together."""
     world = world_of(name)
+    assert still(loaded(name), alone(name).frames) == set()
     text, files = pin_assets(world.text, NAME, world.folder)
-    assert still(load_deployment(text, NAME).with_assets(files), alone(name).frames) == set()
     check = ComponentCheck(text, NAME, world.ticks, files=files, run=partial(rehearse, folder=world.folder))
     assert list(check.broken()) == []
     assert name != "mixed" or list(elsewhere(text, NAME, world.ticks, check.first)) == []
@@ -258,10 +267,9 @@ def holders(frame: Frame) -> str:
 
 
 def test_what_is_held_is_in_the_island_of_its_holders_and_is_handed_over() -> None:
-    text, files = pin_assets(yard(), NAME, assets())
     frames = alone("everything").frames
     assert list(dict.fromkeys(map(holders, frames))) == ["", "1", "12", "2"] and holders(frames[-1]) == ""
-    deployment, layout = load_deployment(text, NAME).with_assets(files), frames[0].layout
+    deployment, layout = loaded("everything"), frames[0].layout
     kept, nearest = Volumes(deployment, layout), set[str]()
     for frame in [*frames[::3], *Random(7).sample(frames, 9)]:
         islands = kept.islands(frame.numbers)
