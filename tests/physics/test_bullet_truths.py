@@ -292,6 +292,15 @@ def test_a_motor_gives_its_force(bullet: Make, draws: random.Random) -> None:
         assert spin / seconds == pytest.approx(torque / one.rod_inertia(name), rel=0.001)
 
 
+def test_a_free_rod_keeps_its_speed(bullet: Make) -> None:
+    """Bullet's default damping of joints takes a fifth of it in 0.1 s."""
+    one = bullet(NO_GRAVITY)
+    one.set_rod("red.goal", (0.0, 0.0), (0.5, 50.0))
+    for _ in range(50):
+        one.tick({"red.goal": ((0.0, 0.0), (0.0, 0.0))}, ball=False)
+    assert one.of("red.goal", "joint_velocities", 2) == pytest.approx([0.5, 50.0], rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["red.attack", "blue.goal"])
 def test_hanging_figures_swing_with_their_period(bullet: Make, draws: random.Random, name: str) -> None:
     """2 pi sqrt(I / (m g d)) (1 + a^2 / 16), within 0.5 %: mass, centre and inertia of what turns are in the engine as
