@@ -302,7 +302,7 @@ def test_requests_are_in_the_capture_and_a_run_begins_right_behind_one(tmp_path:
     assert verify_capture(capture, 3).equal
     rows = open_capture(capture).captured_ticks()
     asked_of = {str(what.get("name")) for _, _, what in REQUESTS}
-    assert {edit.name for row in rows for edit in row.edits} == asked_of - {"b", "k"} | {"b-4", "k-3"}
+    assert {getattr(edit, "name", "") for row in rows for edit in row.edits} == asked_of - {"b", "k"} | {"b-4", "k-3"}
     effective = run.answers[asked[1]].tick
     at_s = (effective + 1) * 0.01
     start = read_branch(f"{capture}@{at_s:g}s", load_deployment(its, NAME)).start
