@@ -1,4 +1,4 @@
-"""What is set, added and removed while a world goes on, by events and by requests, and in captures of it."""
+"""What is set, added and removed during a run, by events and by requests, and in its capture."""
 
 from __future__ import annotations
 

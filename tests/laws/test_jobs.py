@@ -1,4 +1,4 @@
-"""Jobs over links that lose, repeat and delay: each begins once, on any number of nodes, whoever leaves meanwhile."""
+"""Jobs over links that lose, repeat and delay: each begins once, also while robots leave and come back."""
 
 from __future__ import annotations
 

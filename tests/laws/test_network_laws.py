@@ -1,4 +1,4 @@
-"""Laws 5 and 6: every offered packet has one fate, and its luck depends on seed, link and number alone."""
+"""Law 5: every offered packet has one fate, on every link at every tick."""
 
 from __future__ import annotations
 

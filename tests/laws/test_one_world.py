@@ -165,7 +165,7 @@ def disturb(system: System, seed: int, ticks: int) -> None:
 
 @pytest.mark.parametrize("name", WORLDS)
 @pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 9))])
-def test_whoever_computes_it_and_whoever_is_lost_the_world_is_the_same(name: str, seed: int, tmp_path: Path) -> None:
+def test_nodes_moves_losses_and_a_bad_bus_give_the_same_world(name: str, seed: int, tmp_path: Path) -> None:
     """To the last bit and packet, and so is its capture: simulated again on three nodes, and judged again."""
     world, usual = world_of(name), alone(name)
     path, weather = tmp_path / "run.mcap", Weather(seed, delay_ns=100_000, spread_ns=2_000_000, loss=0.01, repeat=0.05)
@@ -183,7 +183,7 @@ def test_whoever_computes_it_and_whoever_is_lost_the_world_is_the_same(name: str
 
 
 def test_on_many_nodes_without_losses() -> None:
-    """Objects that are not made anew have other pasts than those that are."""
+    """Engines that are never rebuilt have other pasts than rebuilt ones."""
     for name in ("table", "everything"):
         assert run(world_of(name), 8, PATIENT).digests == alone(name).digests, name
 

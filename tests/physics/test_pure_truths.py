@@ -1,4 +1,4 @@
-"""Physical truths of the pure engine: energy, rebound, no tunnelling, and that it kicks and rolls as Bullet does."""
+"""Physical truths of the pure engine alone: energy, rest, no tunnelling; `test_bullet_truths` has what both engines keep."""
 
 from collections.abc import Callable
 from typing import Any

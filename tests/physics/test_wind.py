@@ -1,4 +1,4 @@
-"""Wind on rigid bodies: against the drag of a box, the same on any number of nodes, and set while a world goes on."""
+"""Wind on rigid bodies: against the drag of a box, and set during a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robots that move by kinematics enter nothing: no scenery, no other robot, no rigid body; whoever computes which."""
+"""Robots that move by kinematics enter nothing: no scenery, no other robot, no rigid body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Modifiers: what each does to readings and commands, and that it is the same on any nodes, whoever owns what."""
+"""Modifiers: what each does to readings and commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sensors: keyed Gaussian noise, rates in whole ticks, and nothing but frame, seed and names in a sample."""
+"""Sensors: keyed Gaussian noise, rates in whole ticks, and the numbering of samples."""
 
 from __future__ import annotations
 
