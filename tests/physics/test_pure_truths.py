@@ -1,4 +1,4 @@
-"""Physical truths of the pure engine alone: energy, rest, no tunnelling; `test_bullet_truths` has what both engines keep."""
+"""Physical truths of the pure engine alone: energy, rest, no tunnelling; those of both are in test_bullet_truths.py."""
 
 from collections.abc import Callable
 from typing import Any
