@@ -68,22 +68,6 @@ def close(state: HubState, frame: Frame, packets: Sequence[RobotPacket], sent: d
     return fates
 
 
-def luck(
-    links: str, order: Sequence[int], skipped: frozenset[int] = frozenset()
-) -> dict[tuple[str, int], tuple[int, ...]]:
-    """Send 40 packets a tick to red.goal in some order of arrival; return the draws by (source, sequence)."""
-    state, frame = state_with(links)
-    draws: dict[tuple[str, int], tuple[int, ...]] = {}
-    for tick in range(6):
-        sent = [Sent(1 + tick * 40 + number, "red.goal", "echo", 0, bytes(8)) for number in order]
-        sent = [packet for packet in sent if packet.sequence not in skipped]
-        for flight in close(state, frame, [], {"player-red": sent}):
-            draws[flight.source, flight.sequence] = flight.words
-    for flight in state.in_flight():
-        draws[flight.source, flight.sequence] = flight.words
-    return draws
-
-
 def test_refused_packets_are_in_no_account() -> None:
     state, frame = state_with(LINK)
     sent = [Sent(1, "nobody", "echo", 0, b""), Sent(2, "red.goal", "echo", 0, b""), Sent(2, "red.goal", "echo", 0, b"")]
