@@ -12,7 +12,6 @@ from foosim.deployment.schema import Deployment
 from foosim.players.workshop import HAND_M as FRONT_M
 from foosim.world.actuators.gripper import Grip
 from tests.forms.worlds import DEPLOY
-from tests.solid_yards import solids_text
 
 __all__ = ["FRONT_M"]
 NAME: Final = "cranes.yaml"
@@ -22,6 +21,32 @@ LIFT_M: Final = 0.1
 TEMPLATES: Final = yaml.safe_load((DEPLOY / "workshop.yaml").read_text())["templates"]
 Step = tuple[int, str, str, Sequence[float]]
 """From which tick on, whom, which actuator, and what it is told."""
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes equal values each time: a deployment has no anchors."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def solids_text(**sections: Any) -> str:
+    """Return a deployment of rigid bodies in an empty yard, on a node."""
+    whole = {
+        "format": 2,
+        "world": "solids",
+        "seed": 1,
+        "tick": "10 ms",
+        "substeps": 4,
+        "engine": "mujoco",
+        "pace": "fast",
+        "assets": "models",
+        "scene": {"kind": "empty"},
+        "nodes": {"n": {"robots": ["*"]}},
+        "network": {"links": [{"id": "all", "from": "*", "to": "*", "delay": "3 ms", "order": "fifo"}]},
+        **sections,
+    }
+    return yaml.dump(whole, Dumper=_Plain, sort_keys=False)
 
 
 class Script(Player):

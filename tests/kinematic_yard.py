@@ -60,7 +60,8 @@ class Yard:
 
     def step(self, ticks: int = 1) -> None:
         for _ in range(ticks):
-            self.solve(self.layout.robots, self.numbers, self.stepper)
+            robots = [robot for robot in self.layout.robots if robot.is_solved]
+            self.solve(robots, self.numbers, self.stepper)
             self.tick += 1
         assert self.stepper.quarantined == []
 

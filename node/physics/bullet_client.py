@@ -81,7 +81,6 @@ def settings_of(physics: Physics, substep_s: float) -> dict[str, Any]:
         "minimumSolverIslandSize": 0,  # else small islands share one solver call, and stop on its common residual
         "solverResidualThreshold": 0,  # else iteration stops on what the other islands of the call are doing
         "contactERP": physics.contact_erp,  # 0.08 by default: restitution would be e + (0 to 0.08)
-        "contactBreakingThreshold": 0.001,  # 20 mm by default: points of contacts that are no more
         "restitutionVelocityThreshold": 0.05,  # slower contacts do not bounce: a sphere comes to rest
         "warmStartingFactor": 0,  # starts from the impulses of the last step, which are not in the frame
         "contactSlop": 0,  # a tolerated penetration shifts where a contact begins

@@ -59,7 +59,7 @@ def test_each_file_says_how_to_use_it(file: str) -> None:
 def test_nothing_in_the_folder_is_unchecked() -> None:
     files = {path.relative_to(DEPLOY).as_posix() for path in DEPLOY.rglob("*") if path.is_file()}
     generated_or_deployment = {file for file in files if file.endswith(".schema.json") or is_deployment(DEPLOY / file)}
-    of_robots = {file for file in files if file.startswith("models/")}  # tests/laws/test_yard.py has them
+    of_robots = {file for file in files if file.startswith("models/")}  # tests/whole_worlds.py has them
     assert files - generated_or_deployment - of_robots == {*USED_BY, "Dockerfile.dockerignore"}
 
 

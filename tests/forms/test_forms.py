@@ -1,8 +1,8 @@
 """Each of foosim's forms in a world of its own: its settings beyond their limits.
 
 `make forms` has the long part: the laws, thousands of ticks by several seeds, and runs with settings at their limits.
-`make test` has the laws of all forms together, in the mixed worlds of tests/laws, and of those alone that these cannot
-have.
+`make test` has the laws of all forms together, in the worlds of tests/whole_worlds.py, and of those alone that these
+cannot have.
 """
 
 from __future__ import annotations
@@ -30,18 +30,12 @@ from tests.frames import Frames, broken_laws
 Key = tuple[str, ...]
 TICKS: Final = 100
 NAME: Final = "world.yaml"
-HEADS: Final = {("actuator", "look_at"), ("actuator", "pan_tilt")}
-"""What turns heads: tests/laws/test_jobs.py has the laws of these."""
-OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque"), *HEADS]
-"""What only a robot from a file has, which a text alone does not bring: tests/laws/test_yard.py has the others."""
+OF_FILES: Final = [("model", "urdf"), *(("actuator", name) for name in ("joint_torque", "look_at", "pan_tilt"))]
+"""What only a robot from a file has, which a text alone does not bring: tests/whole_worlds.py has them."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
-ALONE: Final = {
-    *(("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")),
-    *(("actuator", "go_to"), ("actuator", "gripper"), ("actuator", "joint_trajectory")),
-    *(("sensor", "gripper_state"), ("sensor", "job")),
-}
-"""What no mixed world has: each has one engine and one scene, and none has grippers and jobs."""
+ALONE: Final = {("engine", "pure"), ("scene", "football_table"), ("scene", "hall")}
+"""What no world of tests/whole_worlds.py has: each has one engine and one scene."""
 EACH_ALONE: Final = pytest.mark.parametrize(
     "key", [pytest.param(key, marks=() if key in ALONE else pytest.mark.campaign) for key in ALL], ids="-".join
 )

@@ -18,7 +18,8 @@ import pytest
 import yaml
 
 from foosim.capture.rows import PacketRow
-from foosim.client.player import Commands, Packet, Player, Samples, Turn
+from foosim.client.player import Packet, Player, Samples, Turn
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.rehearsal.journals import ENDINGS, Ending
@@ -26,9 +27,8 @@ from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.world.actuators.go_to import Place
 from foosim.world.frame import Frame
-from tests.kinematic_yard import yard_text
+from tests.whole_worlds import assets, written, yard
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 600
@@ -151,95 +151,46 @@ def test_counts_need_no_memory_a_vhub_that_dies_amid_a_tick_gives_the_same(endin
     assert run(sets, ticks=240, kills={41: ending, 118: ending, 121: ending}) == found
 
 
-NOISE: Final = {"kind": "gaussian_noise"}
-BASE: Final = {
-    "model": "holonomic",
-    "sensors": {
-        "pose": {"kind": "pose", "rate": "50 Hz", "modifiers": [{**NOISE, "std": {"position": "1 cm"}}]},
-    },
-    "actuators": {"go": {"kind": "go_to"}},
+HAPPENS: Final[dict[str, tuple[bool, dict[str, Any]]]] = {
+    "nothing": (False, {}),
+    "a grasp and a job": (True, {}),
+    "a removal": (False, {"entity": "drive-2", "remove": True}),
+    "an addition": (False, {"entity": "drive-4", "add": "6,9"}),
+    "a setting": (False, {"entity": "base-1", "set": {"down": True}}),
 }
-Step = tuple[int, str, str, dict[str, float] | tuple[float, ...]]
-"""From which tick on, whom, which actuator, and what it is told."""
-HAPPENS: Final[dict[str, tuple[list[Step], dict[str, Any]]]] = {
-    "nothing": ([], {}),
-    "an addition and a removal": ([], {"late": {"add": True}, "early": {"remove": True}}),
-    "a job": (
-        [
-            (30, "busy", "go", {"x": -3.0, "y": 4.0, "job": 1.0}),
-            (60, "busy", "go", {"x": -3.0, "y": 8.0, "job": 2.0}),
-        ],
-        {},
-    ),
-    "a grasp": ([(30, "crane", "gripper", {"closed": 1.0}), (40, "crane", "joints", (0.2, 0.1))], {}),
-    "a setting": ([], {"busy": {"set": {"down": True}}}),
-}
-TOUCHED: Final = frozenset(("crane", "busy", "late", "early", "script"))
-WALKS: Final[list[Step]] = [(tick, "walker", "go", {"x": -12.0, "y": tick / 10}) for tick in range(90)]
-CRANES: Final = TABLE.parents[1] / "tests" / "swarm"
-
-
-class Told(Player):
-    """Tells robots what its parameter `steps` says."""
-
-    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
-        self._steps = parameters["steps"]
-
-    def act(self, tick: int, samples: Samples) -> Commands:
-        due = [step for step in self._steps if step[0] == tick]
-        return {
-            robot: {actuator: Place(**values) if actuator == "go" else values} for _, robot, actuator, values in due
-        }
+"""Whether cranes hand a load over, and what an event does to robots that are far from all others."""
+OTHERS: Final = frozenset(("arm", "quad", "scout"))
 
 
 def living(what: str) -> Rows:
-    """What happens to some, and the rows of all others' packets: a base that a player sends about, and a quadrotor
-    that falls, and so never rests."""
-    steps, events = HAPPENS[what]
-    robots: dict[str, Any] = {
-        name: {**BASE, "at": {"x": f"{-3 * place} m", "y": f"{3 * place} m"}}
-        for place, name in enumerate(("busy", "early", "late", "walker"), start=1)
-    }
-    robots["late"]["spare"] = True
-    robots["crane"] = yaml.safe_load((CRANES / "living.yaml").read_text())["templates"]["crane"]
-    imu = {"kind": "imu", "rate": "100 Hz", "modifiers": [{**NOISE, "std": {"angular_rate": "0.1 rad/s"}}]}
-    robots["far"] = {"model": "quadrotor", "at": {"y": "-9 m", "z": "20 m"}, "actuators": {}, "sensors": {"imu": imu}}
-    about = {
-        "class": f"{__name__}:Told",
-        "rate": "100 Hz",
-        "lockstep": True,
-        "robots": {"walker": ["pose"], "far": ["imu"], "crane": ["grip"], "busy": ["pose"]},
-    }
-    text = yard_text(
-        robots,
-        engine="mujoco",
-        substeps=2,
-        assets="models",
-        objects={"crate": {"model": "box", "size": ["20 cm"] * 3, "mass": "4 kg", "at": {"x": "35 cm", "z": "10 cm"}}},
-        players={
-            "script": {**about, "parameters": {"steps": steps}},
-            "talker": {**about, "parameters": {"steps": WALKS}},
-        },
-        network={"links": [{"id": "all", "from": "*", "to": "*", **yaml.safe_load(f"{{{LINK}}}")}]},
-        events=[{"at": "0.5 s", "entity": name, **verb} for name, verb in events.items()],
-    )
+    """Return the rows of all packets of robots that are far from what happens."""
+    grips, event = HAPPENS[what]
+    data = yaml.safe_load(yard())
+    data["events"] = [{"at": "0.3 s", **event}] if event else []
+    data["network"]["links"] = [{"id": "all", "from": "*", "to": "*", **yaml.safe_load(f"{{{LINK}}}")}]
+    if not grips:
+        data["players"]["script"]["parameters"]["steps"] = []
+    noise = {"kind": "gaussian_noise", "std": {"angular_rate": "0.1 rad/s"}}
+    for robot in ("scout", "quad"):
+        data["robots"][robot]["sensors"]["imu"]["modifiers"] = [noise]
+    data["players"]["ear"] = {**data["players"]["flight"], "robots": {"quad": ["imu"], "scout": ["imu", "pose"]}}
     flights: list[Flight] = []
     frames: list[Frame] = []
     settings = Settings(on_closing=lambda closing: flights.extend(closing.fates), on_commit=frames.append)
-    result = rehearse(text, "yard.yaml", 90, 2, settings=settings, folder=CRANES)
+    text = written(data)
+    result = rehearse(text, "yard.yaml", 90, 2, settings=settings, folder=assets())
     assert result.json["reason"] == "done", result.json["reason"]
+    last = frames[-1]
     has_happened = {
-        "an addition and a removal": frames[-1].at("late", "absent") == 0.0 and frames[-1].at("early", "absent") == 1.0,
-        "a job": frames[-1].at("busy", "go.jobs_numbers") == 2.0,
-        "a grasp": frames[-1].at("crane", "gripper.held") >= 0.0,
-        "a setting": frames[-1].at("busy", "down") == 1.0,
+        "a grasp and a job": last.at("crane-1", "gripper.jobs_numbers") > 0.0,
+        "a removal": last.at("drive-2", "absent") == 1.0,
+        "an addition": last.at("drive-4", "absent") == 0.0,
+        "a setting": last.at("base-1", "down") == 1.0,
     }
     assert [one for one, is_so in has_happened.items() if is_so] == [one for one in [what] if one != "nothing"]
-    return {
-        key: row
-        for key, row in rows_of(flights, load_deployment(text, "yard.yaml")).items()
-        if TOUCHED.isdisjoint(key[:2])
-    }
+    pinned, files = pin_assets(text, "yard.yaml", assets())
+    rows = rows_of(flights, load_deployment(pinned, "yard.yaml").with_assets(files))
+    return {key: row for key, row in rows.items() if not OTHERS.isdisjoint(key[:2])}
 
 
 @cache

@@ -144,12 +144,6 @@ def assert_counts_stay(seen: Seen) -> None:
     assert offered == sorted(offered)
 
 
-def test_with_bullet_it_is_the_same() -> None:
-    sets = SETS[1:]
-    seen, usual = fly([(40, kill_hub()), (90, kill_hub("torn"))], 120, sets), fly([], 120, sets)
-    assert_the_same(seen, usual)
-
-
 def test_a_journal_whose_files_began_anew_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Heads between the ticks: a fold begins at one of them, and older ones go."""
     monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)

@@ -2,7 +2,6 @@
 
 Each is a formula from a textbook, with the tolerance to which the engine keeps it; its source and what Bullet does with
 other settings is said beside it. Speeds, angles and phases are drawn; a test that fails prints the seed of its draws.
-What each setting of the engine does for them is in test_engine_settings.py.
 """
 
 from __future__ import annotations
@@ -25,6 +24,8 @@ FOOT = "blue.midfield"
 SEED: Final = 20
 ERPS: Final = (0, 0.01)
 """Exact, and as the table plays: a ball that a figure presses down does not sink then."""
+EACH: Final = pytest.mark.parametrize(("engine", "contact_erp"), [*(("bullet", erp) for erp in ERPS), ("pure", 0)])
+"""The truths that both engines keep."""
 NO_ROLLING: Final = "table.surfaces.floor.rolling_friction=0 mm"
 NO_GRAVITY: Final = "table.gravity=0 m/s2"
 
@@ -63,10 +64,10 @@ def test_a_free_roll_keeps_its_speed(bullet: Make, draws: random.Random, contact
     assert abs(one.position[0] - (-0.25 + 5.0 * speed)) < 1e-6
 
 
-@pytest.mark.parametrize("contact_erp", ERPS)
-def test_energy_of_a_free_ball_never_rises(bullet: Make, draws: random.Random, contact_erp: float) -> None:
+@EACH
+def test_energy_of_a_free_ball_never_rises(world: Make, engine: str, draws: random.Random, contact_erp: float) -> None:
     """By no more than 1e-9 of what it was a substep: over the floor, walls, into goals and corners."""
-    one = bullet(erp(contact_erp))
+    one = world(f"engine={engine}", erp(contact_erp))
     touched = 0
     for _ in range(6):
         start = (draws.uniform(-0.5, 0.5), draws.uniform(-0.25, 0.25), draws.uniform(0.03, 0.06))
@@ -96,11 +97,13 @@ def test_energy_never_rises_in_corner_and_goal(bullet: Make, contact_erp: float,
 # --- 2, 3: rebounds --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("contact_erp", ERPS)
-def test_a_rebound_has_the_pairs_restitution(bullet: Make, draws: random.Random, contact_erp: float) -> None:
+@EACH
+def test_a_rebound_has_the_pairs_restitution(
+    world: Make, engine: str, draws: random.Random, contact_erp: float
+) -> None:
     """e within 1e-4, or e to e + ERP. With Bullet's default contactERP it is e + (0 to 0.08), by the phase of the
     contact within a substep."""
-    one = bullet(NO_GRAVITY, erp(contact_erp))
+    one = world(f"engine={engine}", NO_GRAVITY, erp(contact_erp))
     wanted = one.table.surfaces.walls.restitution
     for speed in (0.3, *(speed_of(draws, 0.3, 15.0) for _ in range(4)), 15.0):
         for phase in range(10):
@@ -108,10 +111,10 @@ def test_a_rebound_has_the_pairs_restitution(bullet: Make, draws: random.Random,
             assert wanted - 1e-4 <= -one.velocity[1] / speed <= wanted + max(contact_erp, 1e-4), (speed, phase)
 
 
-@pytest.mark.parametrize("contact_erp", ERPS)
-def test_an_oblique_rebound_slips_or_rolls(bullet: Make, draws: random.Random, contact_erp: float) -> None:
+@EACH
+def test_an_oblique_rebound_slips_or_rolls(world: Make, engine: str, draws: random.Random, contact_erp: float) -> None:
     """v_t' = v_t - min(mu (v_n + v_n'), 2/7 v_t), v_n' = e v_n, and the spin 5/2 of the change over r."""
-    one = bullet(NO_GRAVITY, erp(contact_erp))
+    one = world(f"engine={engine}", NO_GRAVITY, erp(contact_erp))
     walls = one.table.surfaces.walls
     slips, rolls = 0, 0
     for _ in range(40):
@@ -132,13 +135,13 @@ def test_an_oblique_rebound_slips_or_rolls(bullet: Make, draws: random.Random, c
 # --- 4: rolling and sliding ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("contact_erp", ERPS)
+@EACH
 @pytest.mark.parametrize("rolling", [0.1, 0.2, 0.5])
 def test_rolling_friction_brakes_as_its_formula_says(
-    bullet: Make, draws: random.Random, contact_erp: float, rolling: float
+    world: Make, engine: str, draws: random.Random, contact_erp: float, rolling: float
 ) -> None:
     """a = 5/7 rho g / r, at any speed."""
-    one = bullet(f"table.surfaces.floor.rolling_friction={rolling} mm", erp(contact_erp))
+    one = world(f"engine={engine}", f"table.surfaces.floor.rolling_friction={rolling} mm", erp(contact_erp))
     wanted = 5 / 7 * rolling / 1000 * one.table.gravity / one.table.ball.radius
     for _ in range(6):
         speed = speed_of(draws, 0.05, 0.8) + 0.5 * wanted
@@ -207,14 +210,16 @@ def test_a_dropped_ball_bounces_to_e_squared_of_its_height(
 # --- 7: kicks --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("contact_erp", ERPS)
+@EACH
 @pytest.mark.parametrize("name", ["red.goal", "red.attack", "red.midfield"])
-def test_a_free_rod_kicks_and_recoils(bullet: Make, draws: random.Random, name: str, contact_erp: float) -> None:
+def test_a_free_rod_kicks_and_recoils(
+    world: Make, engine: str, draws: random.Random, name: str, contact_erp: float
+) -> None:
     """v = (1 + e) w a / (1 + m a^2 / I) within 1 %: a rod without recoil would be wrong by up to a factor of two.
 
     The rod keeps w (1 - (1 + e) / (1 + I / (m a^2))) of its spin, within 2 % of w. ERP may add its share to e.
     """
-    one = bullet(erp(contact_erp))
+    one = world(f"engine={engine}", erp(contact_erp))
     more = contact_erp / (1 + one.table.surfaces.figures.restitution)
     arm = one.table.rod.axis_height - one.table.ball.radius
     ratio = one.rod_inertia(name) / (one.table.ball.mass * arm * arm)
@@ -285,6 +290,15 @@ def test_a_motor_gives_its_force(bullet: Make, draws: random.Random) -> None:
         slide, spin = one.of(name, "joint_velocities", 2)
         assert slide / seconds == pytest.approx(force / one.rod_mass(name), rel=0.001)
         assert spin / seconds == pytest.approx(torque / one.rod_inertia(name), rel=0.001)
+
+
+def test_a_free_rod_keeps_its_speed(bullet: Make) -> None:
+    """Bullet's default damping of joints takes a fifth of it in 0.1 s."""
+    one = bullet(NO_GRAVITY)
+    one.set_rod("red.goal", (0.0, 0.0), (0.5, 50.0))
+    for _ in range(50):
+        one.tick({"red.goal": ((0.0, 0.0), (0.0, 0.0))}, ball=False)
+    assert one.of("red.goal", "joint_velocities", 2) == pytest.approx([0.5, 50.0], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["red.attack", "blue.goal"])

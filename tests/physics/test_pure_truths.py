@@ -1,4 +1,4 @@
-"""Physical truths of the pure engine: energy, rebound, no tunnelling, and that it kicks and rolls as Bullet does."""
+"""Physical truths of the pure engine alone: energy, rest, no tunnelling; those of both are in test_bullet_truths.py."""
 
 from collections.abc import Callable
 from typing import Any
@@ -48,24 +48,6 @@ def test_a_ball_comes_to_rest(pure: Make) -> None:
     assert one.velocity == [0.0, 0.0, 0.0] and one.spin[:2] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("speed", [0.3, 1.0, 3.0, 8.0, 15.0])
-def test_a_rebound_has_the_pairs_restitution(pure: Make, speed: float) -> None:
-    one = pure("table.gravity=0 m/s2")
-    for phase in range(10):
-        one.bounce_off_side(speed, phase / 10)
-        assert -one.velocity[1] / speed == pytest.approx(one.table.surfaces.walls.restitution, rel=1e-12)
-
-
-@pytest.mark.parametrize("along", [0.2, 1.0, 5.0])
-def test_an_oblique_rebound_slips_or_rolls(pure: Make, along: float) -> None:
-    one = pure("table.gravity=0 m/s2")
-    one.bounce_off_side(speed=4.0, phase=0.3, along=along)
-    walls = one.table.surfaces.walls
-    change = min(walls.friction * (1 + walls.restitution) * 4.0, 2 / 7 * along)
-    assert one.velocity[0] == pytest.approx(along - change, rel=1e-12)
-    assert one.spin[2] == pytest.approx(2.5 * change / one.table.ball.radius, rel=1e-12)
-
-
 @pytest.mark.parametrize(("speed", "turning"), [(15.0, 0.0), (15.0, 140.0)])
 def test_no_ball_passes_a_foot(pure: Make, speed: float, turning: float) -> None:
     one = pure()
@@ -82,24 +64,6 @@ def test_no_ball_passes_a_wall(pure: Make, speed: float) -> None:
             one.tick()
             assert one.position[0] < one.table.field.length / 2
             assert one.position[1] < one.table.field.width / 2
-
-
-def test_rolling_friction_brakes_as_its_formula_says(pure: Make) -> None:
-    one = pure()
-    one.roll(x=-0.3, speed=0.5, seconds=0.5)
-    wanted = 5 / 7 * one.table.surfaces.floor.rolling_friction * one.table.gravity / one.table.ball.radius
-    assert (0.5 - one.velocity[0]) / 0.5 == pytest.approx(wanted, rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["red.goal", "red.attack", "red.midfield"])
-def test_a_free_rod_kicks_and_recoils_as_in_bullet(pure: Make, world: Make, name: str) -> None:
-    one, other = pure(), world("engine=bullet")
-    for turning in (20.0, 60.0, 120.0):
-        speed, theory, left = one.kick(name, turning)
-        bullets_speed, _, bullets_left = other.kick(name, turning)
-        assert speed == pytest.approx(theory, rel=0.02)
-        assert speed == pytest.approx(bullets_speed, rel=0.01)
-        assert left == pytest.approx(bullets_left, rel=0.05)
 
 
 def test_a_pinned_ball_stops_the_foot(pure: Make) -> None:

@@ -9,11 +9,11 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
+from foosim.world.parameters.hall import hall_of
 from tests.deployment.halls import hall, problems_of
 from tests.kinematic_yard import TICK_S, Yard, yard_text
 
@@ -197,16 +197,23 @@ def test_a_rover_of_a_hall_has_the_halls_battery() -> None:
     rover = "robots: {r: {model: rover, x: 1 m, y: 1 m, rules: {battery: {kind: battery, capacity: 1 kJ}}}}\n"
     (problem,) = problems_of(hall(rover))
     assert "robots.r.rules.battery.capacity: not of a rover of the hall" in problem
-
-
-def test_batteries_are_one_world_on_any_number_of_nodes() -> None:
-    rules = battery(capacity="30 J", chargers=[{"tag": "tanker", "radius": "1 m", "power": "100 W"}, CIRCLE])
-    path = ("-2 m", "60 cm"), ("2 m", "60 cm")
-    robots = {
-        "a": {"model": "holonomic", "rules": rules, "sensors": {"gauge": {"kind": "battery", "rate": "7 Hz"}}},
-        "b": mover(*path, tags=["tanker"], rules=battery(), loop=True),
-        "c": mover(("3 m", "0 m"), ("3 m", "5 m"), rules=rules),
-    }
-    one, *others = (rehearse(yard_text(robots), "yard.yaml", 200, nodes) for nodes in (1, 2, 3))
-    assert not one.json["failed"]
-    assert all(other.digests == one.digests for other in others)
+    world = Yard(
+        hall("robots: {s: {model: station, x: 0 m, y: 0 m}, r: {model: rover, x: 9 m, y: 0 m, charge: 50 %}}\n")
+    )
+    its = hall_of(world.deployment)
+    full, idle = its.rover.battery.capacity, its.rover.battery.idle
+    assert world.vector("r", "charge") == [0.5 * full]
+    world.put("r", "drive.set_point", 0.5, 0.5)
+    world.step(50)
+    gone = world.vector("r", "wheel_travel")[0]
+    assert world.vector("r", "charge")[0] == pytest.approx(0.5 * full - idle - its.rover.battery.drag * gone)
+    world.put("r", "drive.set_point", 0.0, 0.0)
+    for reach, gives in ((0.01, 0.0), (-0.01, its.station.charge_power)):
+        world.put("r", "wheel_speeds", 0.0, 0.0)
+        world.put("r", "position", its.station.charge_radius + reach)
+        before = world.vector("r", "charge")[0]
+        world.step(50)
+        assert world.vector("r", "charge")[0] - before == pytest.approx(gives - idle)
+    world.put("r", "charge", full - 0.5)
+    world.step()
+    assert gone > 0.3 and world.vector("r", "charge") == [full]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from math import cos, inf, pi, radians, sin, sqrt, tan
 from typing import Any, Final
@@ -13,6 +14,7 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.sensing import Sensing
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView, View
 from foosim.world.layout import Entity, build_layout
@@ -205,3 +207,21 @@ def test_forms_ask_their_surroundings_for_rays_and_clearance_at_the_start_of_the
     assert around.clearance(view, beside, 3.0, robot.rover) == pytest.approx([0.1])
     assert around.clearance(view, beside, 3.0, robot.layout["rover02"]) == pytest.approx([0.15]), "the floor"
     assert around.clearance(view, beside, 0.05).tolist() == [inf]
+
+
+def test_beyond_its_range_a_ray_has_no_noise(fleet_text: Text) -> None:
+    noise = "modifiers: [{kind: gaussian_noise, std: 0.2 m}]"
+    robot = Robot(fleet_text, f"kind: proximity, rays: 16, range: 4 m, {noise}", "robots.rover01.x=18 m")
+    one, numbers = robot.sensor(), robot.numbers
+    drawn = [sample_of(one, SensingView(tick, numbers, np.array(numbers))) for tick in range(50)]
+    assert {ways[8] for ways in drawn} == {4.0}, "behind it is nothing"
+    ahead = [ways[0] for ways in drawn]
+    assert len(set(ahead)) == 50 and sum(ahead) / 50 == pytest.approx(1.7, abs=0.1)
+    assert all(0.0 <= way <= 4.0 for ways in drawn for way in ways)
+    assert len({ways[0] - ways[1] for ways in drawn}) == 50, "each ray has noise of its own"
+
+
+def sample_of(one: FittedSensor, view: SensingView) -> tuple[float, ...]:
+    (raw,) = Sensing().sample([one], view)
+    assert raw is not None
+    return struct.unpack(f"<{len(raw) // 8}d", raw)

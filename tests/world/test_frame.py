@@ -191,20 +191,6 @@ def after(edits: list[Edit], numbers: list[float] = AT_START) -> list[float]:
     return written(WITH_SPARES, numbers, edits)
 
 
-def test_spares_are_absent_until_they_are_added_and_as_they_were_when_they_are_removed() -> None:
-    two = after([added("ball-2"), added("ball-3")])
-    names = [entity.name for entity in WITH_SPARES.present(AT_START)]
-    assert [entity.name for entity in WITH_SPARES.present(two)] == sorted([*names, "ball-2", "ball-3"])
-    assert WITH_SPARES.spares == {"ball-2", "ball-3"} and not WITH_SPARES["ball"].can_leave
-    assert after([Remove("ball-3"), Remove("ball-2")], two) == AT_START
-    assert after([Remove("ball-2"), added("ball-2")], two) == two
-
-
-def test_what_is_absent_is_far_below_and_far_from_the_next_that_is() -> None:
-    places = [Frame(0, WITH_SPARES, np.array(AT_START)).vector(name, "position", 3) for name in ("ball-2", "ball-3")]
-    assert all(z < -1e5 for _, _, z in places) and abs(places[0][0] - places[1][0]) >= 1000.0
-
-
 NOTHING: Final[list[Edit]] = [
     added("ball"),
     Add("world", []),
@@ -230,12 +216,6 @@ def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
     assert fitting(AT_START, [edit]) == []
     assert after([edit]) == AT_START
     assert fitting(AT_START, [added("ball-3"), edit]) == [added("ball-3")]
-
-
-def test_edits_fit_in_their_order() -> None:
-    push = Push("ball-2", HERE)
-    edits: list[Edit] = [push, added(), push, added(), Remove("ball-2"), push, Remove("ball-2")]
-    assert fitting(AT_START, edits) == [added(), push, Remove("ball-2")]
 
 
 @settings(max_examples=200)

@@ -1,4 +1,4 @@
-"""Robots that move by kinematics enter nothing: no scenery, no other robot, no rigid body; whoever computes which."""
+"""Robots that move by kinematics enter nothing: no scenery, no other robot, no rigid body."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 import yaml
 
 from foosim.common.errors import DeploymentError
-from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
 from foosim.world.clearance.solids import scenery_of
@@ -120,24 +119,6 @@ def test_twenty_robots_among_boxes_enter_nothing() -> None:
 @pytest.mark.parametrize("seed", range(2, 22))
 def test_twenty_robots_among_boxes_enter_nothing_for_long(seed: int) -> None:
     assert campaign(seed, 20, 3_000) > 1_000
-
-
-def test_whoever_computes_which_the_bits_are_the_same() -> None:
-    """Each robot by a node that is drawn, in batches of whatever size, is as all of them by one."""
-    yard = Yard(crowd(1, 20))
-    nodes = [Stepper(yard.deployment, yard.layout) for _ in range(3)]
-    for tick in range(120):
-        command_all(yard)
-        before, joined = yard.numbers.copy(), yard.numbers.copy()
-        owner = {r.name: draw_words(draw_key(3, r.name), tick)[0] % 3 for r in yard.layout.robots}
-        for number, stepper in enumerate(nodes):
-            mine, numbers = [r for r in yard.layout.robots if owner[r.name] == number], before.copy()
-            if mine:
-                yard.solve(mine, numbers, stepper)
-            for robot in mine:
-                joined[robot.start : robot.split] = numbers[robot.start : robot.split]
-        yard.step()
-        assert joined == yard.numbers, tick
 
 
 @pytest.mark.parametrize(("yaw", "gap"), [(0.0, 1.5), (45.0, 2.0 - 2**0.5 / 2)])

@@ -14,7 +14,6 @@ import pytest
 
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import ComponentCheck, used_form
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.simulation import Simulation
 from foosim.rehearsal.system import Settings, System
@@ -343,16 +342,6 @@ def test_all_of_it_happens() -> None:
     fires = [name for name in ("fire-1", "fire-2", "fire-3") if last.at(name, "radius") > 0.0]
     assert len(fires) == 1 and last.at("scout", "burns.burnt") == 1.0
     assert last.at("door-1", "opened") > 0.5 and last.at("world", "breeze.x") == -5.0
-
-
-def test_the_components_pass_their_check() -> None:
-    """All events come within it: on any number of nodes, too."""
-    text = in_the_docs(*SOON)
-    for name in ("model door", "model fire", "thermometer", "burns", "wind"):
-        assert used_form(text, NAME, name).name == name.rpartition(" ")[2]
-    check = ComponentCheck(text, NAME, 120)
-    assert list(check.broken()) == []
-    assert check.compared > 0
 
 
 def test_what_can_be_set_is_told() -> None:

@@ -146,20 +146,7 @@ def test_the_tick_makes_the_island_not_the_speed() -> None:
     assert len(islands(LAYOUT, {"ball": (0.1, 0.0, RADIUS)}, slower)) < len(at_rest)
 
 
-def test_every_rod_far_from_the_ball_is_an_island_of_its_own() -> None:
-    found = islands(LAYOUT, {"ball": (0.59, 0.0, RADIUS)})
-    assert sorted(map(len, found)) == [1] * 7 + [2]
-    assert {"ball", "blue.goal"} in found
-
-
 # --- solvers ---------------------------------------------------------------------------------------------------------
-
-
-def test_the_owner_of_the_nearest_rod_solves_the_ball() -> None:
-    owners = {name: f"n-{name.replace('.', '-')}" for name in DEPLOYMENT.robots}
-    for name, axis in AXES.items():
-        assert solver_of_ball((axis + 0.02, 0.1, RADIUS), owners) == owners[name]
-        assert solver_of_ball((axis - 0.07, 0.1, RADIUS), owners) == owners[name]
 
 
 def test_ties_go_to_the_first_name() -> None:
@@ -174,13 +161,6 @@ def test_ties_go_to_the_first_name() -> None:
 def test_a_ball_off_the_table_is_the_first_nodes(position: Position) -> None:
     assert with_ball(position) == {"ball"}
     assert solver_of_ball(position, dict.fromkeys(DEPLOYMENT.robots, "z") | {"red.attack": "b"}) == "b"
-
-
-def test_the_world_and_what_has_no_rod_are_the_first_nodes_and_cameras_their_owners() -> None:
-    shares = assignment(LAYOUT, ["n1", "n2", "n3"]).shares(numbers_with(LAYOUT, {}))
-    assert LAYOUT["world"].index in shares["n1"].solved
-    owner = assignment(LAYOUT, ["n1", "n2", "n3"]).owners["camera"]
-    assert LAYOUT["camera"].index in shares[owner].solved
 
 
 @settings(max_examples=150)
@@ -213,21 +193,6 @@ def test_every_entity_has_one_solver_and_islands_are_never_split(balls: dict[str
             ]
             expected = owners[min(near)[1]] if near else (owners[rods[0]] if rods else "n1")
             assert node == expected, (balls, island)
-
-
-def test_balls_that_share_a_rod_are_one_island_with_the_nearest_rod_of_any() -> None:
-    x = AXES["red.attack"]
-    far = {"ball-2": (5.0, 0.0, RADIUS)}
-    both = islands(THREE, {**far, "ball": (x - 0.16, -0.3, RADIUS), "ball-3": (x + 0.05, 0.3, RADIUS)})
-    assert {"ball-2"} in both
-    assert {"ball", "ball-3", "red.attack"} <= next(island for island in both if "ball" in island)
-    apart = islands(THREE, {**far, "ball": (-0.55, 0.0, RADIUS), "ball-3": (0.55, 0.0, RADIUS)})
-    assert not any({"ball", "ball-3"} <= island for island in apart)
-
-
-def test_balls_near_each_other_belong_together_also_off_the_rods() -> None:
-    high = islands(THREE, {"ball-2": (0.0, 0.0, 0.9), "ball": (0.1, 0.1, 1.0), "ball-3": (0.0, 0.0, 1.5)})
-    assert {"ball-2", "ball"} in high and {"ball-3"} in high
 
 
 def test_moving_the_ball_a_little_does_not_make_new_shares() -> None:

@@ -14,6 +14,7 @@ from foosim.world.actuators.x_y_w import Velocity
 from foosim.world.assembly.world import TOGETHER_MIN
 from foosim.world.components.fitted import actuators_of, sensors_of
 from foosim.world.components.view import ComponentError, View, WritableView, has_together
+from foosim.world.moving.wheels import slips_of, wheels_of
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
 QUICK: Final = {"acceleration": "100 m/s2"}
@@ -111,6 +112,19 @@ def test_wheel_speeds_drive_any_robot_on_two_wheels() -> None:
     yard.step(50)
     assert yard.vector("r", "wheel_travel") == pytest.approx([0.2, 0.5])
     assert yard.vector("r", "heading")[0] == pytest.approx(0.6 / 0.4 * 0.5)
+
+
+def test_a_wheel_that_slips_rolls_less_far_than_it_turns() -> None:
+    wheels = {"model": "differential_drive", **QUICK, "slip": "20 %"}
+    yard = Yard(yard_text({"r": wheels, "s": {**wheels, "at": {"y": "2 m"}}}))
+    slips = wheels_of(yard.deployment, yard.layout, yard.layout["r"]).slips
+    assert 0.0 < min(slips) < max(slips) < 0.2
+    assert slips != slips_of(yard.deployment, "s", 0.2), "each robot has its own"
+    actuator(yard, "r").accept(Motion(0.5, 0.0), WritableView(0, yard.numbers))
+    yard.step()
+    assert yard.vector("r", "wheel_travel")[0] == pytest.approx(0.005)
+    x, y, _ = yard.vector("r", "position")
+    assert hypot(x, y) == pytest.approx(0.005 * (1 - sum(slips) / 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("draw", range(6))

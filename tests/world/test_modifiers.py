@@ -1,9 +1,8 @@
-"""Modifiers: what each does to readings and commands, and that it is the same on any nodes, whoever owns what."""
+"""Modifiers: what each does to readings and commands."""
 
 from __future__ import annotations
 
 import struct
-from functools import partial
 from itertools import pairwise
 from math import pi, sqrt
 from pathlib import Path
@@ -18,7 +17,6 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
 from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import System
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
@@ -180,38 +178,6 @@ def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> N
     both = [(twice.read(tick, 0.0) or (0.0,))[0] for tick in range(500)]
     assert np.std(both) == pytest.approx(0.001 * sqrt(2), rel=0.1), "draws of their own"
     assert len({*first} & {*both}) == 0
-
-
-MODIFIED: Final = (
-    f"{ENCODER}.modifiers=[{{kind: bias_walk, initial: {{slide: 1 mm}}, walk: {{spin: 1 deg}}}}, "
-    "{kind: delay, time: 25 ms}, {kind: drop_out, probability: 10 %}, {kind: quantise, step: {slide: 0.1 mm}}, "
-    "{kind: clip, high: {slide: 5 cm}}, {kind: gaussian_noise, std: {slide: 0.2 mm, spin: 1 deg}}]",
-    "robots.camera.sensors.ball.modifiers=[{kind: frame_change, yaw: 10 deg}, {kind: delay, time: 10 ms}]",
-    "robots.blue.goal.actuators={position: {kind: rod_position, modifiers: [{kind: delay, time: 15 ms}, "
-    "{kind: drop_out, probability: 5 %}, {kind: gaussian_noise, std: {spin: 1 deg}}]}}",
-    "table.rules.kickoff_delay=20 ms",
-)
-TICKS: Final = 240
-
-
-def chain(nodes: int, *, moves: bool = False) -> str:
-    """Return the digest of all ticks with every modifier in use."""
-
-    def prepare(system: System) -> None:
-        if moves:
-            for number, (robot, node) in enumerate((("red.goal", "n2"), ("camera", "n3"), ("blue.goal", "n1"))):
-                tick = 40 + 50 * number
-                system.at_tick(tick, partial(system.request, "move", robot=robot, node=node))
-
-    sets = (*MODIFIED, "engine=pure")
-    done = rehearse(TEXT, TABLE.name, TICKS, nodes, sets, prepare=prepare).json
-    assert not done["failed"] and (done["moves"] >= 2) == moves
-    return str(done["digest"]["chain"])
-
-
-def test_the_world_is_the_same_on_any_nodes_and_whoever_owns_a_robot() -> None:
-    alone = chain(1)
-    assert chain(2) == alone and chain(3, moves=True) == alone
 
 
 FAILING: Final = '''

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
-from foosim.world.clearance.hall_obstacles import obstacles_of
-from foosim.world.clearance.hall_start import start_findings
+from foosim.world.clearance.hall_obstacles import obstacles_of, start_findings
 from foosim.world.forms.registry import kit
-from foosim.world.parameters.hall import HALL, Hall
-from foosim.world.parameters.hall_checks import hall_findings
+from foosim.world.parameters.hall import HALL, Hall, hall_findings
 from foosim.world.scene import Shape
 from foosim.world.scenes.hall import hall_scenery
 from foosim.world.spec import WorldSpec

@@ -4,9 +4,11 @@ Frame of reference: x along the hall, y across it, z up, the origin on the floor
 units here. Sources of the numbers are in deploy/warehouse.yaml.
 """
 
+from collections.abc import Iterator
 from typing import Annotated, Final
 
 from foosim.common import units
+from foosim.common.finding import Finding
 from foosim.common.spec_base import Length, SpecBase
 from foosim.common.units import Quantity
 from foosim.world.spec import WorldSpec
@@ -85,3 +87,15 @@ class Hall(SpecBase):
 def hall_of(spec: WorldSpec) -> Hall:
     """Return the hall of a world that has one."""
     return spec.section(HALL, Hall)
+
+
+def hall_findings(hall: Hall) -> Iterator[Finding]:
+    """Yield what is wrong between the settings of a hall."""
+    rover = hall.rover
+    if 2 * rover.radius > min(hall.length, hall.width):
+        yield Finding((HALL, "rover", "radius"), "more than half of the hall's least side")
+    if rover.drive.track > 2 * rover.radius:
+        what = "the wheels would be outside of the rover: more than twice its radius"
+        yield Finding((HALL, "rover", "drive", "track"), what)
+    if rover.battery.empty >= rover.battery.full:
+        yield Finding((HALL, "rover", "battery", "empty"), "not below the full battery's voltage")
