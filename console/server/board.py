@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
@@ -24,13 +24,6 @@ WATCHED_MAX: Final = 64
 KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence", "jobs"})
 """Messages of which the last one is kept for those that join, and of which only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
-
-
-class Onlooker(Protocol):
-    """Observes the moments of all sources, for comparisons of two of them."""
-
-    def saw(self, source: int, moment: Moment) -> Iterable[Mapping[str, Any]]:
-        """Return complete messages for pages."""
 
 
 @dataclass
@@ -62,14 +55,13 @@ class Board:
         sources: Sequence[Source],
         version: str,
         clock: Callable[[], float],
-        onlookers: Sequence[Onlooker] = (),
         cut_off: Callable[[Reader, str], None] = lambda reader, why: None,
     ) -> None:
         """`clock` gives seconds; `cut_off` ends the connection of a reader."""
         self.sources = sources
         self.readers: dict[str, Reader] = {}
         """By name."""
-        self._version, self._clock, self._onlookers, self._cut_off = version, clock, onlookers, cut_off
+        self._version, self._clock, self._cut_off = version, clock, cut_off
         self._told = [Told(source.about) for source in sources]
         self._wanted = [Wanted() for _ in sources]
 
@@ -209,9 +201,6 @@ class Board:
         now_s = self._clock()
         for reader in self.readers.values():
             reader.show(told.shown, now_s)
-        for onlooker in self._onlookers:
-            for message in onlooker.saw(source, moment):
-                self.tell(source, message)
 
     def tell(self, source: int, message: Mapping[str, Any]) -> None:
         told, kind = self._told[source], message["type"]

@@ -24,7 +24,7 @@ from websockets.http11 import Request, Response
 
 from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import encode_json
-from foosim.console.server.board import Board, Onlooker
+from foosim.console.server.board import Board
 from foosim.console.server.page_files import HEADERS, page_files
 from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Ask, Hello, read_message
 from foosim.console.server.reader import Reader, Role, TooSlow
@@ -80,13 +80,11 @@ def new_tokens() -> Tokens:
 class ConsoleServer:
     """Serves sources to browsers."""
 
-    def __init__(
-        self, sources: Sequence[Source], tokens: Tokens, version: str, onlookers: Sequence[Onlooker] = ()
-    ) -> None:
+    def __init__(self, sources: Sequence[Source], tokens: Tokens, version: str) -> None:
         """Call it in a running event loop."""
         self._loop = asyncio.get_running_loop()
         self._sources, self._tokens = sources, tokens
-        self.board = Board(sources, version, self._loop.time, onlookers, self._cut_off)
+        self.board = Board(sources, version, self._loop.time, self._cut_off)
         self._files = page_files()
         self._connections: dict[str, ServerConnection] = {}
         """Of readers, by their name."""

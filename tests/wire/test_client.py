@@ -102,7 +102,7 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
                 elif packet.source == "hand":
                     heard.append(packet.payload)
         assert {int(payload) for payload in back + heard} <= set(range(1, number + 1))
-        control.down()
+        control.request("down")
         with pytest.raises(RunEnded):
             while True:
                 client.receive(PATIENCE_S)
