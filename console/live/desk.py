@@ -11,7 +11,7 @@ from typing import Any, Final
 from foosim.client.client import AGAIN_S, CalledJob, Client
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
-from foosim.console.shown.sendable import jobs_of
+from foosim.console.shown.scene_json import jobs_of
 from foosim.deployment.schema import Deployment
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.forms.jobs import JobState

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from foosim.console.shown.poses import packed
+from foosim.console.shown.drawing import packed
 from foosim.console.shown.source import Curve, Link, Moment
 
 Role = Literal["viewer", "operator"]

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.console.shown.sendable import jobs_content
+from foosim.client.commands import CommandEncoder
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
@@ -17,6 +17,7 @@ from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.sensors.job import JobSettings
 from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -188,3 +189,20 @@ def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:
     boxes += [swept_box(body) for body in scene.bodies.values() if body.links[0].joint != "free"]
     boxes = [box for box in boxes if np.isfinite(box).all()]
     return enclosing(boxes) if boxes else ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+
+
+def jobs_of(deployment: Deployment, robot: str) -> dict[str, str]:
+    """Return the actuators of a robot of whose jobs a sensor tells, each with that sensor's channel."""
+    sensors = sorted(deployment.robots[robot].sensors.items(), reverse=True)  # of several the first by name tells
+    return {its.actuator: channel for channel, its in sensors if isinstance(its, JobSettings)}
+
+
+def jobs_content(deployment: Deployment, entity: str) -> list[dict[str, Any]]:
+    """Return them as pages read it, with the names of their commands' numbers; none of what is no robot."""
+    if entity not in deployment.robots:
+        return []
+    encoder = CommandEncoder(deployment)
+    return [
+        {"actuator": actuator, "numbers": [field.name for field in encoder.actuator(entity, actuator).fields]}
+        for actuator in sorted(jobs_of(deployment, entity))
+    ]

@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from foosim.common.errors import Refused
 from foosim.console.server.server import ConsoleServer, Tokens
-from foosim.console.shown.poses import HEAD, Poser
+from foosim.console.shown.drawing import HEAD, Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment

@@ -18,9 +18,8 @@ from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory, PacketMark
 from foosim.console.recorded.recording import Recording
-from foosim.console.shown.asked import edit_text
 from foosim.console.shown.source import Curve
-from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
+from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents, edit_text
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame

@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from foosim.console.shown.drawing import Drawing
-from foosim.console.shown.poses import Poser
+from foosim.console.shown.drawing import Drawing, Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
