@@ -308,21 +308,6 @@ def test_a_go_out_of_turn_is_refused() -> None:
 # --- free-running ----------------------------------------------------------------------------------------------------
 
 
-def test_a_free_running_client_hears_and_is_not_waited_for() -> None:
-    air = Air()
-    core = air.enter("ear", 0)
-    air.start()
-    for tick in range(6):
-        core.send([ECHO], stamp_ns=7)
-        air.carry(core)
-        air.close()
-        assert air.closed() == tick
-    air.carry(core)
-    assert [packet.payload for packet in core.arrivals] == [b"%16d" % tick for tick in (0, 5)]
-    assert [[packet.sequence for packet in d.packets] for d in air.deliveries] == [[], [1], [2], [3], [4], [5], [6]]
-    assert (core.tick, core.go, core.statistics().received, core.statistics().missing) == (5, None, 2, 0)
-
-
 def test_downlinks_in_another_order_are_all_taken_and_once_each() -> None:
     core = in_run()
     packets = [Received("red.goal", number, 0, "echo", 0, 0, b"%d" % number) for number in range(6)]

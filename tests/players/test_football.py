@@ -101,18 +101,6 @@ def test_the_striker_lets_the_ball_of_its_own_defence_pass(name: str) -> None:
         assert bench.forward(line, commands) < -1.0, "feet behind the rod and above the ball"
 
 
-def test_both_teams_play_alike() -> None:
-    """The table is the same from either side; only where a shot aims is each team's own affair."""
-    red, blue = Bench("red"), Bench("blue")
-    for turn in range(20):
-        x, y = 0.01, 0.015 * turn - 0.15
-        mine, other = red.act(x, y), blue.act(x, y)
-        assert len(mine) == len(LINE_NAMES)
-        for line in LINE_NAMES:
-            command = mine[f"red.{line}"]
-            assert other[f"blue.{line}"] == Command(command.slide, -command.spin)
-
-
 def test_nothing_is_commanded_before_the_ball_and_the_rod_were_seen() -> None:
     team = Team(DEPLOYMENT, {"team": "red"})
     rod = Sample("red.goal", "encoder", 0, 0, 0, RodPosition(0.0, 0.0))
