@@ -116,7 +116,7 @@ class Control:
 
     def view(self, inbox: Inbox) -> None:
         """Offer the frames that are shown to an inbox, as (key of `channels.VIEW`, ..., a `Commit`'s bytes). They come
-        while somebody has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
+        while a viewer has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
         """
         self._session.subscribe(channels.VIEW.key_for_all, channels.VIEW.key, inbox)
 

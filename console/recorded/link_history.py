@@ -1,6 +1,6 @@
-"""What each link of a captured run did up to any time: windows of seconds behind the slider, and the last drops.
+"""What each link of a captured run did up to any time: windows of seconds up to the slider, and the last drops.
 
-Packets come in the order of the file; per link their times are sorted when they are asked for, and a window is two
+Packets come in the order of the file; per link their times are sorted at a request, and a window is two
 searches. A packet is offered when it was sent, delivered at the tick of its arrival, dropped at its sending or, where
 it had come so far, at its arrival: as the totals of a running vHub count. Pure: neighbours are `capture_history`, which
 reads, and `links`, which places them in the world.
@@ -72,7 +72,7 @@ class Timed:
         return self._sorted
 
     def span(self, after_ns: int, until_ns: int) -> tuple[int, int]:
-        """Return which of them, in order, are behind one time and not behind another, as first and stop."""
+        """Return the range of them, in order, after one time and up to another, as first and stop."""
         times = self.in_order()[0]
         return int(times.searchsorted(after_ns, "right")), int(times.searchsorted(until_ns, "right"))
 
@@ -124,7 +124,7 @@ class LinkHistory:
         `delay_ms` is the mean of what arrived in the window (null for nothing), `queue_ms` what the newest packet
         waited, `loss` the share of what was decided.
         """
-        told = []
+        found = []
         for (source, destination, rule), record in sorted(self._links.items()):
             if only is not None and only != (source, destination):
                 continue
@@ -140,7 +140,7 @@ class LinkHistory:
             delivered, dropped = arrived_to - arrived, sum(causes.values())
             delays = record.delivered.in_order()[2]
             delay_ns = (int(delays[arrived_to]) - int(delays[arrived])) / delivered if delivered else None
-            told.append(
+            found.append(
                 {
                     "from": source,
                     "to": destination,
@@ -154,7 +154,7 @@ class LinkHistory:
                     "causes": causes,
                 }
             )
-        return told
+        return found
 
     def totals(self, at_ns: int) -> dict[str, int]:
         """Return how many packets were offered, delivered and dropped by a time, and are under way."""

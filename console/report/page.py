@@ -1,7 +1,7 @@
 """A report as one self-contained HTML page: it loads nothing, and its tables need no script.
 
 The script that draws charts and map is that of the console's page; it is in the page, with its data. All texts are
-escaped, also those that the capture's own makers chose.
+escaped, also those of the capture's makers.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from foosim.world.frame import Frame
 from foosim.world.setting.settable import WITH_A_PLACE
 
 MARKS_MAX: Final = 400
-"""Marks of one kind; those that come later are counted."""
+"""Marks of one kind; later ones are counted."""
 DROP_BINS: Final = 120
 """Marks of drops: each is of a span of time."""
 FINE_BINS: Final = 8192
@@ -85,7 +85,7 @@ class WorldEvents:
 
 
 class Timeline:
-    """Gathers the marks of a run; `news` gives those that came since."""
+    """Gathers the marks of a run; `news` gives the new ones."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -114,7 +114,7 @@ class Timeline:
             self._add(mark)
 
     def take_edits(self, tick: int, edits: Iterable[EditRow]) -> None:
-        """Take what was asked for in the tick that led to a frame."""
+        """Take the requests of the tick that led to a frame."""
         for edit in edits:
             if edit.kind == "network":
                 self._add(Mark(tick, NETWORK, self._network_text(edit.event, tick)))
@@ -208,7 +208,7 @@ def _vector(numbers: Sequence[float]) -> str:
 def moves(epochs: Sequence[EpochRow]) -> Iterator[tuple[int, str]]:
     """Yield (tick, text) of each robot that was moved from one node to another while both took part.
 
-    What another node adopts when its own is lost, and what goes back, is told by the recoveries.
+    Recoveries report what another node adopts when its own is lost, and what goes back.
     """
     for before, epoch in pairwise(epochs):
         owned = {owner.robot: owner.node for owner in before.owners}

@@ -10,7 +10,6 @@ from typing import Any, Final
 import pytest
 
 from foosim.client.player import Sample
-from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.players.football import Keeper, Passive, Striker, Team
 from foosim.players.table.rod import TURN, Rod, Sight, View
@@ -116,15 +115,6 @@ def test_commands_stay_within_reach() -> None:
         x, y = -0.6 + 0.006 * turn, 0.32 if turn % 2 else -0.32
         for name, command in bench.act(x, y).items():
             assert abs(command.slide) <= LINES[name.removeprefix("blue.")].half_stroke  # type: ignore[index]
-
-
-def test_parameters_that_are_not_right_are_refused() -> None:
-    with pytest.raises(UnknownName, match=r"unknown parameter \(there are: team\), 'tema', nearest is 'team'"):
-        Team(DEPLOYMENT, {"tema": "red"})
-    with pytest.raises(BadValue, match="parameter team is not one of red, blue, 'green'"):
-        Team(DEPLOYMENT, {"team": "green"})
-    with pytest.raises(BadValue, match="parameter team is not one of red, blue, null"):
-        Team(DEPLOYMENT, {})
 
 
 def test_two_teams_play_through_the_network() -> None:
