@@ -22,7 +22,7 @@ from foosim.vhub.links.fabric import link_name
 from foosim.vhub.network.packet import DELIVERED, DROPPED
 
 LINKS_MAX: Final = 4096
-"""Number of links with counts of their own; packets of further ones are counted in `others`."""
+"""Number of links with counts; packets of further ones are in no window."""
 DROPS_SHOWN: Final = 8
 SHARE_DIGITS: Final = 6
 
@@ -91,20 +91,15 @@ class LinkHistory:
     """All links of a run. `add` takes rows in the order of the file."""
 
     def __init__(self, tick_ns: int) -> None:
-        self.packets = 0
-        self.others = 0
-        """Packets of links beyond `LINKS_MAX`, which no window has."""
         self._tick_ns = tick_ns
         self._links: dict[LinkKey, LinkRecord] = {}
 
     def add(self, mark: PacketMark, number: int) -> int:
         """Count a packet, whose row has this number; return when it was dropped (ns), -1 when it was not."""
-        self.packets += 1
         key = mark.source, mark.destination, link_name(mark.rule, mark.radio)
         record = self._links.get(key)
         if record is None:
             if len(self._links) >= LINKS_MAX:
-                self.others += 1
                 return -1
             record = self._links[key] = LinkRecord()
         record.offered.add(mark.sent_ns, mark.queue_ns)

@@ -7,7 +7,7 @@ Pure: neighbours are `tracks` (what is known between samples), `poses_csv`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
 from typing import Any, Final
@@ -110,17 +110,8 @@ class Course:
         if len(self._points) > POINTS:
             first, last = self._points[0][0], self._points[-1][0]
             self._apart = max(1, 2 * (last - first) // POINTS)
-            self._points = [*self._thinned()][-POINTS:]
-
-    def _thinned(self) -> Iterator[tuple[int, float | None]]:
-        """Yield the points that are far enough from the one before, the first of each hole, and the last one."""
-        at, was_known = self._points[0][0] - self._apart, True
-        for tick, metres in self._points[:-1]:
-            if (metres is None and was_known) or tick - at >= self._apart:
-                yield tick, metres
-                at = tick
-            was_known = metres is not None
-        yield self._points[-1]
+            kept = (point for number, point in enumerate(self._points) if number % 2 == 0 or point[1] is None)
+            self._points = [*kept][-POINTS:]
 
 
 def _content(tick: int, found: Sequence[Distance], series: Iterable[tuple[int, float | None]]) -> dict[str, Any]:

@@ -99,11 +99,6 @@ class RuleTexts:
         return self._texts[key]
 
 
-def rule_text(deployment: Deployment, source: str, destination: str) -> str:
-    """Return the rule of the deployment alone for the packets from one endpoint to another, at its start."""
-    return RuleTexts(deployment).text(source, destination)
-
-
 def _lines(
     deployment: Deployment, rule: LinkRule | None, profile: Profile, in_force: list[Settings], changes: list[str]
 ) -> Iterator[str]:

@@ -23,7 +23,6 @@ Reading = tuple[str, str]
 """Names of a robot and of its channel."""
 FIGURES: Final = ("offered", "delivered", "dropped", "loss", "delay_ms", "queue_ms")
 """What can be plotted of a link."""
-OVERLAYS: Final = ("contacts", "rays")
 
 
 class NotAsked(Refused):

@@ -25,7 +25,7 @@ from foosim.world.frame import Frame
 from foosim.world.setting.settable import WITH_A_PLACE
 
 MARKS_MAX: Final = 400
-"""Marks of one kind; later ones are counted."""
+"""Marks of one kind; later ones are left out."""
 DROP_BINS: Final = 120
 """Marks of drops: each is of a span of time."""
 FINE_BINS: Final = 8192
@@ -94,8 +94,6 @@ class Timeline:
         self._epoch: EpochRow | None = None
         self._new: list[Mark] = []
         self._kinds: Counter[str] = Counter()
-        self.left: Counter[str] = Counter()
-        """Marks by kind that there was no room for."""
         self._fine_ns = max(FINE_NS, self._tick_ns)
         self._drops: dict[int, Counter[str]] = {}
         for event in deployment.network.events:
@@ -105,8 +103,6 @@ class Timeline:
         self._kinds[mark.kind] += 1
         if self._kinds[mark.kind] <= MARKS_MAX:
             self._new.append(mark)
-        else:
-            self.left[mark.kind] += 1
 
     def take_frame(self, frame: Frame) -> None:
         """Take the next frame."""

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from foosim.client import connect, control
+from foosim.client import control
+from foosim.client.client import connect
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
 from foosim.world.sensors.encoder import RodPosition

@@ -13,7 +13,7 @@ import pytest
 
 from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
-from foosim.client import connect
+from foosim.client.client import connect
 from foosim.client.control import Control
 from foosim.client.errors import RunEnded
 from foosim.deployment.loader import load_deployment

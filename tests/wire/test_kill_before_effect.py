@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any, Final
 
 from foosim.capture.reader import open_capture
-from foosim.client import connect
+from foosim.client.client import connect
 from foosim.client.control import Control
 from foosim.replay.verify import verify_capture
 from tests.kinematic_yard import yard_text
