@@ -17,7 +17,7 @@ from foosim.common import limits
 from foosim.common.errors import UnknownName
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol import channels
-from foosim.protocol.actions import Log, Publish
+from foosim.protocol.actions import Publish
 from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
@@ -435,11 +435,3 @@ def test_random_and_mutated_bytes_are_refused_and_counted(
     core.receive(channels.DOWN, "hand", bytes(whole), 0)
     taken(core, Go(limits.COUNTER_MAX, limits.COUNTER_MAX, 0, []))
     assert core.go is not None, "it goes on"
-
-
-def test_only_the_first_few_refused_messages_are_worth_a_line() -> None:
-    core = in_run()
-    for _ in range(10):
-        core.receive(channels.DOWN, "ear", b"?", 0)
-    assert len([action for action in core.actions if isinstance(action, Log)]) == 3
-    assert core.statistics().malformed == 10
