@@ -101,7 +101,7 @@ def waited(what: str, found: Callable[[], Any]) -> Any:
 
 def go_on_to(page: Page, tick: int) -> None:
     """Have a paused run go on to a tick, and the page show it."""
-    control.step(tick - int(control.status(RUN)["ticks"]), RUN)
+    control.request("step", RUN, count=tick - int(control.status(RUN)["ticks"]))
     waited(f"tick {tick}", lambda: control.status(RUN)["ticks"] == tick)
     page.until(f"{STAT}.drawn === {tick} && {STAT}.paused")
 
