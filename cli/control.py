@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Annotated, Any
 
 import typer
@@ -31,13 +32,13 @@ def status(run: RunOption = None, json: JsonOption = False) -> None:
 @app.command()
 def pause(run: RunOption = None, json: JsonOption = False) -> None:
     """Pause simulated time, after the ticks that are released already."""
-    show_answer(control.pause(run), json)
+    show_answer(control.request("pause", run), json)
 
 
 @app.command()
 def resume(run: RunOption = None, json: JsonOption = False) -> None:
     """Continue after a pause."""
-    show_answer(control.resume(run), json)
+    show_answer(control.request("resume", run), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -47,7 +48,7 @@ def step(
     json: JsonOption = False,
 ) -> None:
     """Simulate a number of ticks, then pause."""
-    show_answer(control.step(count, run), json)
+    show_answer(control.request("step", run, count=count), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -58,7 +59,7 @@ def rate(
 ) -> None:
     """Change how fast simulated time passes."""
     read_at("foosim rate PACE", parse_pace, pace)
-    show_answer(control.rate(pace, run), json)
+    show_answer(control.request("rate", run, pace=pace), json)
 
 
 Numbers = tuple[float, float, float]
@@ -81,7 +82,7 @@ def add(
         from foosim.world.setting.settable import read_place
 
         place = {**(read_place(place) if isinstance(place, str) else place or {}), "yaw": yaw}
-    show_answer(control.add(name, place, node, run), json)
+    show_answer(control.request("add", run, name=name, at=place, node=node), json)
 
 
 @app.command()
@@ -91,7 +92,7 @@ def remove(
     json: JsonOption = False,
 ) -> None:
     """Remove an entity from the world; it can be added again."""
-    show_answer(control.remove(name, run), json)
+    show_answer(control.request("remove", run, name=name), json)
 
 
 @app.command()
@@ -102,13 +103,13 @@ def move(
     json: JsonOption = False,
 ) -> None:
     """Move a robot to another node; the world stays the same."""
-    show_answer(control.move(robot, node, run), json)
+    show_answer(control.request("move", run, robot=robot, node=node), json)
 
 
 @app.command()
 def balance(run: RunOption = None, json: JsonOption = False) -> None:
     """Move robots from busy nodes to idle ones, once; prints the robots and the loads."""
-    show_answer(control.balance(run), json)
+    show_answer(control.request("balance", run), json)
 
 
 Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
@@ -117,7 +118,7 @@ Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
 @app.command()
 def stop(node: Node, run: RunOption = None, json: JsonOption = False) -> None:
     """Stop a node, after its robots have moved to the other nodes."""
-    show_answer(control.stop(node, run), json)
+    show_answer(control.request("stop", run, node=node), json)
 
 
 @app.command()
@@ -127,7 +128,7 @@ def start(node: Node, run: RunOption = None, json: JsonOption = False) -> None:
     `up` starts the process of a local node and counts its failures anew. A node with `launch: manual` is started by
     hand.
     """
-    show_answer(control.start(node, run), json)
+    show_answer(control.request("start", run, node=node), json)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
@@ -143,7 +144,7 @@ def push(
 
     An impulse of 0.021 N s changes the velocity of a body of 21 g by 1 m/s.
     """
-    show_answer(control.push(_three("impulse", "N s", impulse), name, run), json)
+    show_answer(control.request("push", run, impulse=_three("impulse", "N s", impulse), name=name), json)
 
 
 @app.command(name="set")
@@ -164,7 +165,7 @@ def set_field(
     field, is_set, text = setting.partition("=")
     if not is_set:
         raise BadValue("no FIELD=VALUE, such as down=true", setting)
-    show_answer(control.set(name, field, _read_value(text), run), json)
+    show_answer(control.request("set", run, name=name, field=field, value=_read_value(text)), json)
 
 
 def _read_value(text: str) -> Any:
@@ -186,6 +187,8 @@ def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
         raise BadValue(f"{needed}; here are {len(words)}", " ".join(words))
     try:
         x, y, z = map(float, words)
+        if not isfinite(x + y + z):
+            raise ValueError
     except ValueError:
         raise BadValue(f"{needed}; not all of these are numbers", " ".join(words)) from None
     return x, y, z
@@ -194,7 +197,7 @@ def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
 @app.command()
 def down(run: RunOption = None, json: JsonOption = False) -> None:
     """End a run in order."""
-    show_answer(control.down(run), json)
+    show_answer(control.request("down", run), json)
 
 
 def show_answer(answer: Answer, json: bool) -> None:

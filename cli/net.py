@@ -246,7 +246,7 @@ def set_link(
     Keys are those of a rule, with dots for what is inside: burst.loss=1% burst.mean_bad=20ms. A mapping is written
     whole.
     """
-    show_answer(control.network({"set": {**nested(settings), "link": link}}, run), json)
+    show_answer(control.request("network", run, event={"set": {**nested(settings), "link": link}}), json)
 
 
 @app.command()
@@ -265,7 +265,7 @@ def partition(
 ) -> None:
     """Drop packets between endpoints of different groups."""
     event = {"partition": [_split(group) for group in groups], **_for(lasts, random)}
-    show_answer(control.network({**event, "symmetric": False} if one_way else event, run), json)
+    show_answer(control.request("network", run, event=event | ({"symmetric": False} if one_way else {})), json)
 
 
 @app.command()
@@ -279,7 +279,7 @@ def clog(
 ) -> None:
     """Delay packets to the end of the clog; then all arrive at once, in order."""
     ends = {"from": _split(source), "to": _split(destination)}
-    show_answer(control.network({"clog": ends, **_for(lasts, random)}, run), json)
+    show_answer(control.request("network", run, event={"clog": ends, **_for(lasts, random)}), json)
 
 
 @app.command()
@@ -289,7 +289,7 @@ def heal(
     json: JsonOption = False,
 ) -> None:
     """End disturbances of the network; clogged packets are released at once."""
-    show_answer(control.network({"heal": what}, run), json)
+    show_answer(control.request("network", run, event={"heal": what}), json)
 
 
 def _split(text: str) -> list[str]:

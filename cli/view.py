@@ -97,7 +97,7 @@ def view(  # noqa: PLR0913, PLR0917  # a command's options
     else:
         die_with_parent()
         sources = open_run_sources(what, second, offset_ns, view_only=view_only)
-    serve_sources(lambda: (sources, ()), options)
+    serve_sources(sources, options)
 
 
 def is_recording(what: str) -> bool:

@@ -8,7 +8,7 @@
             client.command({"red.attack": {"slide": 0.05, "spin": 0.0}})
 
 The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
-until the loop's body is done; after `listen` it goes on by itself. Everything travels as packets through the emulated
+until the loop's body is done; after `listen` it continues by itself. Everything travels as packets through the emulated
 network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
 frame (origin on the floor in the middle, z up). A client belongs to one thread.
 """
@@ -87,7 +87,7 @@ class Arrived:
 
 
 class Named(Generic[T]):
-    """Things by name, in name order; a name that does not exist raises UnknownName, which says what is nearest."""
+    """Things by name, in name order; a name that does not exist raises UnknownName with the nearest one."""
 
     def __init__(self, what: str, names: Iterable[str], make: Callable[[str], T]) -> None:
         self._what = what
@@ -122,7 +122,7 @@ class CalledJob:
 
     @property
     def state(self) -> JobState:
-        """How it stands by the newest reading; NONE before it is known to be taken."""
+        """Its state by the newest reading; NONE before it is known to be taken."""
         return self._job.state
 
     @property
@@ -161,7 +161,7 @@ class Actuator:
     def set(self, *numbers: Any, **named: Any) -> None:
         """Command the robot, by the numbers of a command in their order or by name: `set(slide=0.1, spin=0.0)`.
 
-        What the numbers of its kind mean `foosim components actuator KIND` says. In lockstep a command is
+        `foosim components actuator KIND` explains the numbers of its kind. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
         its last command. Raises BadValue for names and numbers that are none of a command; NotJoined, RunEnded.
         """
@@ -173,9 +173,9 @@ class Actuator:
     def call(self, *numbers: Any, **named: Any) -> CalledJob:
         """Give the actuator a job, by the numbers of a command as for `set`: `call(x=3.0, y=1.0).result(60.0)`.
 
-        The command is sent again until the job sensor of the robot, to which the client has subscribed, tells that it
-        was taken: in `receive` and `result`, or when a tick ends. It preempts the job that runs, whoever's that is.
-        Raises BadValue for an actuator without jobs or a sensor that tells of them, and as `set` does; UnknownName
+        The command is sent again until the job sensor of the robot, to which the client has subscribed, reports that it
+        was taken: in `receive` and `result`, or when a tick ends. It preempts the running job of any sender.
+        Raises BadValue for an actuator without jobs or a sensor that reports them, and as `set` does; UnknownName
         without the subscription, NotJoined and RunEnded.
         """
         self._client._check_sending()
@@ -187,7 +187,7 @@ class Actuator:
 
     @property
     def job(self) -> CalledJob | None:
-        """This client's last job: the one that it called, else, after a restart, the one of which the sensor tells.
+        """This client's last job: the one that it called, else, after a restart, the one that the sensor reports.
 
         Raises as `call`.
         """
@@ -329,7 +329,7 @@ class Client:
     def subscribe(self, source: str, channel: str) -> None:
         """Subscribe to a robot's channel, or to another client's broadcasts on one; before `lockstep` or `listen`.
 
-        Raises UnknownName, PacketError for what is no channel, NotJoined.
+        Raises UnknownName, PacketError for an invalid channel, NotJoined.
         """
         check_subscription(self.deployment, source, channel)
         if self._period is not None and (source, channel) not in self._subscriptions:
@@ -341,9 +341,9 @@ class Client:
 
         `rate_hz` is a whole number of ticks; None is the rate, with its offset, that the deployment declares. The
         client joins when the loop begins. What the loop's body sends leaves when the loop comes round or is left; a
-        client that does not go on holds the run, up to the deployment's deadline. Where a machine was lost with the
-        run's last ticks, the run goes on from before them: lower ticks come again, and the log says so. Raises BadValue
-        for a rate, NotJoined, ConnectionFailed, and PacketError when a tick's packets are too many for one answer.
+        client that does not continue holds the run, up to the deployment's deadline. Where a machine was lost with the
+        run's last ticks, the run continues from before them: lower ticks come again, and the log has a line. Raises
+        BadValue for a rate, NotJoined, ConnectionFailed, and PacketError for more packets than one answer takes.
         """
         turns = self._turns_at(rate_hz)
         if self._period is not None and self._turns != turns:

@@ -100,7 +100,7 @@ class Taker(NamedTuple):
         return {field.name: value for field, value in zip(fields, values, strict=True)}
 
     def _check_length(self, values: object) -> None:
-        """Raise BadValue for numbers that are not one for each joint; what is no sequence is none of a command."""
+        """Raise BadValue unless there is a number for each joint; other values are refused when they are packed."""
         if isinstance(values, Sized) and len(values) != len(self.joints):
             raise self._of_another_length(values)
 

@@ -1,23 +1,19 @@
 """Requests to a running system from another process: by id, repeated until they are answered.
 
-Each function finds the newest live run (or the one named), sends its supervisor a request, and returns the answer,
-which names the tick at which the request takes effect; a refusal raises `RequestRefused`.
+An answer names the tick at which the request takes effect; a refusal raises `RequestRefused`.
 """
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, Self
 
 from foosim.client.asking import Take, Taken, answer_to, ask
-from foosim.common.errors import BadValue, Failed, Refused
+from foosim.common.errors import Failed, Refused
 from foosim.common.json_text import decode_json, encode_json
-from foosim.common.struct_types import Vector
-from foosim.common.units import parse_pace
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.asset_transfer import Fetching
@@ -120,7 +116,7 @@ class Control:
 
     def view(self, inbox: Inbox) -> None:
         """Offer the frames that are shown to an inbox, as (key of `channels.VIEW`, ..., a `Commit`'s bytes). They come
-        while somebody has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
+        while a viewer has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
         """
         self._session.subscribe(channels.VIEW.key_for_all, channels.VIEW.key, inbox)
 
@@ -172,99 +168,16 @@ def pki_of(info: RunInfo) -> Path | None:
     return Path(os.environ.get(PKI_VARIABLE) or info.pki)
 
 
-def _ask(run: str | None, verb: str, **arguments: Any) -> Answer:
+def request(verb: str, run: str | None = None, **arguments: Any) -> Answer:
+    """Send a request to the newest live run, or to the one named, and return the answer; None arguments are left out.
+
+    Raises what `connect` and `Control.ask` raise.
+    """
     with connect(run) as control:
-        return control.ask(verb, **arguments)
+        return control.ask(verb, **{name: value for name, value in arguments.items() if value is not None})
 
 
 def status(run: str | None = None) -> dict[str, Any]:
     """Return the state of a run, as `supervisor.status` makes it."""
     with connect(run) as control:
         return control.status()
-
-
-def pause(run: str | None = None) -> Answer:
-    """Release no further order."""
-    return _ask(run, "pause")
-
-
-def resume(run: str | None = None) -> Answer:
-    """Go on after a pause."""
-    return _ask(run, "resume")
-
-
-def step(count: int = 1, run: str | None = None) -> Answer:
-    """Release `count` ticks and pause behind them."""
-    return _ask(run, "step", count=count)
-
-
-def rate(pace: str, run: str | None = None) -> Answer:
-    """Change the pace: realtime, fast, or a factor such as 2x. Raises BadValue."""
-    parse_pace(pace)
-    return _ask(run, "rate", pace=pace)
-
-
-def add(name: str, at: Any = None, node: str | None = None, run: str | None = None) -> Answer:
-    """Add a spare of the deployment: the entity of this name, or the first of this fleet that is absent.
-
-    `at` is a text `X,Y` or `X,Y,Z` (m), or a mapping of x, y, z, roll, pitch, yaw as in a deployment; by default the
-    entity starts where the deployment has it. `node` owns it from now on.
-    """
-    given = {"name": name, "at": at, "node": node}
-    return _ask(run, "add", **{key: value for key, value in given.items() if value is not None})
-
-
-def remove(name: str, run: str | None = None) -> Answer:
-    """Remove an entity from the world; it can be added again."""
-    return _ask(run, "remove", name=name)
-
-
-def move(robot: str, node: str, run: str | None = None) -> Answer:
-    """Move a robot to another node; the world does not change."""
-    return _ask(run, "move", robot=robot, node=node)
-
-
-def balance(run: str | None = None) -> Answer:
-    """Move robots from busy nodes to idle ones, once, as `up --balance` does again and again."""
-    return _ask(run, "balance")
-
-
-def stop(node: str, run: str | None = None) -> Answer:
-    """Have a node end; its robots move to the others first."""
-    return _ask(run, "stop", node=node)
-
-
-def start(node: str, run: str | None = None) -> Answer:
-    """Let a node take part again that was stopped or given up; where `up` starts nodes, it starts this one."""
-    return _ask(run, "start", node=node)
-
-
-def push(impulse: Vector, name: str | None = None, run: str | None = None) -> Answer:
-    """Give a free body an impulse (N s, world frame); by default the first one by name."""
-    _check_finite("impulse", impulse)
-    return _ask(run, "push", impulse=impulse, **({} if name is None else {"name": name}))
-
-
-def set(name: str, field: str, value: Any, run: str | None = None) -> Answer:  # the word of the command
-    """Set a field of an entity: `at` (a pose), `down` (whether a robot is out of service), or `RULE.FIELD`.
-
-    Values are as in a deployment: texts with units, `True` or `False`, a mapping of x, y, z, roll, pitch, yaw.
-    """
-    return _ask(run, "set", name=name, field=field, value=value)
-
-
-def network(event: dict[str, Any], run: str | None = None) -> Answer:
-    """Have something happen to the network: an event of a deployment without its time."""
-    return _ask(run, "network", event=event)
-
-
-def _check_finite(what: str, numbers: Iterable[float]) -> None:
-    """Raise BadValue for a number that JSON cannot represent."""
-    for number in numbers:
-        if not math.isfinite(number):
-            raise BadValue(f"{what}: not a finite number", number)
-
-
-def down(run: str | None = None) -> Answer:
-    """End the run in order."""
-    return _ask(run, "down")

@@ -72,7 +72,7 @@ class ClientStatistics:
 
 
 class ClientCore:
-    """One client's state machine. `actions` are those that the shell performs next."""
+    """One client's state machine. `actions` are what the shell performs next."""
 
     def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
         """`world` is empty when the client accepts any world."""
@@ -89,7 +89,7 @@ class ClientCore:
         self.tick = -1
         """The newest tick that the vHub has named."""
         self.since = -1
-        """The tick since which a free-running client exists; -1 while it does not, and before the vHub says so."""
+        """The tick since which a free-running client exists; -1 while it does not, and before the vHub reports it."""
         self.absent: Sequence[str] = ()
         """Those of its robots that are absent."""
         self.ended = False
@@ -212,7 +212,7 @@ class ClientCore:
     ) -> None:
         """Take part: in lockstep every `period_ticks`, or free-running with 0; subscribe to these (endpoint, channel).
 
-        Its ticks are those that leave the remainder `offset_ticks`, which is below the period. With `arrivals`, which
+        Its ticks leave the remainder `offset_ticks`, which is below the period. With `arrivals`, which
         are some of what it hears, they are those at which a packet of these arrives, or a period has passed.
 
         Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.

@@ -14,7 +14,7 @@ class PlayerError(Failed):
 
 
 class Unanswered(KeyboardInterrupt):
-    """Raised in a player that does not return, to end it; the text says how long it was waited for."""
+    """Raised in a player that does not return, to end it; the text has the time that it had."""
 
 
 class ConnectionRefused(Refused):

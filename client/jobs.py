@@ -40,11 +40,11 @@ class Job:
     """One job: `number` is None as long as it has not been sent, `state` NONE as long as it is not known to be taken.
 
     `by` is who commanded the robot after it, where that is known of a job that was preempted; `why` is a sentence on
-    why it has failed, where the actuator says that.
+    why it has failed, where the actuator gives a reason.
     """
 
     def __init__(self, what: str, number: int | None, command: Any) -> None:
-        """`what` names robot and actuator, for messages; `command` is what it asks for."""
+        """`what` names robot and actuator, for messages; `command` is its command."""
         self.what: Final = what
         self.number = number
         self.state = JobState.NONE
@@ -84,7 +84,7 @@ class Jobs:
 
     def __init__(self, deployment: Deployment, sender: str, robot: str, actuator: str) -> None:
         """Raises UnknownName for a robot, actuator or sender, BadValue for an actuator without jobs, or one of whose
-        jobs no sensor tells."""
+        jobs no sensor reports."""
         self._taker: Taker = CommandEncoder(deployment).actuator(robot, actuator)
         its = deployment.robots[robot]
         self.what: Final = f"{robot}/{actuator}"
@@ -99,16 +99,16 @@ class Jobs:
             channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
         }
         if not telling:
-            raise BadValue(f"{robot} has no sensor of the kind job that tells of its actuator", actuator)
+            raise BadValue(f"{robot} has no sensor of the kind job for its actuator", actuator)
         if sender in deployment.players:
             heard = {channel for endpoint, channel in deployment.heard_by(sender) if endpoint == robot}
             if telling.isdisjoint(heard):
                 raise BadValue(
-                    f"{sender} does not hear {' or '.join(sorted(telling))} of {robot}, which tells of", actuator
+                    f"{sender} does not hear {' or '.join(sorted(telling))} of {robot}, the sensor of", actuator
                 )
             telling &= heard
         self.heard: Final = (robot, min(telling))
-        """The (robot, channel) that tells how they stand."""
+        """The (robot, channel) that reports their states."""
         self.sender, self.robot, self.actuator = sender, robot, actuator
         self._row = self.senders.index(sender)
         self._repeat_ticks = max(1, REPEAT_NS // deployment.tick_ns)
@@ -119,7 +119,7 @@ class Jobs:
         self._sent = self._due_tick = 0
         """The number that was sent last, and when it is sent again."""
 
-    # --- what one asks for -------------------------------------------------------------------------------------------
+    # --- requests ----------------------------------------------------------------------------------------------------
 
     def call(self, *numbers: Any, **named: Any) -> Job:
         """Begin a job, by the numbers of a command in their order or by name; it is sent by `commands`.
@@ -130,7 +130,7 @@ class Jobs:
             raise self._taker.wrong("numbers are given by name or in their order, not both")
         command = self._taker.value(named or numbers)
         self._taker.encode(command)
-        if self._current is not None and self._current.number is None:  # nobody will ever hear of it
+        if self._current is not None and self._current.number is None:  # it was never sent
             self._current.state = JobState.PREEMPTED
             self._current.by = self.sender
         self._current = Job(self.what, None, command)
@@ -149,14 +149,14 @@ class Jobs:
 
     @property
     def running(self) -> str:
-        """Whose job the actuator does, by the newest reading; empty for nobody's."""
+        """Whose job the actuator does, by the newest reading; empty for none."""
         at = 0 if self._reading is None else int(self._reading.running)
         return self.senders[at - 1] if at else ""
 
     # --- what is heard and sent --------------------------------------------------------------------------------------
 
     def hear(self, samples: Samples) -> None:
-        """Take what the newest sample of the job sensor tells."""
+        """Take the newest sample of the job sensor."""
         sample = samples.get(self.heard)
         reading = None if sample is None else sample.value
         if isinstance(reading, Reading) and reading is not self._reading and self._is_sound(reading):
@@ -188,7 +188,7 @@ class Jobs:
     def due(self, tick: int) -> Any | None:
         """Return the command that is to be sent at a tick, with its job's number; None where there is nothing to send.
 
-        It is sent again until a reading tells that it was taken. The first one waits for a reading, which tells the
+        It is sent again until a reading reports it as taken. The first one waits for a reading, which has the
         number of the last job before a restart; and a number is above that of the tick, so that none is used twice.
         """
         job = self._current

@@ -85,13 +85,13 @@ class Acting:
 
         It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
         """
-        asked: tuple[int | str, ...] = (since, *absent)
-        if asked == self._known:
+        wanted: tuple[int | str, ...] = (since, *absent)
+        if wanted == self._known:
             return
         if self._known and self._known[0] != since:
             self.player = self._make(tick)
             self.newest.samples = {}
-        self._known = asked
+        self._known = wanted
         self.player.robots = tuple([name for name in sorted(self.declared.robots) if name not in absent])
 
     def _make(self, tick: int) -> Player:

@@ -178,7 +178,7 @@ class Replay:
         return self.ask("resume")
 
     def step(self, ticks: int = 1) -> dict[str, Any]:
-        """Publish so many ticks at once, and pause after them."""
+        """Publish `ticks` ticks at once, and pause after them."""
         return self.ask("step", count=ticks)
 
     def seek(self, time_ns: int) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def waited(what: str, found: Callable[[], Any]) -> Any:
 
 def go_on_to(page: Page, tick: int) -> None:
     """Have a paused run go on to a tick, and the page show it."""
-    control.step(tick - int(control.status(RUN)["ticks"]), RUN)
+    control.request("step", RUN, count=tick - int(control.status(RUN)["ticks"]))
     waited(f"tick {tick}", lambda: control.status(RUN)["ticks"] == tick)
     page.until(f"{STAT}.drawn === {tick} && {STAT}.paused")
 
@@ -118,11 +118,11 @@ def running(folder: Path) -> Iterator[tuple[int, str]]:
     try:
         path = waited("the run", lambda: find_run(RUN)).path / "console.json"
         waited("its first tick", lambda: control.status(RUN)["ticks"] > 0)
-        control.pause(RUN)
-        control.rate(PACE, RUN)
+        control.request("pause", RUN)
+        control.request("rate", RUN, pace=PACE)
         told = waited("the console", lambda: path.exists() and json.loads(path.read_text()))
         yield up.pid, str(told["operate"])
-        control.down(RUN)
+        control.request("down", RUN)
         up.wait(LIMIT_S)
     finally:
         if up.poll() is None:
@@ -150,7 +150,7 @@ def live(album: Album, folder: Path) -> None:
         (blue,) = (pid for pid, words in children(launcher).items() if name_of(words) == "blue")
         os.kill(blue, signal.SIGKILL)
         go_on_to(page, CUT_TICK)
-        control.network(CUT, RUN)
+        control.request("network", RUN, event=CUT)
         go_on_to(page, END_TICK)
         page.click(".drops summary", "partition")
         page.get("document.querySelector('.drops').scrollIntoView()")

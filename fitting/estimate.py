@@ -54,7 +54,7 @@ SLOW: Final = 0.1
 BESIDE: Final = 4
 """Speeds before and after a rebound are measured over so many points."""
 KNOWN: Final = 0.5
-"""An interval that reaches farther than this share of its value, to either side, says that the tracks do not tell."""
+"""An interval that reaches farther than this share of its value, to either side, is not determined by the tracks."""
 
 
 class NoLeastSquares(Failed):
@@ -144,7 +144,7 @@ def _noise(found: Any) -> float:
 
 
 def _errors(found: Any) -> Array:
-    """Return the standard errors of what was fitted, infinite for what nothing tells.
+    """Return the standard errors of what was fitted, infinite where nothing determines them.
 
     They are the roots of the diagonal of the inverse of J^T J, times the variance of the residuals.
     """

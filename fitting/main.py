@@ -60,8 +60,8 @@ def fit_command(
     apart. A track is used up to where the ball comes over a corner ramp or before a goal.
 
     The YAML has what the tracks tell, each value with half of its interval of 95 % confidence; a deployment whose table
-    is a preset includes it. What they do not tell is left out, and said. An existing file is not overwritten. It needs
-    scipy: pip install 'foosim[fit]'.
+    is a preset includes it. What they do not determine is left out, with a message. No existing file is overwritten.
+    It needs scipy: pip install 'foosim[fit]'.
     """
     # Before scipy is imported. The matrices are small: threads would wait for each other longer than they compute.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -125,7 +125,7 @@ def _first(table: Table) -> Pairs:
 
 
 def _doubts(found: Result, tracks: list[Track]) -> Iterator[str]:
-    """Yield what says that intervals do not hold."""
+    """Yield the reasons why intervals do not hold."""
     if not found.is_converged:
         yield "the fit did not come to an end: values and intervals may be wrong; more or longer tracks tell more"
     for track, residuals in zip(tracks, found.of_tracks, strict=True):

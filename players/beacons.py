@@ -43,8 +43,8 @@ class Beacon(NamedTuple):
 
 
 class Telemetry(NamedTuple):
-    """What a rover tells its base: where it is (m), its charge (a share), how far it has driven (m), how many others it
-    hears, and between which spots it is."""
+    """A rover's report to its base: where it is (m), its charge (a share), how far it has driven (m), how many others
+    it hears, and between which spots it is."""
 
     number: int
     x: float
@@ -75,7 +75,7 @@ def encode_beacon(beacon: Beacon) -> bytes:
 
 
 def decode_beacon(payload: object, rovers: int, spots: int) -> Beacon | None:
-    """Return the beacon that a payload holds, of one of so many rovers on a map of so many spots; None for none."""
+    """Return the beacon in a payload, given the numbers of rovers and of spots on the map; None for an invalid one."""
     return _decoded(payload, rovers, spots) if isinstance(payload, bytes) else None
 
 

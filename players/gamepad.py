@@ -58,7 +58,7 @@ class Gamepad(Player):
         self._file: int | None = _opened(device)
 
     def act(self, tick: int, samples: Samples) -> Commands:
-        """Return the command of each rod after what the gamepad has told since the last turn."""
+        """Return the command of each rod after the events of the gamepad since the last turn."""
         now_s = tick * self._tick_ns * 1e-9
         for value, kind, number in self._events(tick):
             if kind & BUTTON and not kind & INITIAL:

@@ -1,6 +1,6 @@
 """A team that a person plays from the keys of a terminal.
 
-Which keys do what is in `KEYS`, and is told when the player starts. The terminal gets its own mode back when the
+`KEYS` lists the keys; the player prints it when it starts. The terminal gets its own mode back when the
 process ends.
 """
 

@@ -20,7 +20,7 @@ from foosim.world.models.rover import RoverRobot
 FLEET_S: Final = 1.0
 FORGOTTEN_S: Final = 60.0
 ENTRIES_MAX: Final = 30
-"""210 bytes, which the smallest packets of the usual radios hold; the newest are told."""
+"""210 bytes, which the smallest packets of the usual radios hold; the newest are sent."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -46,14 +46,14 @@ class Dispatch(Player):
         for (_, channel), sample in samples.items():
             if channel != TELEMETRY:
                 continue
-            told = decode_telemetry(sample.value, self._rovers, self._spots)
-            said_s = sample.sent_ns / 1e9
-            if told is not None and said_s > self.fleet.get(told.number, (-1.0, told))[0]:
-                self.fleet[told.number] = said_s, told
+            telemetry = decode_telemetry(sample.value, self._rovers, self._spots)
+            sent_s = sample.sent_ns / 1e9
+            if telemetry is not None and sent_s > self.fleet.get(telemetry.number, (-1.0, telemetry))[0]:
+                self.fleet[telemetry.number] = sent_s, telemetry
         if now_s < self._due_s:
             return Turn({})
         self._due_s = now_s + FLEET_S
-        known = sorted((now_s - said_s, number) for number, (said_s, _) in self.fleet.items())
+        known = sorted((now_s - sent_s, number) for number, (sent_s, _) in self.fleet.items())
         newest = [(age, self.fleet[number][1]) for age, number in known if age <= FORGOTTEN_S][:ENTRIES_MAX]
-        entries = [Entry(told.number, told.here, told.goal, age) for age, told in newest]
+        entries = [Entry(telemetry.number, telemetry.here, telemetry.goal, age) for age, telemetry in newest]
         return Turn({}, [Packet("", FLEET, encode_fleet(entries))] if entries else [])

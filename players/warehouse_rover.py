@@ -330,6 +330,6 @@ class Patrol(Player):
             self._telemetry_due_s = now_s + TELEMETRY_S
             hears = sum(now_s - known.at_s <= CLAIM_S for known in self.heard.values())
             spots = self._here, self._goal
-            told = Telemetry(self.number, estimate.x, estimate.y, self._share, estimate.driven, hears, *spots)
-            packets.append(Packet(self.settings.base, TELEMETRY, encode_telemetry(told)))
+            telemetry = Telemetry(self.number, estimate.x, estimate.y, self._share, estimate.driven, hears, *spots)
+            packets.append(Packet(self.settings.base, TELEMETRY, encode_telemetry(telemetry)))
         return packets

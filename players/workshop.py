@@ -2,7 +2,7 @@
 
 The foreman has a list of steps, each of one aim or several, and takes the next step when all are reached by the samples
 that it hears. Grippers get jobs, joints and wheels get set-points at each turn: what the network loses is repeated. A
-crate that is not where it should be, for somebody has put it elsewhere, it tries to take again and again.
+crate that was put elsewhere it tries to take again and again.
 """
 
 from __future__ import annotations

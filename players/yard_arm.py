@@ -82,9 +82,9 @@ class Arm(Player):
     def _is_free(self, side: float, now_s: float) -> bool:
         """Whether no scout can be near on a side."""
         for number in self._scouts:
-            told = self.heard.reports.get(number)
-            if told is None or now_s - told.time > SILENT_S:
+            report = self.heard.reports.get(number)
+            if report is None or now_s - report.time > SILENT_S:
                 return False
-            if hypot(told.x - self._x, told.y - self._y) < NEAR_M and (told.y - self._y) * side > 0.0:
+            if hypot(report.x - self._x, report.y - self._y) < NEAR_M and (report.y - self._y) * side > 0.0:
                 return False
         return True

@@ -97,7 +97,7 @@ class Watch(Player):
         if now_s < self._watch_s:
             return Turn(commands)
         self._watch_s = now_s + WATCH_S
-        fresh = [told for _, told in sorted(self.heard.reports.items()) if now_s - told.time < FRESH_S]
+        fresh = [report for _, report in sorted(self.heard.reports.items()) if now_s - report.time < FRESH_S]
         return Turn(commands, [Packet("", WATCH, encode_watch(fresh))] if fresh else [])
 
     def _sense(self, samples: Samples) -> None:

@@ -1,4 +1,4 @@
-"""Payloads of the radio messages in a yard: what a scout says of itself, and what the watch overhead passes on.
+"""Payloads of the radio messages in a yard: reports of scouts, and the reports that the watch overhead passes on.
 
 A damaged payload, or a foreign one on the same channel, decodes to None. Numbers are little-endian.
 """
@@ -22,8 +22,8 @@ _CRATE = struct.Struct("<ff")
 
 
 class Report(NamedTuple):
-    """What a scout says: its number, the time (s), where it is (m), how many crates it is done with, and where it has
-    put those (m), in the order in which it did."""
+    """The report of a scout: its number, the time (s), where it is (m), the number of crates that it is done with, and
+    their places (m), in the order in which it put them there."""
 
     number: int
     time: float
@@ -35,9 +35,9 @@ class Report(NamedTuple):
 
 def encode_report(report: Report) -> bytes:
     """Return a report's bytes: 15, and 8 a crate."""
-    told = report.crates[-CRATES_MAX:]
-    head = _HEAD.pack(report.number, report.done, len(told), report.time, report.x, report.y)
-    return head + b"".join(_CRATE.pack(x, y) for x, y in told)
+    crates = report.crates[-CRATES_MAX:]
+    head = _HEAD.pack(report.number, report.done, len(crates), report.time, report.x, report.y)
+    return head + b"".join(_CRATE.pack(x, y) for x, y in crates)
 
 
 def decode_report(payload: object) -> Report | None:
@@ -79,7 +79,7 @@ def _report_at(payload: bytes, at: int) -> tuple[Report, int] | None:
 
 
 class Heard:
-    """The newest report of each scout, whoever passed it on."""
+    """The newest report of each scout, by any way."""
 
     def __init__(self) -> None:
         self.reports: dict[int, Report] = {}
@@ -89,8 +89,8 @@ class Heard:
         """Take what has come."""
         for (_, channel), sample in samples.items():
             if channel == REPORT:
-                told = decode_report(sample.value)
-                self._keep([] if told is None else [told])
+                report = decode_report(sample.value)
+                self._keep([] if report is None else [report])
             elif channel == WATCH:
                 self._keep(decode_watch(sample.value))
 

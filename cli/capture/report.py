@@ -1,8 +1,7 @@
-"""The command `foosim capture report`: a shell over `report.gather` and `report_page.page`."""
+"""The command `foosim capture report`: a shell over `gather` and `page` of `console.report`."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +32,7 @@ def report(
     with new_file(out) as part:
         part.write_text(page(found), encoding="utf-8")
     if json:
-        print_json(asdict(found))
+        print_json(found)
     else:
-        packets, dropped = found.fates["offered"], found.fates["dropped"]
-        typer.echo(f"{out}: {packets} packets on {len(found.links)} links, {dropped} dropped")
+        fates, links = found["fates"], len(found["links"])
+        typer.echo(f"{out}: {fates['offered']} packets on {links} links, {fates['dropped']} dropped")

@@ -1,7 +1,7 @@
 """The distance between two sources on one clock, published point by point while it is computed.
 
 Of two recordings all of the time that both have is compared; of a source that has its own clock, what it shows while
-somebody looks.
+a browser looks.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ async def compare(feed: Feed, clock: Clock, one: Compare, other: Open, covers: C
     in_pool = partial(asyncio.get_running_loop().run_in_executor, pool)
     try:
         if isinstance(one, Leader):
-            told = _beside(one, await in_pool(other), in_pool)
+            contents = _beside(one, await in_pool(other), in_pool)
         else:
             assert isinstance(clock, Deck), "a recording is compared on a deck"
-            told = _on_deck(clock, Comparison(await in_pool(one), await in_pool(other), clock.tick_ns), in_pool)
-        async for content in told:
+            contents = _on_deck(clock, Comparison(await in_pool(one), await in_pool(other), clock.tick_ns), in_pool)
+        async for content in contents:
             feed.tell({"type": "compared", "covers": covers(), **content})
     except CaptureError as error:
         feed.tell({"type": "note", "level": "error", "text": f"the comparison ends: {error}"})
@@ -55,14 +55,14 @@ async def _on_deck(deck: Deck, comparison: Comparison, in_pool: InPool) -> Async
         comparison.work(POINTS_AT_ONCE)
         return comparison.as_json(tick)
 
-    told: Any = None
+    contents: Any = None
     while True:
         head = deck.playhead
         comparison.over(head.first, head.last)
         now = head.tick(deck.clock_ns()), head.first, head.last
-        if now != told or not comparison.is_complete:
+        if now != contents or not comparison.is_complete:
             yield await in_pool(work, now[0])
-            told = now
+            contents = now
         await asyncio.sleep(TOLD_S if comparison.is_complete else 0)
 
 

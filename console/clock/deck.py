@@ -50,7 +50,7 @@ class Clock(ABC):
     @property
     @abstractmethod
     def paused(self) -> bool:
-        """Whether time stands still."""
+        """Whether time is paused."""
 
     @abstractmethod
     def time_ns(self) -> int:
@@ -58,7 +58,7 @@ class Clock(ABC):
 
     @abstractmethod
     def wall_ns(self, time_ns: int) -> int | None:
-        """Return the wall time at which a simulated time is reached; None where it stands still, or nobody knows."""
+        """Return the wall time at which a simulated time is reached; None where it is paused, or not known."""
 
     @abstractmethod
     def account(self) -> dict[str, Any]:
@@ -113,7 +113,7 @@ class Deck(Clock):
         return {"state": "paused" if head.paused else "running", "pace": str(head.pace), "loop": head.loops}
 
     def ask(self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]) -> Answered:
-        """Do what is asked. `neighbour` gives the next tick, later or not, of which something is recorded.
+        """Do a request. `neighbour` gives the next tick, later or not, of which something is recorded.
 
         Raises NotAsked for an unknown verb, BadValue for wrong arguments.
         """
@@ -143,7 +143,7 @@ class Deck(Clock):
             there = neighbour(here, count > 0)
             count = (there - here) if there is not None else 0
             if not count:
-                raise BadValue(f"step: nothing is recorded {'behind' if there is None else 'at'} tick {here}")
+                raise BadValue(f"step: nothing is recorded {'after' if there is None else 'at'} tick {here}")
         self.playhead.step(count, now_ns)
 
     def _text(self, verb: str, now_ns: int) -> str:
@@ -152,7 +152,7 @@ class Deck(Clock):
         if verb == "rate":
             return f"at {head.pace} from {where} on"
         if verb == "loop":
-            return "begins again at its end" if head.loops else "stands still at its end"
+            return "begins again at its end" if head.loops else "pauses at its end"
         return f"{'paused' if head.paused else 'plays'} at {where}"
 
 

@@ -1,6 +1,6 @@
-"""A source that has a clock of its own, a live run or a replay that somebody plays, and that another source follows.
+"""A source that has a clock of its own, a live run or a replay, and that another source follows.
 
-All that it tells is passed on; its moments are the clock, and say where its entities are. Pure.
+Its messages are passed on; its moments are the clock, and have the poses of its entities. Pure.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, So
 
 
 class HeardClock(Clock):
-    """The time of the moment that was heard last; before the first one it stands at 0."""
+    """The time of the moment that was heard last; before the first one it is 0."""
 
     def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         super().__init__(tick_ns, clock_ns)
@@ -49,11 +49,11 @@ class Leader:
     """A source that forwards another one's messages, and gives the time to its followers."""
 
     def __init__(self, source: Source, tick_ns: int, clock_ns: Callable[[], int]) -> None:
-        """`tick_ns` is known before the source tells it. `clock_ns` is a monotonic wall clock."""
+        """`tick_ns` is known before the source describes itself. `clock_ns` is a monotonic wall clock."""
         self.source = source
         self.clock = HeardClock(tick_ns, clock_ns)
         self.gaps = 0
-        """How often moments were not heard, or not in their order: nobody looked, or time jumped."""
+        """How often moments were not heard, or not in their order: no browser looked, or time jumped."""
         self._is_looked_at = False
         self._places: dict[str, int] = {}
         """The rows of poses by the names of links, and by those of entities, whose last link it is."""

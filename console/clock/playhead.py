@@ -1,6 +1,6 @@
 """Where a recording is looked at: playing, paused, stepped, sought, looped, at a rate.
 
-Pure: the caller tells the wall time, of one monotonic clock. A position is a tick, with a fraction while it plays.
+Pure: the caller gives the wall time, of one monotonic clock. A position is a tick, with a fraction while it plays.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Playhead:
         self._at, self._anchor_ns = at, now_ns
 
     def wall_ns(self, tick: int) -> int | None:
-        """Return the wall time at which a tick is reached; None while it stands still."""
+        """Return the wall time at which a tick is reached; None while paused."""
         if self.paused:
             return None
         return self._anchor_ns + ceil((tick - self._at) * self._tick_ns / self.pace.factor)
@@ -92,7 +92,7 @@ class Playhead:
         self._anchor(Fraction(tick), now_ns)
 
     def step(self, count: int, now_ns: int) -> None:
-        """Go so many ticks on, or back when negative, as far as there are some, and stand still there.
+        """Go `count` ticks forward, or back when negative, as far as there are ticks, and pause there.
 
         Raises BadValue for a count out of range.
         """

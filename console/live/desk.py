@@ -11,7 +11,7 @@ from typing import Any, Final
 from foosim.client.client import AGAIN_S, CalledJob, Client
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
-from foosim.console.shown.sendable import jobs_of
+from foosim.console.shown.scene_json import jobs_of
 from foosim.deployment.schema import Deployment
 from foosim.world.components.fitted import FittedActuator, actuators_of
 from foosim.world.forms.jobs import JobState
@@ -35,18 +35,18 @@ class Desk:
         """Join, and hear all sensors that tell of jobs; `deployment` has the contents of its files."""
         self._client = client
         encoder = CommandEncoder(deployment)
-        told = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
-        self._takers = {(robot, one): encoder.actuator(robot, one) for robot, its in told.items() for one in its}
+        reported = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
+        self._takers = {(robot, one): encoder.actuator(robot, one) for robot, its in reported.items() for one in its}
         self._fitted: dict[tuple[str, str], FittedActuator] = {
-            (robot, one.channel): one for robot, its in told.items() if its
+            (robot, one.channel): one for robot, its in reported.items() if its
             for one in actuators_of(deployment, layout, layout[robot])
         }  # fmt: skip
         self._called: dict[tuple[str, str], str] = {}
-        """What was asked of each actuator last, in words."""
-        client.listen((robot, channel) for robot, its in told.items() for channel in its.values())
+        """The last request to each actuator, in words."""
+        client.listen((robot, channel) for robot, its in reported.items() for channel in its.values())
 
     def send(self, robot: str, actuator: str, numbers: Mapping[str, Any]) -> str:
-        """Give a job, by the numbers of a command; return what is asked in words. It preempts the one that runs.
+        """Give a job, by the numbers of a command; return the request in words. It preempts the one that runs.
 
         Raises UnknownName for an actuator without jobs, BadValue for numbers that are none of a command or beyond its
         limits, NotJoined, RunEnded and ConnectionFailed.
@@ -82,9 +82,9 @@ class Desk:
     def jobs(self) -> list[dict[str, Any]]:
         """Return how the jobs stand, as pages read it: of each actuator with a job of this client."""
         found = ((pair, self._job(pair)) for pair in self._takers)
-        return [self._told(*pair, job) for pair, job in found if job is not None]
+        return [self._reported(*pair, job) for pair, job in found if job is not None]
 
-    def _told(self, robot: str, actuator: str, job: CalledJob) -> dict[str, Any]:
+    def _reported(self, robot: str, actuator: str, job: CalledJob) -> dict[str, Any]:
         state = job.state
         words = WORDS[state] + (f" by {job.by}" if job.by else "") if job.number is not None or state else UNSENT
         what = self._called.get((robot, actuator), "")
@@ -98,5 +98,5 @@ class Desk:
     def _found(self, robot: str, actuator: str) -> tuple[str, str]:
         if (robot, actuator) not in self._takers:
             valid = ["/".join(pair) for pair in self._takers]
-            raise UnknownName("no actuator of whose jobs a sensor tells", f"{robot}/{actuator}", valid)
+            raise UnknownName("no actuator whose jobs a sensor reports", f"{robot}/{actuator}", valid)
         return robot, actuator

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.console.live.history import History
-from foosim.console.live.watched import Watched
+from foosim.console.live.watched import WatchList
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
 from foosim.console.shown.source import About, Curve, Moment, Wanted
@@ -43,7 +43,7 @@ class World:
     def __init__(self, deployment: Deployment) -> None:
         self.drawing = Drawing(deployment)
         self.links = Links(deployment, self.drawing.entities)
-        self.events, self.watched = WorldEvents(deployment), Watched(deployment)
+        self.events, self.watched = WorldEvents(deployment), WatchList(deployment)
         self.history = History(deployment.tick_ns)
         self.planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
         """Events of the deployment's network that are not marked yet, the last one first."""

@@ -1,7 +1,7 @@
 """The console's history of a run, so that a page that is opened later can scroll back.
 
-Numbers of frames, values of the status, figures of links and readings that were plotted: of each the last rows, some
-time apart, of at most so many bytes. Nobody is asked for anything because of it: it keeps what is heard anyway. Pure.
+Numbers of frames, values of the status, figures of links and readings that were plotted: of each the rows of the last
+minutes, so far apart that they fit a number of bytes. It keeps what the console receives anyway. Pure.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from foosim.console.shown.curves import link_figure
 from foosim.console.shown.source import FIGURES, Curve, Link, Reading, Wanted
 
 WINDOW_NS: Final = 300_000_000_000
-"""How far back is kept at least, simulated time, where there is room."""
+"""Simulated time for which rows are kept."""
 APART_NS: Final = 100_000_000
 """Between rows, simulated time, where there is room."""
-ROWS_MAX: Final = WINDOW_NS // APART_NS
 FRAMES_BYTES: Final = 16 * 1024 * 1024
 STATUSES_BYTES: Final = 8 * 1024 * 1024
 LINKS_BYTES: Final = 8 * 1024 * 1024
@@ -41,38 +40,33 @@ _HOLE: Final[Numbers] = np.empty(0)
 class Rows:
     """The last rows of one kind."""
 
-    def __init__(self, bytes_max: int, dtype: DTypeLike = np.float64) -> None:
+    def __init__(self, tick_ns: int, bytes_max: int, dtype: DTypeLike = np.float64) -> None:
         self._rows: deque[Row] = deque()
-        self._bytes_max, self._dtype = bytes_max, dtype
-        self._bytes = 0
+        self._tick_ns, self._bytes_max, self._dtype = tick_ns, bytes_max, dtype
         self._is_interrupted = False
 
     def interrupt(self) -> None:
         """Have a hole before the next row."""
         self._is_interrupted = bool(self._rows)
 
-    def is_due(self, tick: int, tick_ns: int, count: int) -> bool:
-        """Whether a row of so many numbers is to be kept at a tick. What is later is forgotten: time went back."""
+    def is_due(self, tick: int, count: int) -> bool:
+        """Whether a row of `count` numbers is to be kept at a tick. Later rows are forgotten: time went back."""
         while self._rows and self._rows[-1][0] > tick:
-            self._bytes -= _size(self._rows.pop())
+            self._rows.pop()
         if not self._rows:
             return True
         size = count * np.dtype(self._dtype).itemsize + ROW_BYTES
         apart_ns = max(APART_NS, WINDOW_NS * size // self._bytes_max)
-        return (tick - self._rows[-1][0]) * tick_ns >= apart_ns
+        return (tick - self._rows[-1][0]) * self._tick_ns >= apart_ns
 
     def keep(self, tick: int, what: Any, numbers: Any) -> None:
         """Keep a row that is due."""
         if self._is_interrupted and self._rows:
-            self._add((self._rows[-1][0] + 1, None, _HOLE))
+            self._rows.append((self._rows[-1][0] + 1, None, _HOLE))
         self._is_interrupted = False
-        self._add((tick, what, np.array(numbers, self._dtype)))
-        while len(self._rows) > ROWS_MAX or self._bytes > self._bytes_max:
-            self._bytes -= _size(self._rows.popleft())
-
-    def _add(self, row: Row) -> None:
-        self._rows.append(row)
-        self._bytes += _size(row)
+        self._rows.append((tick, what, np.array(numbers, self._dtype)))
+        while (tick - self._rows[0][0]) * self._tick_ns > WINDOW_NS:
+            self._rows.popleft()
 
     @property
     def newest(self) -> Any:
@@ -104,18 +98,14 @@ def _points(rows: list[Row], place_in: Callable[[Any], int | None], has_gaps: bo
                 yield tick, value
 
 
-def _size(row: Row) -> int:
-    return row[2].nbytes + ROW_BYTES
-
-
 class History:
     """The history of one run."""
 
     def __init__(self, tick_ns: int) -> None:
         self._tick_ns = tick_ns
-        self._frames = Rows(FRAMES_BYTES, np.float32)
-        self._statuses = Rows(STATUSES_BYTES)
-        self._links = Rows(LINKS_BYTES)
+        self._frames = Rows(tick_ns, FRAMES_BYTES, np.float32)
+        self._statuses = Rows(tick_ns, STATUSES_BYTES)
+        self._links = Rows(tick_ns, LINKS_BYTES)
         self._readings: dict[Reading, Rows] = {}
         self._watched: Collection[Reading] = ()
 
@@ -130,7 +120,7 @@ class History:
 
     def keep_frame(self, tick: int, values: NDArray[np.float64]) -> None:
         """Keep the numbers of a frame that are shown."""
-        if self._frames.is_due(tick, self._tick_ns, len(values)):
+        if self._frames.is_due(tick, len(values)):
             self._frames.keep(tick, "frame", values)
 
     def keep(self, message: Mapping[str, Any]) -> None:
@@ -145,12 +135,12 @@ class History:
 
     def _keep_status(self, status: Mapping[str, Any]) -> None:
         before: Mapping[str, int] = self._statuses.newest or {}
-        if self._statuses.is_due(status["ticks"], self._tick_ns, len(before)):
+        if self._statuses.is_due(status["ticks"], len(before)):
             numbers = dict(_numbers(status, ""))
             self._statuses.keep(status["ticks"], _places(before, numbers), [*numbers.values()])
 
     def _keep_links(self, tick: int, links: list[Mapping[str, Any]]) -> None:
-        if not self._links.is_due(tick, self._tick_ns, len(links) * len(FIGURES)):
+        if not self._links.is_due(tick, len(links) * len(FIGURES)):
             return
         rows: dict[Link, list[Mapping[str, Any]]] = {}
         for row in links:
@@ -165,12 +155,12 @@ class History:
     def _keep_readings(self, reading: Reading, points: list[tuple[int, list[float]]]) -> None:
         if reading not in self._watched:
             return
-        rows = self._readings.pop(reading, None) or Rows(READINGS_BYTES)
+        rows = self._readings.pop(reading, None) or Rows(self._tick_ns, READINGS_BYTES)
         self._readings[reading] = rows  # the one received last
         if len(self._readings) > READINGS_MAX:
             del self._readings[next(iter(self._readings))]
         for tick, numbers in points:
-            if rows.is_due(tick, self._tick_ns, len(numbers)):
+            if rows.is_due(tick, len(numbers)):
                 rows.keep(tick, reading, numbers)
 
     def reader(self, curve: Curve) -> Callable[[], Points]:

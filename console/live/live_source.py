@@ -1,8 +1,8 @@
 """A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
 
 Looking on costs the run what its leases say: they are renewed only while a browser looks; while none does, a status is
-asked for each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
-meanwhile; of a run that has ended pages are told how. Asking waits in threads, one connection each, so that nobody
+requested each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
+meanwhile; pages get the reason of the end of a run. Requests wait in threads, one connection each, so that none
 waits for another's answer.
 """
 
@@ -101,7 +101,7 @@ class LiveSource:
         if wrong:
             raise BadValue("no argument of a request", wrong[0])
         if verb in JOB_VERBS:
-            assert self._sending is not None, "a source without these verbs is not asked for them"
+            assert self._sending is not None, "a source without these verbs gets no request"
             self._following.check_present(arguments.get("robot"))
             return await self._sending.ask(verb, arguments)
         loop = asyncio.get_running_loop()
@@ -111,7 +111,7 @@ class LiveSource:
         return answered
 
     def _ask(self, verb: str, arguments: dict[str, Any]) -> tuple[Answered, str]:
-        assert self._connect_operator is not None, "a source without verbs is not asked"
+        assert self._connect_operator is not None, "a source without verbs gets no request"
         try:
             control = self._idle.pop()
         except IndexError:

@@ -33,13 +33,13 @@ def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
     if stopped_by and reason == "stopped":
         reason = f"stopped by {stopped_by}"
     command = "" if capture is None else f"foosim view {shlex.quote(capture)}"
-    said = f"The run has {'failed' if failed else 'ended'} at tick {result['ticks']}: {reason}. "
+    text = f"The run has {'failed' if failed else 'ended'} at tick {result['ticks']}: {reason}. "
     if capture is None:
-        said += "It has no capture."
+        text += "It has no capture."
     else:
         state = "" if is_complete(Path(capture)) else " (unfinished)"
-        said += f"Its capture is {capture}{state}; this shows it: {command}"
+        text += f"Its capture is {capture}{state}; this shows it: {command}"
     return {
         "type": "presence", "state": "ended", "failed": failed, "reason": reason, "capture": capture,
-        "command": command, "text": said,
+        "command": command, "text": text,
     }  # fmt: skip

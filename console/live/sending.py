@@ -1,8 +1,8 @@
 """The console as a client of a live run: connects as the endpoint that the deployment declares for it, and gives jobs.
 
-It connects when a browser looks, stays for all browsers, and tells pages how the jobs stand. One that cannot connect,
-as where another console has the endpoint, says why, and tries again. Waiting is done in a thread of its own, the only
-one that knows the client.
+It connects when a browser looks, stays for all browsers, and reports the state of the jobs to pages. One that cannot
+connect, as where another console has the endpoint, reports the reason, and tries again. Waiting is done in a thread of
+its own, the only one that knows the client.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Sending:
             self._thread.shutdown(wait=False)
 
     async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
-        """Give a job, or cancel one. Raises Refused, whose text says why it is not."""
+        """Give a job, or cancel one. Raises Refused with the reason."""
         answered = await self._in_thread(lambda: self._ask(verb, dict(arguments)))
         self._is_wanted.set()
         return answered
@@ -100,17 +100,17 @@ class Sending:
     def _connected(self) -> Desk:
         """Return the desk, connected. Raises Refused."""
         if self._desk is None:
-            assert self._drawing is not None, "a world is described before it is asked for anything"
+            assert self._drawing is not None, "a world is described before its first request"
             deployment = self._drawing.deployment
             try:
                 self._client = self._join(deployment.console)
             except Refused as refused:
-                raise Failed(f"this console can send nobody, it is not connected: {refused}") from None
+                raise Failed(f"this console cannot send robots, it is not connected: {refused}") from None
             self._desk = Desk(self._client, deployment, self._drawing.layout)
         return self._desk
 
     def _turn(self) -> dict[str, Any]:
-        """Receive for a moment; return what pages are told."""
+        """Receive for a moment; return the message for pages."""
         jobs: list[dict[str, Any]] = []
         problem = ""
         try:

@@ -1,6 +1,6 @@
-"""Watched details: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
+"""WatchList details: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
 
-Pure; explaining takes milliseconds a packet, so it is done where it holds up nobody, and once for each packet.
+Pure; explaining takes milliseconds a packet, so it is done in a thread, and once for each packet.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ FRAMES_KEPT: Final = 64
 FRAMES_APART_TICKS: Final = 20
 
 
-class Watched:
+class WatchList:
     """The last published details."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._frames: deque[Frame] = deque(maxlen=FRAMES_KEPT)
-        self._told: dict[Link, Any] = {}
+        self._last_drops: dict[Link, Any] = {}
         """The drops of each link as they were explained last."""
         self._rules = RuleTexts(deployment)
-        self._said: dict[Link, str] = {}
+        self._last_rules: dict[Link, str] = {}
         """The last published rule of each link."""
         self._read: dict[str, int] = {}
         """The tick of the last published reading, by robot and channel."""
@@ -65,18 +65,18 @@ class Watched:
     def drops(
         self, report: Mapping[str, Any], links: Iterable[Link], at_ns: int = 0, who: Mapping[int, str] | None = None
     ) -> list[dict[str, Any]]:
-        """Return the messages about links whose drops are others than those that were told, or whose rule is another
-        one at this time; `who` names who asked for the events of the network of a tick."""
-        told: dict[Link, Any] = {}
-        said: dict[Link, str] = {}
+        """Return the messages about links whose drops or whose rule have changed by this time; `who` names the
+        requester of the events of the network of a tick."""
+        drops: dict[Link, Any] = {}
+        rules: dict[Link, str] = {}
         messages = []
         for source, destination in links:
             link, rows = (source, destination), report.get("drops", {}).get(f"{source}>{destination}", [])
             asked = [(tick, event) for tick, event in report.get("asked", [])]
-            told[link], said[link] = rows, self._rules.text(source, destination, at_ns, asked, who)
-            if self._told.get(link) != rows or self._said.get(link) != said[link]:
-                messages.append(self._message(report, source, destination, said[link]))
-        self._told, self._said = told, said
+            drops[link], rules[link] = rows, self._rules.text(source, destination, at_ns, asked, who)
+            if self._last_drops.get(link) != rows or self._last_rules.get(link) != rules[link]:
+                messages.append(self._message(report, source, destination, rules[link]))
+        self._last_drops, self._last_rules = drops, rules
         return messages
 
     def _message(self, report: Mapping[str, Any], source: str, destination: str, rule: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from foosim.deployment.text.files import read_source_file
 def branch_answer(recording: Recording, tick: int) -> Answered:
     """Return the command that continues from a tick; its tick is that of the captured frame that the run begins with.
 
-    Behind a `#` it says where the deployment's file is not the captured one. Raises BadValue for a tick without a frame
+    After a `#` it warns that the deployment's file is not the captured one. Raises BadValue for a tick without a frame
     before it, CaptureError.
     """
     number = recording.index.places[FRAME].newest(tick * recording.tick_ns)

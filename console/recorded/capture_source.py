@@ -22,9 +22,8 @@ from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import ARGUMENTS, VERBS, Clock, Deck, checked
 from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.branch_text import branch_answer
-from foosim.console.recorded.capture_curves import curve_points, reading_points
+from foosim.console.recorded.capture_curves import curve_points, reading_points, status_at
 from foosim.console.recorded.capture_history import CaptureHistory
-from foosim.console.recorded.capture_status import status_at
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.recorded.whereabouts import Whereabouts
 from foosim.console.shown.compare import Where

@@ -1,6 +1,6 @@
-"""What each link of a captured run did up to any time: windows of seconds behind the slider, and the last drops.
+"""What each link of a captured run did up to any time: windows of seconds up to the slider, and the last drops.
 
-Packets come in the order of the file; per link their times are sorted when they are asked for, and a window is two
+Packets come in the order of the file; per link their times are sorted at a request, and a window is two
 searches. A packet is offered when it was sent, delivered at the tick of its arrival, dropped at its sending or, where
 it had come so far, at its arrival: as the totals of a running vHub count. Pure: neighbours are `capture_history`, which
 reads, and `links`, which places them in the world.
@@ -22,7 +22,7 @@ from foosim.vhub.links.fabric import link_name
 from foosim.vhub.network.packet import DELIVERED, DROPPED
 
 LINKS_MAX: Final = 4096
-"""Number of links with counts of their own; packets of further ones are counted in `others`."""
+"""Number of links with counts; packets of further ones are in no window."""
 DROPS_SHOWN: Final = 8
 SHARE_DIGITS: Final = 6
 
@@ -72,7 +72,7 @@ class Timed:
         return self._sorted
 
     def span(self, after_ns: int, until_ns: int) -> tuple[int, int]:
-        """Return which of them, in order, are behind one time and not behind another, as first and stop."""
+        """Return the range of them, in order, after one time and up to another, as first and stop."""
         times = self.in_order()[0]
         return int(times.searchsorted(after_ns, "right")), int(times.searchsorted(until_ns, "right"))
 
@@ -91,20 +91,15 @@ class LinkHistory:
     """All links of a run. `add` takes rows in the order of the file."""
 
     def __init__(self, tick_ns: int) -> None:
-        self.packets = 0
-        self.others = 0
-        """Packets of links beyond `LINKS_MAX`, which no window has."""
         self._tick_ns = tick_ns
         self._links: dict[LinkKey, LinkRecord] = {}
 
     def add(self, mark: PacketMark, number: int) -> int:
         """Count a packet, whose row has this number; return when it was dropped (ns), -1 when it was not."""
-        self.packets += 1
         key = mark.source, mark.destination, link_name(mark.rule, mark.radio)
         record = self._links.get(key)
         if record is None:
             if len(self._links) >= LINKS_MAX:
-                self.others += 1
                 return -1
             record = self._links[key] = LinkRecord()
         record.offered.add(mark.sent_ns, mark.queue_ns)
@@ -124,7 +119,7 @@ class LinkHistory:
         `delay_ms` is the mean of what arrived in the window (null for nothing), `queue_ms` what the newest packet
         waited, `loss` the share of what was decided.
         """
-        told = []
+        found = []
         for (source, destination, rule), record in sorted(self._links.items()):
             if only is not None and only != (source, destination):
                 continue
@@ -140,7 +135,7 @@ class LinkHistory:
             delivered, dropped = arrived_to - arrived, sum(causes.values())
             delays = record.delivered.in_order()[2]
             delay_ns = (int(delays[arrived_to]) - int(delays[arrived])) / delivered if delivered else None
-            told.append(
+            found.append(
                 {
                     "from": source,
                     "to": destination,
@@ -154,7 +149,7 @@ class LinkHistory:
                     "causes": causes,
                 }
             )
-        return told
+        return found
 
     def totals(self, at_ns: int) -> dict[str, int]:
         """Return how many packets were offered, delivered and dropped by a time, and are under way."""

@@ -19,10 +19,9 @@ from __future__ import annotations
 
 import csv
 from array import array
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import cos, isfinite, radians, sin, sqrt
+from math import cos, hypot, isfinite, radians, sin
 from typing import Final
 
 import numpy as np
@@ -40,12 +39,8 @@ YAWS: Final[Mapping[str, Callable[[float], float]]] = {"yaw": float, "yaw_rad": 
 SEPARATORS: Final = ",;\t"
 LENGTH_OFF: Final = 0.01
 """By how much the length of a quaternion may differ from 1: tables are rounded."""
-ROWS_MAX: Final = 20_000_000
-ENTITIES_MAX: Final = 10_000
 METRES_MAX: Final = 1e6
 NS_MAX: Final = 2**62
-
-Number = Callable[[Sequence[str]], float]
 
 
 class BadPoses(Refused):
@@ -56,108 +51,92 @@ class BadPoses(Refused):
 
 @dataclass(slots=True)
 class _Samples:
-    """What was read of one entity."""
+    """The samples of one entity."""
 
     times: array[int] = field(default_factory=lambda: array("q"))
     poses: array[float] = field(default_factory=lambda: array("d"))
 
 
 class _Table:
-    """The columns of a table, and how a line is read by them."""
+    """The columns of a table by name, and how a line is read by them."""
 
     def __init__(self, place: str, header: Sequence[str]) -> None:
-        self._names = [name.strip().lower() for name in header]
-        self._place = place
-        double = sorted(name for name, count in Counter(self._names).items() if count > 1 and name)
+        names = [name.strip().lower() for name in header]
+        self._place, self._columns = place, {name: column for column, name in enumerate(names)}
+        self._count = len(names)
+        double = sorted(name for column, name in enumerate(names) if name and self._columns[name] != column)
         if double:
-            raise BadPoses(f"{place}: column {double[0]!r} stands there twice")
-        time = self._one("time", TIMES)
-        self._time, self._ns = self._names.index(time), TIMES[time]
-        self._name = self._names.index(self._one("what moves", NAMES))
-        self._lengths = [self._length(axis) for axis in "xyz"]
-        turns = [name for name in YAWS if name in self._names]
-        parts = [name for name in QUATERNION if name in self._names]
-        if parts and len(parts) < len(QUATERNION):
-            missing = ", ".join(sorted({*QUATERNION} - {*parts}))
+            raise BadPoses(f"{place}: column {double[0]!r} is there twice")
+        self._time, self._name = self._one("time", TIMES), self._one("what moves", NAMES)
+        axes = "xyz" if any(f"z{unit}" in self._columns for unit in LENGTHS) else "xy"
+        self._lengths = [self._one(axis, [f"{axis}{unit}" for unit in LENGTHS]) for axis in axes]
+        self._turn = [name for name in (*YAWS, *QUATERNION) if name in self._columns]
+        if self._turn and self._turn[0] in QUATERNION and len(self._turn) < len(QUATERNION):
+            missing = ", ".join(sorted({*QUATERNION} - {*self._turn}))
             raise BadPoses(f"{place}: an orientation needs {', '.join(QUATERNION)}; {missing} is missing")
-        if len(turns) > 1 or (turns and parts):
-            raise BadPoses(f"{place}: one orientation, not {', '.join([*turns, *parts])}")
-        self._yaw = turns[0] if turns else ""
-        self._quaternion = [self._names.index(name) for name in parts]
+        if len(self._turn) > 1 and self._turn[0] in YAWS:
+            raise BadPoses(f"{place}: one orientation, not {', '.join(self._turn)}")
 
     def _one(self, what: str, names: Iterable[str]) -> str:
-        found = [name for name in names if name in self._names]
+        """Return the name of the one column of these names. Raises BadPoses."""
+        found = [name for name in names if name in self._columns]
         if len(found) == 1:
             return found[0]
         if found:
             raise BadPoses(f"{self._place}: one column for {what}, not {' and '.join(found)}")
-        close = [nearest for name in self._names if (nearest := nearest_name(name, [*names])) is not None]
-        columns = ", ".join(name for name in self._names if name) or "none"
+        close = [nearest for name in self._columns if (nearest := nearest_name(name, [*names])) is not None]
+        columns = ", ".join(name for name in self._columns if name) or "none"
         hint = f", nearest is {close[0]}" if close else ""
         raise BadPoses(f"{self._place}: no column for {what} ({', '.join(names)}) among {columns}{hint}")
 
-    def _length(self, axis: str) -> tuple[int, float] | None:
-        found = [f"{axis}{unit}" for unit in LENGTHS if f"{axis}{unit}" in self._names]
-        if not found and axis == "z":
-            return None
-        name = self._one(axis, [f"{axis}{unit}" for unit in LENGTHS])
-        return self._names.index(name), LENGTHS[name[1:]]
-
     def row(self, place: str, cells: Sequence[str]) -> tuple[str, int, list[float]]:
         """Return a line's values: name, time in ns, the pose's seven numbers."""
-        if len(cells) != len(self._names):
-            raise BadPoses(f"{place}: {len(cells)} values, the first line names {len(self._names)} columns")
-        name = cells[self._name].strip()
+        if len(cells) != self._count:
+            raise BadPoses(f"{place}: {len(cells)} values, the first line names {self._count} columns")
+        name = cells[self._columns[self._name]].strip()
         if not name:
-            raise BadPoses(f"{place}: column {self._names[self._name]!r} is empty")
-        time_ns = self._time_ns(place, cells[self._time].strip())
-        position = [
-            0.0 if length is None else self._number(place, length[0], cells, METRES_MAX / length[1]) * length[1]
-            for length in self._lengths
-        ]
-        return name, time_ns, [*position, *self._orientation(place, cells)]
+            raise BadPoses(f"{place}: column {self._name!r} is empty")
+        units = [(length, LENGTHS[length[1:]]) for length in self._lengths]
+        position = [self._number(place, length, cells, METRES_MAX / unit) * unit for length, unit in units]
+        return name, self._time_ns(place, cells), [*position, 0.0][:3] + self._orientation(place, cells)
 
-    def _time_ns(self, place: str, text: str) -> int:
-        column = self._names[self._time]
+    def _time_ns(self, place: str, cells: Sequence[str]) -> int:
+        text, unit = cells[self._columns[self._time]].strip(), TIMES[self._time]
         # A float has too few digits for ns of a day and more.
-        if self._ns == 1 and text.removeprefix("-").isdigit():
-            time_ns = int(text[:32])
-        else:
-            time_ns = round(self._number(place, self._time, {self._time: text}, NS_MAX / self._ns) * self._ns)
-        if abs(time_ns) > NS_MAX:
-            raise BadPoses(describe(f"{place}: column {column!r} is out of range", text))
-        return time_ns
+        if unit == 1 and text.removeprefix("-").isdigit() and abs(int(text[:32])) <= NS_MAX:
+            return int(text)
+        return round(self._number(place, self._time, cells, NS_MAX / unit) * unit)
 
-    def _number(self, place: str, column: int, cells: Sequence[str] | Mapping[int, str], most: float) -> float:
-        text = cells[column].strip()
+    def _number(self, place: str, column: str, cells: Sequence[str], most: float) -> float:
+        text = cells[self._columns[column]].strip()
         try:
             number = float(text)
         except ValueError:
             number = float("nan")
         if not isfinite(number):
-            raise BadPoses(describe(f"{place}: column {self._names[column]!r} is not a number", text))
+            raise BadPoses(describe(f"{place}: column {column!r} is not a number", text))
         if abs(number) > most:
-            raise BadPoses(describe(f"{place}: column {self._names[column]!r} is out of range ({most:g})", text))
+            raise BadPoses(describe(f"{place}: column {column!r} is out of range ({most:g})", text))
         return number
 
-    def _orientation(self, place: str, cells: Sequence[str]) -> tuple[float, float, float, float]:
-        if self._yaw:
-            angle = YAWS[self._yaw](self._number(place, self._names.index(self._yaw), cells, METRES_MAX))
-            return 0.0, 0.0, sin(angle / 2), cos(angle / 2)
-        if not self._quaternion:
-            return 0.0, 0.0, 0.0, 1.0
-        x, y, z, w = (self._number(place, column, cells, 2.0) for column in self._quaternion)
-        length = sqrt(x * x + y * y + z * z + w * w)
+    def _orientation(self, place: str, cells: Sequence[str]) -> list[float]:
+        numbers = [self._number(place, column, cells, METRES_MAX) for column in self._turn]
+        if not numbers:
+            return [0.0, 0.0, 0.0, 1.0]
+        if len(numbers) == 1:
+            angle = YAWS[self._turn[0]](numbers[0])
+            return [0.0, 0.0, sin(angle / 2), cos(angle / 2)]
+        length = hypot(*numbers)
         if abs(length - 1.0) > LENGTH_OFF:
             raise BadPoses(f"{place}: a quaternion of length {length:.4g}, it has 1")
-        return x / length, y / length, z / length, w / length
+        return [number / length for number in numbers]
 
 
 def read_tracks(lines: Iterable[str], name: str) -> dict[str, Track]:
     """Return the track of each entity or link in a table, by name. `name` is that of the file. Raises BadPoses."""
     table: _Table | None = None
     found: dict[str, _Samples] = {}
-    rows, separator = 0, ","
+    separator = ","
     for number, line in enumerate(lines, 1):
         place = f"{name}:{number}"
         text = line.lstrip("\ufeff") if number == 1 else line
@@ -172,28 +151,18 @@ def read_tracks(lines: Iterable[str], name: str) -> dict[str, Track]:
         if table is None:
             table = _Table(place, cells)
             continue
-        rows += 1
-        if rows > ROWS_MAX:
-            raise BadPoses(f"{place}: more than {ROWS_MAX} lines")
-        _add(found, place, *table.row(place, cells))
+        entity, time_ns, pose = table.row(place, cells)
+        samples = found.setdefault(entity, _Samples())
+        if samples.times and time_ns <= samples.times[-1]:
+            at_s, before_s = time_ns / 1e9, samples.times[-1] / 1e9
+            raise BadPoses(f"{place}: {entity} at {at_s:.9g} s is not later than {before_s:.9g} s; times ascend")
+        samples.times.append(time_ns)
+        samples.poses.extend(pose)
     if table is None:
         raise BadPoses(f"{name}: it is empty, the first line names the columns")
     if not found:
-        raise BadPoses(f"{name}: no line behind that of the columns")
+        raise BadPoses(f"{name}: no line after that of the columns")
     return {entity: _track(samples) for entity, samples in sorted(found.items())}
-
-
-def _add(found: dict[str, _Samples], place: str, entity: str, time_ns: int, pose: Sequence[float]) -> None:
-    samples = found.get(entity)
-    if samples is None:
-        if len(found) >= ENTITIES_MAX:
-            raise BadPoses(f"{place}: more than {ENTITIES_MAX} entities")
-        samples = found[entity] = _Samples()
-    if samples.times and time_ns <= samples.times[-1]:
-        before = samples.times[-1] / 1e9
-        raise BadPoses(f"{place}: {entity} at {time_ns / 1e9:.9g} s comes behind {before:.9g} s; times ascend")
-    samples.times.append(time_ns)
-    samples.poses.extend(pose)
 
 
 def _track(samples: _Samples) -> Track:

@@ -45,7 +45,7 @@ equal in its digest, or what was captured last before it."""
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is seen at a tick that was asked for. `tick` is that of what is shown, `frame` the newest up to it."""
+    """What is seen at a requested tick. `tick` is that of what is shown, `frame` the newest up to it."""
 
     asked: int
     tick: int
@@ -60,7 +60,7 @@ class Recording:
     """An opened capture, also an unfinished one and one that grows. It belongs to one thread."""
 
     def __init__(self, path: Path, topics: tuple[str, ...] = ()) -> None:
-        """`topics` are indexed beside those that are needed. Raises CaptureError."""
+        """`topics` are indexed beside the needed ones. Raises CaptureError."""
         self.about: Final = read_about(path)
         self.deployment: Final[Deployment] = deployment_of(self.about)
         self.tick_ns: Final = self.deployment.tick_ns
@@ -148,7 +148,7 @@ class Recording:
         return self.frame(self.index.places[FRAME].newest(tick * self.tick_ns))
 
     def neighbour(self, tick: int, *, later: bool) -> int | None:
-        """Return the next tick behind, or before, one with a captured frame or poses; None where there is none."""
+        """Return the next tick after, or before, one with a captured frame or poses; None where there is none."""
         found = []
         for topic in (FRAME, POSES):
             places = self.index.places[topic]
@@ -163,7 +163,7 @@ class Recording:
         return self.drawing.known({pose.link: (pose.position, pose.orientation) for pose in poses})
 
     def inputs(self, after: int, until: int) -> Iterator[CapturedTick]:
-        """Yield what led to the ticks behind one, up to another. Raises CaptureError where one is missing."""
+        """Yield what led to the ticks after one, up to another. Raises CaptureError where one is missing."""
         places = self.index.places[TICK]
         for tick in range(after + 1, until + 1):
             number = places.newest(tick * self.tick_ns)

@@ -1,1 +1,1 @@
-"""The report of a capture: one page with charts and map, made of the page's modules."""
+"""The report of a capture: one page with charts and map, drawn by the page's modules."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import Counter, OrderedDict
-from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 
@@ -16,33 +14,47 @@ from foosim.vhub.stages.residual import BURST_LOSS, RANDOM_LOSS
 
 SAMPLES: Final = 512
 RECENT: Final = 1024
-"""Transmissions of a sender that are remembered, so that a broadcast is counted once whatever its receivers."""
-_RESIDUAL: Final = frozenset({RANDOM_LOSS, BURST_LOSS})
+"""Transmissions of a sender that are remembered, so that a broadcast is counted once for all its receivers."""
+
+T = TypeVar("T")
 
 
-class Sample:
-    """A uniform sample of a stream of numbers, all of them up to `SAMPLES`; the same for the same stream.
+class Reservoir(Generic[T]):
+    """A uniform sample of a stream, all of it up to `most` items; the same for the same stream.
 
     Source: Vitter, "Random sampling with a reservoir" (1985), algorithm R.
     """
 
-    def __init__(self, *purpose: str) -> None:
+    def __init__(self, most: int, *purpose: str) -> None:
         self.count = 0
-        self.total = 0
-        self.most = 0
-        self._key = draw_key(0, "report", *purpose)
-        self.kept: array[int] = array("q")
+        self.kept: list[T] = []
+        self._most, self._key = most, draw_key(0, "report", *purpose)
 
-    def add(self, value: int) -> None:
+    def add(self, item: T) -> None:
         self.count += 1
-        self.total += value
-        self.most = max(self.most, value)
-        if len(self.kept) < SAMPLES:
-            self.kept.append(value)
+        if len(self.kept) < self._most:
+            self.kept.append(item)
             return
         place = draw_words(self._key, self.count)[0] * self.count >> 64
-        if place < SAMPLES:
-            self.kept[place] = value
+        if place < self._most:
+            self.kept[place] = item
+
+
+class Times:
+    """Times in ns: their mean and maximum, and quantiles of a sample."""
+
+    def __init__(self, *purpose: str) -> None:
+        self.total = self.most = 0
+        self._sample: Reservoir[int] = Reservoir(SAMPLES, *purpose)
+
+    def add(self, time_ns: int) -> None:
+        self.total += time_ns
+        self.most = max(self.most, time_ns)
+        self._sample.add(time_ns)
+
+    @property
+    def count(self) -> int:
+        return self._sample.count
 
     @property
     def mean(self) -> float:
@@ -50,41 +62,43 @@ class Sample:
 
     def quantile(self, share: float) -> float:
         """Return a quantile, linear between neighbours; 0 of nothing."""
-        return float(np.quantile(np.array(self.kept), share)) if self.kept else 0.0
+        return float(np.quantile(self._sample.kept, share)) if self.count else 0.0
 
 
-@dataclass(slots=True)
-class LinkTally:
-    """One directed link. Copies that the link made are not counted, but for the age of information."""
+class Tally:
+    """Packets by fate, losses by cause, and the delays of delivered packets."""
 
-    offered: int = 0
-    delivered: int = 0
-    dropped: int = 0
-    causes: Counter[str] = field(default_factory=Counter)
-    delay_total_ns: int = 0
-    delay_most_ns: int = 0
-    _newest_ns: int = -1
-    _last_due_ns: int = -1
-    _first_due_ns: int = -1
-    _area: float = 0.0
-    _worst_ns: int = 0
+    def __init__(self, *purpose: str) -> None:
+        self.fates: Counter[str] = Counter()
+        self.causes: Counter[str] = Counter()
+        self.delay = Times("delay", *purpose)
 
     def add(self, row: PacketRow) -> None:
+        self.fates[row.fate] += 1
         if row.fate == "delivered":
-            self._renew(row.sent_ns, row.due_ns)
-        if row.copy:
-            return
-        self.offered += 1
-        if row.fate == "delivered":
-            delay_ns = row.due_ns - row.sent_ns
-            self.delivered += 1
-            self.delay_total_ns += delay_ns
-            self.delay_most_ns = max(self.delay_most_ns, delay_ns)
+            self.delay.add(row.due_ns - row.sent_ns)
         elif row.fate == "dropped":
-            self.dropped += 1
             self.causes[row.cause] += 1
 
-    def _renew(self, sent_ns: int, due_ns: int) -> None:
+    @property
+    def loss(self) -> float | None:
+        """The lost share of packets with a fate; None without one."""
+        judged = self.fates["delivered"] + self.fates["dropped"]
+        return self.fates["dropped"] / judged if judged else None
+
+
+class LinkAge:
+    """The age of the newest information that has arrived on a link, integrated over time.
+
+    Source: Kaul, Yates and Gruteser, "Real-time status: How often should one update?" (2012).
+    """
+
+    def __init__(self) -> None:
+        self._newest_ns = self._first_due_ns = self._last_due_ns = -1
+        self._area, self._worst_ns = 0.0, 0
+
+    def add(self, sent_ns: int, due_ns: int) -> None:
+        """Add a delivered packet, or a delivered copy of one."""
         if self._first_due_ns < 0:
             self._first_due_ns = self._last_due_ns = due_ns
         self._grow(due_ns)
@@ -99,12 +113,8 @@ class LinkTally:
         self._worst_ns = max(self._worst_ns, now_ns - self._newest_ns)
         self._last_due_ns = now_ns
 
-    def age_ns(self, end_ns: int) -> tuple[float, int] | None:
-        """Return the mean and the greatest age of the newest that has come, from the first arrival to the end.
-
-        None where nothing came. Source: Kaul, Yates and Gruteser, "Real-time status: How often should one update?"
-        (2012).
-        """
+    def until(self, end_ns: int) -> tuple[float, int] | None:
+        """Return the mean and the greatest age (ns) from the first arrival to the end; None without an arrival."""
         if self._newest_ns < 0:
             return None
         self._grow(end_ns)
@@ -114,13 +124,11 @@ class LinkTally:
 
 
 class SenderTally:
-    """One radio of an endpoint, or one queue of a wire: what was sent by it, each transmission once."""
+    """The transmissions of one radio of an endpoint, or of one queue of a wire."""
 
     def __init__(self, *purpose: str) -> None:
-        self.queue = Sample("queue", *purpose)
-        self.access = Sample("access", *purpose)
-        self.airtime_ns = 0
-        self.retries = 0
+        self.queue, self.access = Times("queue", *purpose), Times("access", *purpose)
+        self.airtime_ns = self.retries = 0
         self._recent: OrderedDict[tuple[int, int], None] = OrderedDict()
 
     def add(self, row: PacketRow, *, sends_once: bool) -> None:
@@ -137,41 +145,26 @@ class SenderTally:
         self.retries += row.retries
 
 
-class RuleTally:
-    """What went by one rule over one radio."""
+class RuleTally(Tally):
+    """The packets of one rule over one radio, and the rule's own part in their losses and delays."""
 
     def __init__(self, *purpose: str) -> None:
-        self.offered = self.dropped = self.residual = self.passed = 0
+        super().__init__(*purpose)
         self.links: set[tuple[str, str]] = set()
-        self.delay = Sample("delay", *purpose)
-        self.own = Sample("own delay", *purpose)
+        self.own = Times("own delay", *purpose)
+        self._passed = 0
+        """Packets that came as far as the rule's own loss and were not lost by it."""
 
     def add(self, row: PacketRow) -> None:
-        if row.copy:
-            return
-        self.offered += 1
+        super().add(row)
         self.links.add((row.source, row.destination))
-        self.dropped += row.fate == "dropped"
-        self.residual += row.cause in _RESIDUAL
-        self.passed += row.due_ns >= 0 or row.cause == CRC_FAIL
+        self._passed += row.due_ns >= 0 or row.cause == CRC_FAIL
         if row.fate == "delivered":
-            delay_ns = row.due_ns - row.sent_ns
-            self.delay.add(delay_ns)
             spent_ns = row.phase_ns + row.queue_ns + row.access_ns + row.airtime_ns + row.propagation_ns + row.held_ns
-            spent_ns += row.model_ns
-            self.own.add(delay_ns - spent_ns)
+            self.own.add(row.due_ns - row.sent_ns - spent_ns - row.model_ns)
 
-
-class BinTally:
-    """The packets of one channel that were sent in one span of time."""
-
-    def __init__(self, *purpose: str) -> None:
-        self.delivered = self.dropped = 0
-        self.delay = Sample(*purpose)
-
-    def add(self, row: PacketRow) -> None:
-        if row.fate == "delivered":
-            self.delivered += 1
-            self.delay.add(row.due_ns - row.sent_ns)
-        elif row.fate == "dropped":
-            self.dropped += 1
+    @property
+    def own_loss(self) -> float:
+        """The lost share of the packets that came as far as the rule's own loss."""
+        lost = self.causes[RANDOM_LOSS] + self.causes[BURST_LOSS]
+        return lost / (self._passed + lost) if self._passed + lost else 0.0

@@ -1,6 +1,6 @@
 """The console's board: the last messages of each source, the subscriptions of browsers, and their distribution.
 
-A browser that joins is told the sources, their scenes, the last moment and the last of each message, so that it draws
+A browser that joins gets the sources, their scenes, the last moment and the last of each message, so that it draws
 at once. Pure: time is given by `clock`, bytes leave through each reader's outbox.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
@@ -18,23 +18,16 @@ from foosim.console.shown.curves import points_of
 from foosim.console.shown.source import About, Curve, Link, Moment, Source, Wanted
 
 MARKS_MAX: Final = 4096
-"""Of one source: the last so many."""
+"""The last marks of one source."""
 WATCHED_MAX: Final = 64
 """Links, and readings, that all browsers together have looked at."""
 KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence", "jobs"})
-"""Messages of which the last one is kept for those that join, and of which only the newest waits."""
+"""Messages of which the last one is kept for browsers that join, and of which only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
 
 
-class Onlooker(Protocol):
-    """Observes the moments of all sources, for comparisons of two of them."""
-
-    def saw(self, source: int, moment: Moment) -> Iterable[Mapping[str, Any]]:
-        """Return complete messages for pages."""
-
-
 @dataclass
-class Told:
+class SourceState:
     """The last messages of one source."""
 
     about: About
@@ -62,15 +55,14 @@ class Board:
         sources: Sequence[Source],
         version: str,
         clock: Callable[[], float],
-        onlookers: Sequence[Onlooker] = (),
         cut_off: Callable[[Reader, str], None] = lambda reader, why: None,
     ) -> None:
         """`clock` gives seconds; `cut_off` ends the connection of a reader."""
         self.sources = sources
         self.readers: dict[str, Reader] = {}
         """By name."""
-        self._version, self._clock, self._onlookers, self._cut_off = version, clock, onlookers, cut_off
-        self._told = [Told(source.about) for source in sources]
+        self._version, self._clock, self._cut_off = version, clock, cut_off
+        self._states = [SourceState(source.about) for source in sources]
         self._wanted = [Wanted() for _ in sources]
 
     def feed(self, source: int) -> SourceFeed:
@@ -84,17 +76,17 @@ class Board:
         self.readers[reader.name] = reader
         reader.follows = {source: Follows() for source in range(len(self.sources))}
         reader.put_first("sources", self._welcome(reader, "welcome"))
-        for source, told in enumerate(self._told):
-            if told.scene:
-                reader.put_first(("scene", source), told.scene)
-            if told.shown is not None:
-                reader.show(told.shown, self._clock())
-            for kind, message in told.kept.items():
+        for source, state in enumerate(self._states):
+            if state.scene:
+                reader.put_first(("scene", source), state.scene)
+            if state.shown is not None:
+                reader.show(state.shown, self._clock())
+            for kind, message in state.kept.items():
                 reader.put_newest((kind, source), message)
-            if told.marks:
-                reader.put(encode_json({"type": "marks", "source": source, "marks": told.marks}))
-            if told.warning:
-                reader.put(told.warning)
+            if state.marks:
+                reader.put(encode_json({"type": "marks", "source": source, "marks": state.marks}))
+            if state.warning:
+                reader.put(state.warning)
         self._look()
 
     def leave(self, reader: Reader) -> None:
@@ -110,7 +102,7 @@ class Board:
             follows.hz, follows.overlays = message.hz, frozenset(message.overlays)
         elif isinstance(message, Watch):
             follows.link = message.link
-            known = None if message.link is None else self._told[message.source].watched.get(message.link)
+            known = None if message.link is None else self._states[message.source].watched.get(message.link)
             if known is not None:
                 reader.put_newest(("watched", message.source), known)
         else:
@@ -118,7 +110,7 @@ class Board:
             new = tuple(curve for curve in curves if curve not in follows.curves)
             follows.curves = curves
             follows.fields = self._fields(message, curves)
-        shown = self._told[message.source].shown
+        shown = self._states[message.source].shown
         if shown is not None:  # a paused world shows no other one
             follows.next_s = 0.0
             reader.show(shown, self._clock())
@@ -127,13 +119,13 @@ class Board:
 
     def _fields(self, message: Plot, curves: Iterable[Curve]) -> tuple[int, ...]:
         """Return the numbers of the frame among curves. Raises Malformed for one that the frame does not have."""
-        told = self._told[message.source]
-        if not told.scene or message.generation not in (None, told.generation):
+        state = self._states[message.source]
+        if not state.scene or message.generation not in (None, state.generation):
             return ()
         fields = tuple(curve.field for curve in curves if curve.field is not None)
-        wrong = [place for place in fields if place >= told.numbers]
+        wrong = [place for place in fields if place >= state.numbers]
         if wrong:
-            raise Malformed(f"series of field {wrong[0]}: the frame has {told.numbers} numbers")
+            raise Malformed(f"series of field {wrong[0]}: the frame has {state.numbers} numbers")
         return fields
 
     def checked(self, source: int) -> int:
@@ -146,11 +138,13 @@ class Board:
         sources = [
             {
                 "id": source,
-                **asdict(told.about),
-                "verbs": told.about.verbs if reader.role == "operator" else (),
-                "span": None if told.about.span is None else dict(zip(("first", "last"), told.about.span, strict=True)),
+                **asdict(state.about),
+                "verbs": state.about.verbs if reader.role == "operator" else (),
+                "span": None
+                if state.about.span is None
+                else dict(zip(("first", "last"), state.about.span, strict=True)),
             }
-            for source, told in enumerate(self._told)
+            for source, state in enumerate(self._states)
         ]
         return encode_json(
             {"type": kind, "role": reader.role, "name": reader.name, "sources": sources, "version": self._version}
@@ -170,7 +164,7 @@ class Board:
                 tuple(links[:WATCHED_MAX]),
                 tuple(readings[:WATCHED_MAX]),
             )
-            watched = self._told[number].watched
+            watched = self._states[number].watched
             for link in [known for known in watched if known not in wanted.links]:
                 del watched[link]
             if wanted != self._wanted[number]:
@@ -179,58 +173,55 @@ class Board:
 
     def has_ended(self) -> str:
         """Return how the first source has ended; empty while it runs."""
-        presence = self._told[0].presence
+        presence = self._states[0].presence
         return str(presence["text"]) if presence.get("state") == "ended" else ""
 
     # --- messages of sources -----------------------------------------------------------------------------------------
 
     def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
-        told = self._told[source]
-        changed, told.about = about != told.about, about
+        state = self._states[source]
+        changed, state.about = about != state.about, about
         if changed:
             for reader in self.readers.values():
                 reader.put_first("sources", self._welcome(reader, "sources"))
-        if scene == told.described:
+        if scene == state.described:
             return
-        told.generation += 1
-        told.described, told.shown = scene, None
-        told.links = len(scene["links"])
-        told.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
-        told.scene = encode_json({"type": "scene", "source": source, "generation": told.generation, **scene})
-        told.kept.pop("overlay", None)
+        state.generation += 1
+        state.described, state.shown = scene, None
+        state.links = len(scene["links"])
+        state.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
+        state.scene = encode_json({"type": "scene", "source": source, "generation": state.generation, **scene})
+        state.kept.pop("overlay", None)
         for reader in self.readers.values():
-            reader.put_first(("scene", source), told.scene)
+            reader.put_first(("scene", source), state.scene)
             reader.follows[source].fields = ()  # they were places in another world
 
     def show(self, source: int, moment: Moment) -> None:
-        told = self._told[source]
-        assert len(moment.poses) == told.links, f"{len(moment.poses)} poses of a scene of {told.links} links"
-        told.shown = Shown(source, told.generation, moment)
+        state = self._states[source]
+        assert len(moment.poses) == state.links, f"{len(moment.poses)} poses of a scene of {state.links} links"
+        state.shown = Shown(source, state.generation, moment)
         now_s = self._clock()
         for reader in self.readers.values():
-            reader.show(told.shown, now_s)
-        for onlooker in self._onlookers:
-            for message in onlooker.saw(source, moment):
-                self.tell(source, message)
+            reader.show(state.shown, now_s)
 
     def tell(self, source: int, message: Mapping[str, Any]) -> None:
-        told, kind = self._told[source], message["type"]
+        state, kind = self._states[source], message["type"]
         whole = {"source": source, **message}
         if kind == "overlay":
-            whole["generation"] = told.generation
+            whole["generation"] = state.generation
         if kind == "marks":
-            told.marks += message["marks"]
-            del told.marks[:-MARKS_MAX]
+            state.marks += message["marks"]
+            del state.marks[:-MARKS_MAX]
         text = b"" if kind == "readings" else encode_json(whole)
         if kind in KEPT:
-            told.kept[kind] = text
+            state.kept[kind] = text
         if kind == "watched":
-            told.watched[message["link"][0], message["link"][1]] = text
+            state.watched[message["link"][0], message["link"][1]] = text
         if kind == "presence":
-            told.presence = message
-            told.warning = b""  # the warning was about this load
+            state.presence = message
+            state.warning = b""  # the warning was about this load
         if kind == "note":
-            told.warning = b"" if message["level"] == "info" else text
+            state.warning = b"" if message["level"] == "info" else text
         for reader in list(self.readers.values()):
             try:
                 self._send(reader, source, kind, whole, text)

@@ -71,14 +71,14 @@ class Series(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def curve(self) -> Curve:
         """Return it, or raise `Malformed`."""
-        said = [self.field is not None, self.link is not None, bool(self.status), self.reading is not None]
-        if sum(said) != 1 or (self.link is None) != (not self.figure):
+        given = [self.field is not None, self.link is not None, bool(self.status), self.reading is not None]
+        if sum(given) != 1 or (self.link is None) != (not self.figure):
             raise Malformed(f"series {self.id}: give exactly one of field, link with figure, status, reading")
         return Curve(self.id, self.field, self.link, self.figure, self.status, self.reading, self.index)
 
 
 class Plot(_Message, frozen=True, tag="plot"):
-    """All that the page plots of a source: numbers of the frame among it travel behind the poses, in this order."""
+    """All that the page plots of a source: numbers of the frame among it follow the poses, in this order."""
 
     source: Place = 0
     series: Annotated[list[Series], Meta(max_length=CURVES_MAX)] = []
@@ -93,7 +93,7 @@ _decoder: Final[msgspec.json.Decoder[Message]] = msgspec.json.Decoder(Message)
 def read_message(payload: str | bytes) -> Message:
     """Return a page's message, or raise `Malformed`."""
     if isinstance(payload, bytes):
-        raise Malformed("a binary message; a page says JSON")
+        raise Malformed("a binary message; a page sends JSON")
     try:
         return _decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from foosim.console.shown.poses import packed
+from foosim.console.shown.drawing import packed
 from foosim.console.shown.source import Curve, Link, Moment
 
 Role = Literal["viewer", "operator"]
@@ -21,7 +21,7 @@ WAITING_MAX: Final = 256
 
 
 class Shown:
-    """One moment of a source; as bytes for each choice of numbers behind its poses, which browsers share."""
+    """One moment of a source; as bytes for each choice of numbers after its poses, which browsers share."""
 
     def __init__(self, source: int, generation: int, moment: Moment) -> None:
         self.source, self.generation, self.moment = source, generation, moment

@@ -1,7 +1,7 @@
 """The console's server: the page's files over HTTP, and a WebSocket for each browser, in one event loop.
 
-A browser has to come from this page (Origin), to know a token (first message), to keep to the messages of a page, and
-is one of so many; who does not is told why and cut off, and nobody else notices.
+A browser comes from this page (Origin), proves a token (first message) and sends messages of a page; any other one gets
+the reason and is cut off, and so is one beyond the limit of browsers. The others are not affected.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from websockets.http11 import Request, Response
 
 from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import encode_json
-from foosim.console.server.board import Board, Onlooker
+from foosim.console.server.board import Board
 from foosim.console.server.page_files import HEADERS, page_files
 from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Ask, Hello, read_message
 from foosim.console.server.reader import Reader, Role, TooSlow
@@ -80,13 +80,11 @@ def new_tokens() -> Tokens:
 class ConsoleServer:
     """Serves sources to browsers."""
 
-    def __init__(
-        self, sources: Sequence[Source], tokens: Tokens, version: str, onlookers: Sequence[Onlooker] = ()
-    ) -> None:
+    def __init__(self, sources: Sequence[Source], tokens: Tokens, version: str) -> None:
         """Call it in a running event loop."""
         self._loop = asyncio.get_running_loop()
         self._sources, self._tokens = sources, tokens
-        self.board = Board(sources, version, self._loop.time, onlookers, self._cut_off)
+        self.board = Board(sources, version, self._loop.time, self._cut_off)
         self._files = page_files()
         self._connections: dict[str, ServerConnection] = {}
         """Of readers, by their name."""
@@ -182,7 +180,7 @@ class ConsoleServer:
             return _response(400, PLAIN, b"A request has one Host header.\n")
         if self._is_local and _host("".join(hosts)) not in LOCAL_HOSTS:
             # Another host name that resolves to this address would give its pages the rights of this origin.
-            return _response(421, PLAIN, b"This console is asked for as 127.0.0.1 or localhost.\n")
+            return _response(421, PLAIN, b"The address of this console is 127.0.0.1 or localhost.\n")
         path = request.path.partition("?")[0]
         if path == "/ws":
             return None
@@ -246,15 +244,15 @@ class ConsoleServer:
 
     async def _read(self, connection: ServerConnection, reader: Reader) -> None:
         """Handle a page's messages, until its connection ends. Raises Malformed."""
-        asked = asyncio.Semaphore(ASKS_MAX)
+        slots = asyncio.Semaphore(ASKS_MAX)
         async for payload in connection:
             message = read_message(payload)
             if isinstance(message, Hello):
                 raise Malformed("a second hello")
             if isinstance(message, Ask):
                 self.board.checked(message.source)
-                await asked.acquire()
-                self._go(self._ask(reader, message, asked))
+                await slots.acquire()
+                self._go(self._ask(reader, message, slots))
                 continue
             curves = self.board.follow(reader, message)
             if curves:
@@ -266,7 +264,7 @@ class ConsoleServer:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _ask(self, reader: Reader, ask: Ask, asked: asyncio.Semaphore) -> None:
+    async def _ask(self, reader: Reader, ask: Ask, slots: asyncio.Semaphore) -> None:
         """Forward a page's request to a source, and answer it."""
         source = self._sources[ask.source]
         try:
@@ -278,7 +276,7 @@ class ConsoleServer:
         except Refused as refused:
             answered = Answered(str(refused), 0, accepted=False)
         finally:
-            asked.release()
+            slots.release()
         self._put(
             reader,
             {

@@ -1,4 +1,4 @@
-"""Serves sources until a signal ends the process; shared by `foosim view` and `foosim view`.
+"""Serves sources until a signal ends the process; the shell of `foosim view`.
 
 By default only this machine reaches the page. Another address takes a certificate, which browsers have to trust: a
 token that travels in the open is known to everybody on the way.
@@ -10,7 +10,7 @@ import asyncio
 import os
 import ssl
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -18,13 +18,9 @@ from pathlib import Path
 from foosim.common.addresses import LOOPBACK, Address, Insecure, parse_address
 from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
-from foosim.console.server.board import Onlooker
 from foosim.console.server.server import ConsoleServer, Tokens, new_tokens
 from foosim.console.shown.source import Source
 from foosim.runtime.process import Stop
-
-MakeSources = Callable[[], tuple[Sequence[Source], Sequence[Onlooker]]]
-"""Makes sources and their observers; called in the event loop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +37,13 @@ class ServeOptions:
     """A file for the addresses, readable by its owner only: the operator's address permits requests."""
 
 
-def serve_sources(make: MakeSources, options: ServeOptions) -> None:
+def serve_sources(sources: Sequence[Source], options: ServeOptions) -> None:
     """Serve until a signal ends it; the first line on standard output is the address.
 
     Raises BadValue, Insecure, and Failed if the address cannot be used.
     """
     address, tls = listening_at(options)
-    asyncio.run(_serve(make, options, address, tls))
+    asyncio.run(_serve(sources, options, address, tls))
 
 
 def listening_at(options: ServeOptions) -> tuple[Address, ssl.SSLContext | None]:
@@ -71,7 +67,7 @@ def listening_at(options: ServeOptions) -> tuple[Address, ssl.SSLContext | None]
 
 
 async def _serve(
-    make: MakeSources,
+    sources: Sequence[Source],
     options: ServeOptions,
     address: Address,
     tls: ssl.SSLContext | None,
@@ -82,9 +78,8 @@ async def _serve(
         loop.call_soon_threadsafe(ended.set)
 
     Stop().then(end)
-    sources, onlookers = make()
     tokens = new_tokens()
-    server = ConsoleServer(sources, tokens, version("foosim"), onlookers)
+    server = ConsoleServer(sources, tokens, version("foosim"))
     try:
         async with server.listening(address.host.strip("[]"), address.port, tls) as port:
             stem = f"{'http' if tls is None else 'https'}://{address.host}:{port}/"

@@ -7,7 +7,7 @@ Pure: neighbours are `tracks` (what is known between samples), `poses_csv`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
 from typing import Any, Final
@@ -63,7 +63,7 @@ class Comparison:
         return not self._wanted
 
     def work(self, points: int) -> None:
-        """Make so many further points."""
+        """Make some further points."""
         for tick in self._wanted[:points]:
             found = distances(self._one(tick * self._tick_ns), self._other(tick * self._tick_ns))
             self._most[tick] = found[0].metres if found else None
@@ -97,11 +97,11 @@ class Course:
             self._points.append((self._points[-1][0] + 1, None))
         self._is_interrupted = False
         newest = tick, found[0].metres if found else None
-        told = _content(tick, found, [*self._points, newest])
+        content = _content(tick, found, [*self._points, newest])
         known = [at for at, metres in self._points[-1:] if metres is not None]
         if not known or newest[1] is None or tick - known[0] >= self._apart:
             self._keep(newest)
-        return {**told, "complete": True}
+        return {**content, "complete": True}
 
     def _keep(self, point: tuple[int, float | None]) -> None:
         if point[1] is None and [metres for _, metres in self._points[-2:]] == [None, None]:
@@ -110,21 +110,12 @@ class Course:
         if len(self._points) > POINTS:
             first, last = self._points[0][0], self._points[-1][0]
             self._apart = max(1, 2 * (last - first) // POINTS)
-            self._points = [*self._thinned()][-POINTS:]
-
-    def _thinned(self) -> Iterator[tuple[int, float | None]]:
-        """Yield the points that are far enough from the one before, the first of each hole, and the last one."""
-        at, was_known = self._points[0][0] - self._apart, True
-        for tick, metres in self._points[:-1]:
-            if (metres is None and was_known) or tick - at >= self._apart:
-                yield tick, metres
-                at = tick
-            was_known = metres is not None
-        yield self._points[-1]
+            kept = (point for number, point in enumerate(self._points) if number % 2 == 0 or point[1] is None)
+            self._points = [*kept][-POINTS:]
 
 
 def _content(tick: int, found: Sequence[Distance], series: Iterable[tuple[int, float | None]]) -> dict[str, Any]:
-    """Return what is told: the distance of each entity at a tick, and the series of the largest, m."""
+    """Return the content of a message: the distance of each entity at a tick, and the series of the largest, m."""
     return {
         "at": tick,
         "entities": [{"name": one.name, "distance_m": round(one.metres, 6)} for one in found[:ENTITIES_TOLD]],

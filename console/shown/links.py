@@ -1,7 +1,7 @@
 """The links of a run as pages show them: what happened on each in the last seconds, where its ends are, what is
 between.
 
-The vHub counts from the start; a window is the difference of two counts, of which the older one is at most so many
+The vHub counts from the start; a window is the difference of two counts, of which the older one is at most some
 seconds of simulated time old. Pure.
 """
 
@@ -65,14 +65,14 @@ class Windows:
 
     @property
     def length_s(self) -> float:
-        """How long the window is: shorter where nobody has counted so long, 0 at the first count amid a run."""
+        """How long the window is: shorter where counts are not as old, 0 at the first count amid a run."""
         if len(self._kept) > 1:
             return self._kept[-1][0] - self._kept[0][0]
         return self._kept[0][0] if self._is_beginning else 0.0
 
     def take(self, at_s: float, counts: dict[Key, Count], *, are_all: bool = True) -> dict[Key, Count]:
         """Return what has happened on each link since the window began; time that goes back begins a new one, and so
-        does a time in which nobody has counted. Where not all links were counted, one that was not has its own
+        does a time without counts. Where not all links were counted, one that was not has its own
         beginning: its first count."""
         if self._kept and not 0.0 <= at_s - self._kept[-1][0] <= self._window_s:
             self._kept.clear()
@@ -165,7 +165,7 @@ class Links:
         }
 
     def with_ends(self, links: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Return links, of which `from`, `to` and `rule` are told, with where their ends are and what is between."""
+        """Return links, which have `from`, `to` and `rule`, with the places of their ends and what is between."""
         keys = [(link["from"], link["to"], link["rule"]) for link in links]
         self._look([key for key in keys if self._is_on_air(key)])
         return [{**link, **self._ends_of(key)} for link, key in zip(links, keys, strict=True)]
@@ -202,7 +202,7 @@ class Links:
         return found
 
     def _look(self, keys: list[Key]) -> None:
-        """Work out what stands between the ends of some links, those first that were looked at longest ago."""
+        """Work out the obstacles between the ends of some links, the oldest results first."""
         if not self._placed:
             return
         pairs = dict.fromkeys(_pair(source, destination) for source, destination, _ in keys)

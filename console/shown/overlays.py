@@ -41,7 +41,7 @@ class Overlays:
         }
 
     def failures(self) -> list[str]:
-        """Return which sensors have no rays from here on, and why: those that this was not said of yet."""
+        """Return which sensors have no rays from here on, and why; each once."""
         found, self._failures = self._failures, []
         return found
 
@@ -72,7 +72,7 @@ class Overlays:
         return found
 
     def _rays_of_each(self, sensors: list[FittedSensor], frame: Frame) -> list[list[float]]:
-        """Return the rays of those that have some; the others are asked no more."""
+        """Return the rays of sensors that have some; the others are left out from here on."""
         found: list[list[float]] = []
         for fitted in [*sensors]:
             try:

@@ -1,5 +1,5 @@
-"""The rule of a link as people read it: whose packets it is for, what it says, over which radio, what events of the
-network have made of it at a time, and what that amounts to.
+"""The rule of a link as people read it: its packets, its settings, its radio, its changes by events of the network at a
+time, and what that amounts to.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TEXTS_KEPT: Final = 256
 
 
 class RuleTexts:
-    """The rules of one deployment, which has its files, with what was asked of its network."""
+    """The rules of one deployment, which has its files, with the requests to its network."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -43,7 +43,7 @@ class RuleTexts:
         """Return what holds at a time for the packets from one endpoint to another, in lines; the empty text where
         there is no such endpoint.
 
-        `asked` are the events that were asked of the network by then, (tick, event as JSON); `who` names who asked for
+        `asked` are the requested events of the network by then, (tick, event as JSON); `who` names the requester of
         those of a tick, where that is known.
         """
         if not {source, destination} <= {*self._endpoints}:
@@ -90,22 +90,17 @@ class RuleTexts:
         return f", since {event.start_ns / 1e9:g} s (tick {tick}), {by}{until}"
 
     def _rule(self, rule: LinkRule | None, profile: Profile, in_force: list[Settings], who: Mapping[int, str]) -> str:
-        said = [f"{impairments_text(change.changes)}{self._when(change, who)}" for change in in_force]
-        key = None if rule is None else rule.id, profile.rule, profile.radio, tuple(said)
+        changes = [f"{impairments_text(change.changes)}{self._when(change, who)}" for change in in_force]
+        key = None if rule is None else rule.id, profile.rule, profile.radio, tuple(changes)
         if key not in self._texts:
             if len(self._texts) >= TEXTS_KEPT:
                 self._texts.clear()
-            self._texts[key] = "\n".join(_lines(self._deployment, rule, profile, in_force, said))
+            self._texts[key] = "\n".join(_lines(self._deployment, rule, profile, in_force, changes))
         return self._texts[key]
 
 
-def rule_text(deployment: Deployment, source: str, destination: str) -> str:
-    """Return what the deployment alone says of the packets from one endpoint to another, at its start."""
-    return RuleTexts(deployment).text(source, destination)
-
-
 def _lines(
-    deployment: Deployment, rule: LinkRule | None, profile: Profile, in_force: list[Settings], said: list[str]
+    deployment: Deployment, rule: LinkRule | None, profile: Profile, in_force: list[Settings], changes: list[str]
 ) -> Iterator[str]:
     network = deployment.network
     if profile.rule == NO_RADIO:
@@ -126,7 +121,7 @@ def _lines(
     elif profile.rule not in {ON_BOARD, IDEAL}:
         yield f"defaults: preset {network.defaults.preset}"
     settings = profile.settings
-    for change, text in zip(in_force, said, strict=True):
+    for change, text in zip(in_force, changes, strict=True):
         settings = over(settings, change.changes)
         yield f"changed: {text}"
     summary = summary_of(SharedSettings(profile.rule, profile.radio, settings), deployment.asset_files)

@@ -1,4 +1,4 @@
-"""A world as a page draws it, in JSON, said once: links with their shapes, scenery, bodies, what can be plotted."""
+"""A world as a page draws it, in JSON: links with their shapes, scenery, bodies, what can be plotted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.console.shown.sendable import jobs_content
+from foosim.client.commands import CommandEncoder
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
 from foosim.world.forms.payloads import PayloadCodec
@@ -17,6 +17,7 @@ from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.sensors.job import JobSettings
 from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -29,7 +30,7 @@ UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "joint_efforts": ("N", "N m"),
     "contacts": ("", "N s", ""),
 }
-"""Of the numbers of fields that every model calls the same; the last one stands for all behind it."""
+"""Of the numbers of fields that every model calls the same; the last one is that of all after it."""
 NO_UNIT: Final = ("",)
 TICKS: Final = ("_ticks", ("ticks",))
 """How a field of a rule's memory is called that counts ticks, and its unit."""
@@ -139,7 +140,7 @@ def _fields(deployment: Deployment, layout: Layout, scene: Scene) -> list[dict[s
 
 
 def _units(entity: Entity, field: str) -> tuple[str, ...]:
-    """Return the units of a field's numbers, the last one standing for all behind it; a field may have none."""
+    """Return the units of a field's numbers, the last one for all after it; a field may have none."""
     ending, ticks = TICKS
     return entity.kind.units.get(field) or UNITS.get(field) or (ticks if field.endswith(ending) else NO_UNIT)
 
@@ -169,7 +170,7 @@ def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
 
 
 def _runs(count: int, units: int) -> list[tuple[int, int]]:
-    """Return the place and length of the runs of so many numbers that have a unit each."""
+    """Return the place and length of the runs of `count` numbers with a unit each."""
     runs = [(place, 1) for place in range(min(count, units) - 1)]
     return [*runs, (len(runs), count - len(runs))]
 
@@ -183,8 +184,25 @@ def _sensors(deployment: Deployment) -> list[dict[str, str]]:
 
 
 def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:
-    """Return the box around what stands; bodies that are free move within it."""
+    """Return the box around scenery and bodies on fixed bases; free bodies move within it."""
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes += [swept_box(body) for body in scene.bodies.values() if body.links[0].joint != "free"]
     boxes = [box for box in boxes if np.isfinite(box).all()]
     return enclosing(boxes) if boxes else ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+
+
+def jobs_of(deployment: Deployment, robot: str) -> dict[str, str]:
+    """Return the actuators of a robot whose jobs a sensor reports, each with that sensor's channel."""
+    sensors = sorted(deployment.robots[robot].sensors.items(), reverse=True)  # of several the first by name counts
+    return {its.actuator: channel for channel, its in sensors if isinstance(its, JobSettings)}
+
+
+def jobs_content(deployment: Deployment, entity: str) -> list[dict[str, Any]]:
+    """Return them as pages read it, with the names of their commands' numbers; none of other entities."""
+    if entity not in deployment.robots:
+        return []
+    encoder = CommandEncoder(deployment)
+    return [
+        {"actuator": actuator, "numbers": [field.name for field in encoder.actuator(entity, actuator).fields]}
+        for actuator in sorted(jobs_of(deployment, entity))
+    ]

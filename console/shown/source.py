@@ -1,9 +1,8 @@
 """The sources of a page: a running system, a capture, a replay, recorded poses; all behind one interface.
 
-A `Source` runs inside the console's event loop and tells a `Feed` of its world: which scene it has, what there is to
-see at a moment, and messages in the form that pages read (docs/reference/console.md lists them). It knows no browser;
-what all browsers together look at it is told by `want`. Whatever takes longer than a millisecond or waits goes into a
-thread of its own.
+A `Source` runs inside the console's event loop and feeds a `Feed` with its world: its scene, its moments, and messages
+in the form that pages read (docs/reference/console.md lists them). It knows no browser; `want` gives what all browsers
+together look at. Whatever takes longer than a millisecond or waits goes into a thread of its own.
 """
 
 from __future__ import annotations
@@ -24,11 +23,10 @@ Reading = tuple[str, str]
 """Names of a robot and of its channel."""
 FIGURES: Final = ("offered", "delivered", "dropped", "loss", "delay_ms", "queue_ms")
 """What can be plotted of a link."""
-OVERLAYS: Final = ("contacts", "rays")
 
 
 class NotAsked(Refused):
-    """A source has no such verb, or not for this browser; the text lists those that it has."""
+    """A source has no such verb, or not for this browser; the text lists the valid ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +55,7 @@ class Moment:
     values: NDArray[np.float64]
     """The frame's numbers, which the scene's `fields` index; not a number for what is absent, empty without a frame."""
     jump: bool = False
-    """Not the moment behind the one before: paths are cut here."""
+    """Not the moment after the one before: paths are cut here."""
     paused: bool = False
 
 
@@ -128,7 +126,7 @@ class Source(Protocol):
         """Take note of what the browsers look at. Called at each change, in the event loop's thread."""
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        """Have something done; `who` names the browser that asks. Raises Refused, whose text says why it is not."""
+        """Have something done; `who` names the browser. Raises Refused with the reason."""
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         """Return name, unit and points (tick, value) of a curve so far; no points where nothing is kept of it."""

@@ -7,30 +7,32 @@ frame is there. Pure, and bounded whatever the length of the run.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 from pydantic import ValidationError
 
 from foosim.capture.rows import EditRow, EpochRow, RecoveryRow
 from foosim.common.errors import Refused
-from foosim.console.shown.asked import edit_text, moves
 from foosim.deployment.network.rules import event_of
 from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import WorldMarks
+from foosim.world.forms.forms import DOWN
 from foosim.world.frame import Frame
+from foosim.world.setting.settable import WITH_A_PLACE
 
 MARKS_MAX: Final = 400
-"""Marks of one kind; those that come later are counted."""
+"""Marks of one kind; later ones are left out."""
 DROP_BINS: Final = 120
 """Marks of drops: each is of a span of time."""
 FINE_BINS: Final = 8192
 """Spans in which drops are counted; where they are not enough, they get twice as long."""
 FINE_NS: Final = 50_000_000
 CAUSES_SHOWN: Final = 3
-QUARANTINE, DOWN = "quarantine", "down"
+QUARANTINE = "quarantine"
 EPOCH, RECOVERY, MOVE, NETWORK, DROPS = "epoch", "recovery", "move", "network", "drops"
 
 FLAGS: Final = {"quarantined": (QUARANTINE, "is in quarantine"), "down": (DOWN, "is out of service")}
@@ -83,7 +85,7 @@ class WorldEvents:
 
 
 class Timeline:
-    """Gathers the marks of a run; `news` gives those that came since."""
+    """Gathers the marks of a run; `news` gives the new ones."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -92,8 +94,6 @@ class Timeline:
         self._epoch: EpochRow | None = None
         self._new: list[Mark] = []
         self._kinds: Counter[str] = Counter()
-        self.left: Counter[str] = Counter()
-        """Marks by kind that there was no room for."""
         self._fine_ns = max(FINE_NS, self._tick_ns)
         self._drops: dict[int, Counter[str]] = {}
         for event in deployment.network.events:
@@ -103,8 +103,6 @@ class Timeline:
         self._kinds[mark.kind] += 1
         if self._kinds[mark.kind] <= MARKS_MAX:
             self._new.append(mark)
-        else:
-            self.left[mark.kind] += 1
 
     def take_frame(self, frame: Frame) -> None:
         """Take the next frame."""
@@ -112,7 +110,7 @@ class Timeline:
             self._add(mark)
 
     def take_edits(self, tick: int, edits: Iterable[EditRow]) -> None:
-        """Take what was asked for in the tick that led to a frame."""
+        """Take the requests of the tick that led to a frame."""
         for edit in edits:
             if edit.kind == "network":
                 self._add(Mark(tick, NETWORK, self._network_text(edit.event, tick)))
@@ -179,3 +177,38 @@ def drops_text(causes: Counter[str]) -> str:
     shown = ", ".join(f"{cause} {count}" for cause, count in most[:CAUSES_SHOWN])
     more = f", {len(most) - CAUSES_SHOWN} more causes" if len(most) > CAUSES_SHOWN else ""
     return f"{causes.total()} dropped: {shown}{more}"
+
+
+def edit_text(edit: EditRow) -> str:
+    """Return a description of a requested edit; empty for other edits."""
+    if edit.kind == "push":
+        return f"push {edit.name} by {_vector(edit.impulse)} N s"
+    if edit.kind == "set":
+        return _set_text(edit)
+    return {"add": f"{edit.name} was added", "remove": f"{edit.name} was removed"}.get(edit.kind, "")
+
+
+def _set_text(edit: EditRow) -> str:
+    """Return a description of a field that is set; empty for what comes with a place."""
+    if edit.field == DOWN:
+        return f"{edit.name} is {'in' if edit.numbers == [0.0] else 'out of'} service"
+    if edit.field == "position":
+        return f"put {edit.name} at {_vector(edit.numbers)} m"
+    return "" if edit.field in WITH_A_PLACE else f"set {edit.name} {edit.field} to {_vector(edit.numbers)}"
+
+
+def _vector(numbers: Sequence[float]) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)
+
+
+def moves(epochs: Sequence[EpochRow]) -> Iterator[tuple[int, str]]:
+    """Yield (tick, text) of each robot that was moved from one node to another while both took part.
+
+    Recoveries report what another node adopts when its own is lost, and what goes back.
+    """
+    for before, epoch in pairwise(epochs):
+        owned = {owner.robot: owner.node for owner in before.owners}
+        for owner in epoch.owners:
+            node = owned.get(owner.robot, owner.node)
+            if node != owner.node and node in epoch.roster and owner.node in before.roster:
+                yield epoch.tick, f"move {owner.robot} from {node} to {owner.node}"

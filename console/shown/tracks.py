@@ -63,7 +63,7 @@ class Track:
     poses: NDArray[np.float64]
 
     def at(self, time_ns: int) -> Pose | None:
-        """Return the pose at a time; None before the first sample, behind the last, in a gap and in a jump."""
+        """Return the pose at a time; None before the first sample, after the last, in a gap and in a jump."""
         number = int(self.times_ns.searchsorted(time_ns, "right")) - 1
         if number < 0:
             return None

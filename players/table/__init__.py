@@ -1,1 +1,1 @@
-"""What the players of the football table are made of: the ball's track, rods, shots, devices of people."""
+"""The parts of the players of the football table: the ball's track, rods, shots, devices of people."""

@@ -61,12 +61,12 @@ class Motors:
         self.spin = Motor(drive.spin.gain, drive.spin.speed, accelerations[SPIN], tick_s)
         self._read_tick = -1
         self._read = Motion(0.0, 0.0), Motion(0.0, 0.0)
-        self._told: deque[tuple[int, float, float]] = deque()
+        self._commands: deque[tuple[int, float, float]] = deque()
         """Set-points in the order of the ticks from which they hold; the first one holds at the reading's tick."""
 
     def tell(self, tick: int, slide: float, spin: float) -> None:
         """Note set-points (m, rad) that hold from a tick on."""
-        self._told.append((tick, slide, spin))
+        self._commands.append((tick, slide, spin))
 
     def see(self, tick: int, slide: float, spin: float) -> None:
         """Take a reading (m, rad) of a tick; one that is not newer than the last changes nothing.
@@ -78,17 +78,17 @@ class Motors:
         before_slide, before_spin = self.at(tick) if self._read_tick >= 0 else self._read
         self._read = Motion(slide, before_slide.speed), Motion(spin, before_spin.speed)
         self._read_tick = tick
-        while len(self._told) > 1 and self._told[1][0] <= tick:
-            self._told.popleft()
+        while len(self._commands) > 1 and self._commands[1][0] <= tick:
+            self._commands.popleft()
 
     def at(self, tick: int) -> tuple[Motion, Motion]:
         """Return how slide and spin move at a tick, after that of the reading."""
         slide, spin = self._read
-        told, coming = self._told, 0
+        commands, coming = self._commands, 0
         for passing in range(self._read_tick, tick):
-            while coming < len(told) and told[coming][0] <= passing:
+            while coming < len(commands) and commands[coming][0] <= passing:
                 coming += 1
             if coming:
-                _, slide_to, spin_to = told[coming - 1]
+                _, slide_to, spin_to = commands[coming - 1]
                 slide, spin = self.slide.after(slide, slide_to), self.spin.after(spin, spin_to)
         return slide, spin

@@ -108,7 +108,7 @@ class Rod:
         self.foresee(tick)
 
     def foresee(self, tick: int) -> None:
-        """Set its state to that of a tick to come, by what it was told."""
+        """Set its state to that of a tick to come, by its commands."""
         slide, spin = self._motors.at(tick)
         self.slide = slide.at
         self.swing, self.turning = -self._side * spin.at, -self._side * spin.speed

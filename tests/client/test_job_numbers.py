@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from foosim.client.commands import CommandEncoder
-from foosim.client.jobs import Job, Jobs
+from foosim.client.jobs import Jobs
 from foosim.client.player import Sample
 from foosim.client.vectors import CommandVector
 from foosim.common.errors import BadValue, UnknownName
@@ -122,24 +122,6 @@ def test_commands_are_those_that_a_player_returns() -> None:
     assert its.commands(4) == {}
 
 
-def known(its: Jobs) -> Job | None:
-    return its.job
-
-
-def test_after_a_restart_the_last_job_is_the_one_of_the_reading() -> None:
-    its = jobs()
-    assert known(its) is None
-    hear(its, 0.0, 0.0)
-    assert known(its) is None
-    hear(its, 7.0, RUNNING, 2.0)
-    job = known(its)
-    assert job is not None
-    assert (job.number, job.state) == (7, RUNNING)
-    assert sent(its, range(5)) == [], "it runs already"
-    hear(its, 7.0, JobState.DONE)
-    assert job.check()
-
-
 @pytest.mark.parametrize(
     "reading",
     [
@@ -174,13 +156,6 @@ def test_a_player_reads_the_sensor_that_it_hears() -> None:
     assert Jobs(PLAYERS, "one", "twice", "drive").heard == ("twice", "b")
     with pytest.raises(BadValue, match="deaf does not hear jobs of scout"):
         Jobs(PLAYERS, "deaf", "scout", "drive")
-
-
-def test_a_command_that_is_none_is_refused() -> None:
-    commands: list[Any] = [(1.0,), (1.0, 2.0, 3.0), (float("nan"), 0.0)]
-    for numbers in commands:
-        with pytest.raises(BadValue, match="scout/drive takes"):
-            jobs().call(*numbers)
 
 
 def test_the_guides_simulation_comes_to_its_place(

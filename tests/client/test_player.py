@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,7 +22,9 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
+from foosim.rehearsal.run import rehearse
 from foosim.world.actuators.rod_position import Command
+from foosim.world.parameters.table import LINE_NAMES
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.encoder import RodPosition
 from tests.turns import BY_PERIOD
@@ -42,11 +46,11 @@ class Scripted(Player):
         self.commands: Any = {}
         Scripted.made.append(self)
 
-    def act(self, tick: int, samples: Samples) -> Commands:
+    def act(self, tick: int, samples: Samples) -> Commands | Turn:
         self.calls.append((tick, {pair: sample.value for pair, sample in samples.items()}))
         if isinstance(self.commands, BaseException):
             raise self.commands
-        commands: Commands = self.commands
+        commands: Commands | Turn = self.commands
         return commands
 
 
@@ -86,7 +90,7 @@ def test_it_joins_with_its_rate_and_what_it_hears() -> None:
     (join,) = said(loop)
     assert isinstance(join, Join)
     assert join.period == 5
-    rods = ("attack", "defence", "goal", "midfield")
+    rods = sorted(LINE_NAMES)
     heard = [Subscription("camera", "ball"), *(Subscription(f"red.{line}", "encoder") for line in rods)]
     assert join.subscriptions == heard
     assert Scripted.made[-1].parameters == {"team": "red"}
@@ -109,18 +113,33 @@ def test_samples_are_the_newest_of_each_channel() -> None:
     assert loop.newest.malformed == 1
 
 
-def test_commands_are_packed_in_name_order_and_answer_the_go() -> None:
+def test_packets_leave_before_commands_which_are_packed_in_name_order_and_answer_the_go() -> None:
     loop = begun()
     said(loop)
-    Scripted.made[-1].commands = {"red.midfield": Command(0.01, 1.0), "red.attack": Command(-0.02, 2.0)}
+    packets = [Packet("", "beacon", b"2"), Packet("player-blue", "word", b"1"), Packet("red.goal", "echo", b"")]
+    commands = {"red.midfield": Command(0.01, 1.0), "red.attack": Command(-0.02, 2.0)}
+    Scripted.made[-1].commands = Turn(commands, packets)
     go(loop, 1)
     (done,) = said(loop)
     assert isinstance(done, Done) and done.tick == 5
-    assert [(p.destination, p.channel, np.frombuffer(p.payload).tolist()) for p in done.packets] == [
+    sent = [Packet(p.destination, p.channel, p.payload) for p in done.packets]
+    assert sent[:3] == packets
+    assert [(*p[:2], np.frombuffer(p.payload).tolist()) for p in sent[3:]] == [
         ("red.attack", "position", [-0.02, 2.0]),
         ("red.midfield", "position", [0.01, 1.0]),
     ]
     assert loop.deadline_ns() == NEVER_NS
+
+
+def test_it_hears_what_its_selectors_match_beside_its_robots() -> None:
+    loop = begun("players.player-red.hears={'player-*': [beacon], 'blue.*': [encoder], camera: [echo]}")
+    (join,) = said(loop)
+    assert isinstance(join, Join)
+    heard = {(item.source, item.channel) for item in join.subscriptions}
+    rods = {(f"{team}.{line}", "encoder") for team in ("red", "blue") for line in LINE_NAMES}
+    assert heard == rods | {("camera", "ball"), ("player-blue", "beacon"), ("camera", "echo")}
+    go(loop, 1, Received("player-blue", 3, 0, "beacon", 0, 0, b"\xff here"))
+    assert Scripted.made[-1].calls == [(5, {("player-blue", "beacon"): b"\xff here"})]
 
 
 def test_a_free_running_player_acts_at_its_rate() -> None:
@@ -192,6 +211,14 @@ def test_a_free_running_player_is_another_one_since_another_tick() -> None:
          "red.goal/position takes slide (m), spin (rad): spin is not a number, 'up' (ACT)"),
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
+        (Turn({}, [Packet("player-bleu", "beacon", b"")]), "unknown destination (there are: blue.attack, blue.defence,"
+         " blue.goal, blue.midfield, camera, player-blue, player-red, red.attack, red.defence, red.goal, red.midfield),"
+         " 'player-bleu', nearest is 'player-blue'"),
+        (Turn({}, [Packet("blue.goal", "position", bytes(16))]), "not one of its robots (there are: camera, red.attack,"
+         " red.defence, red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
+        (Turn({}, [Packet("", "", b"")]), "channel '': not 1 to 32 characters"),
+        (Turn({}, [Packet("", "beacon", "text")]), "a payload is a str, not bytes"),  # type: ignore[arg-type]
+        (Turn({}, b"x"), "a turn's packets are a bytes, not a sequence of Packet"),  # type: ignore[arg-type]
         (None, "act gave a value of type NoneType, not a mapping from robots to commands"),
         ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to commands"),
         ({"camera": Command(0.0, 0.0)}, "no robot that takes a Command (there are: blue.attack,"
@@ -244,3 +271,36 @@ def test_a_player_that_is_not_declared_is_no_player() -> None:
     sets = ("players={}", f"clients={{{NAME}: {{lockstep: false}}}}")
     with pytest.raises(PlayerError, match=r"not declared as a player \(there are: none\), 'player-red'"):
         begun(*sets)
+
+
+# --- in a run ---------------------------------------------------------------------------------------------------------
+
+
+class Counts(Player):
+    """Broadcasts the number of its turn; keeps what it has heard from the other."""
+
+    heard: ClassVar[dict[str, list[tuple[int, bytes]]]] = {}
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        self.name = "player-" + parameters["team"]
+        self.turns = 0
+        Counts.heard[self.name] = []
+
+    def act(self, tick: int, samples: Samples) -> Turn:
+        self.turns += 1
+        Counts.heard[self.name] += [(tick, sample.value) for sample in samples.values() if type(sample.value) is bytes]
+        return Turn({}, [Packet("", "count", b"%d" % self.turns)])
+
+
+def test_players_hear_each_other_in_a_run_a_link_s_delay_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("counting")
+    module.Counts = Counts  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "counting", module)
+    hears = [f"players.player-{one}.hears={{'player-*': [count]}}" for one in ("red", "blue")]
+    classes = [f"players.player-{one}.class=counting:Counts" for one in ("red", "blue")]
+    links = "network.links=[{id: slow, from: player-blue, to: player-red, delay: 13 ms},"
+    links += " {id: dead, from: player-red, to: player-blue, loss: 100 %}]"
+    rehearse(TABLE.read_text(), TABLE.name, 50, sets=["engine=pure", links, *hears, *classes])
+    assert Counts.heard["player-blue"] == []
+    # A turn begins with a picture, which the camera gives 10 ms late: the first one at tick 5.
+    assert Counts.heard["player-red"] == [(tick, b"%d" % (tick // 5 - 2)) for tick in range(15, 50, 5)]

@@ -151,10 +151,14 @@ def test_all_say_hello_and_join_under_their_own_names(bench: Bench) -> None:
         assert not bench.players[name].is_over()
 
 
-def test_who_gets_a_go_acts_and_nobody_else(begun: Bench) -> None:
-    ((name, done),) = begun.say((channels.DOWN, BLUE, Go(1, 5, 0, [])))
-    assert name == BLUE and isinstance(done, Done) and (done.name, done.tick) == (BLUE, 5)
-    assert Counts.turns == ["blue"]
+def test_a_go_reaches_its_player_alone_and_those_due_at_one_tick_act_in_the_order_of_the_process(begun: Bench) -> None:
+    assert begun.say((channels.DOWN, "stranger", Go(1, 5, 0, []))) == []
+    answers = begun.say(*((channels.DOWN, name, Go(1, 5, 0, [])) for name in (BLUE, RED)))
+    assert [name for name, _ in answers] == [RED, BLUE]
+    ((name, done),) = begun.say((channels.DOWN, BLUE, Go(2, 10, 0, [])))
+    assert name == BLUE and isinstance(done, Done) and (done.name, done.tick) == (BLUE, 10)
+    assert Counts.turns == ["red", "blue", "blue"]
+    assert [player.core.statistics().malformed for player in begun.players.values()] == [0, 0]
 
 
 def test_one_that_acts_at_arrival_joins_so_and_acts_at_any_tick_beside_one_that_does_not(bench: Bench) -> None:
@@ -168,16 +172,6 @@ def test_one_that_acts_at_arrival_joins_so_and_acts_at_any_tick_beside_one_that_
     ((name, done),) = bench.say((channels.DOWN, BLUE, Go(1, 7, 0, [])))
     assert (name, done.tick) == (BLUE, 7)
     assert bench.say((channels.DOWN, RED, Go(1, 7, 0, []))) == [], "it has a period of 5 ticks"
-
-
-def test_those_due_at_one_tick_act_in_the_order_of_the_process(begun: Bench) -> None:
-    answers = begun.say(*((channels.DOWN, name, Go(1, 5, 0, [])) for name in (BLUE, RED)))
-    assert [name for name, _ in answers] == [RED, BLUE]
-
-
-def test_what_names_nobody_here_reaches_nobody(begun: Bench) -> None:
-    assert begun.say((channels.DOWN, "stranger", Go(1, 5, 0, []))) == []
-    assert [player.core.statistics().malformed for player in begun.players.values()] == [0, 0]
 
 
 def test_one_that_is_refused_ends_all(bench: Bench) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,9 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from foosim.common.errors import Refused
 from foosim.console.server.server import ConsoleServer, Tokens
-from foosim.console.shown.poses import HEAD, Poser
+from foosim.console.shown.drawing import HEAD, Poser
 from foosim.console.shown.scene_json import scene_content
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
@@ -92,6 +92,58 @@ class MemorySource:
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return ("the ball", "m", [(1.0, 2.0)]) if curve.id == "known" else ("", "", [])
+
+
+class Heard:
+    """A feed that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.abouts: list[About] = []
+        self.scenes: list[Mapping[str, Any]] = []
+        self.moments: list[Moment] = []
+        self.told: list[Mapping[str, Any]] = []
+        self._more = asyncio.Event()
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        self.abouts.append(about)
+        self.scenes.append(scene)
+        self._more.set()
+
+    def show(self, moment: Moment) -> None:
+        assert len(moment.poses) == len(self.scenes[-1]["links"])
+        self.moments.append(moment)
+        self._more.set()
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        self.told.append(message)
+        self._more.set()
+
+    @property
+    def tick(self) -> float:
+        """That of the last moment, -1 before there is one."""
+        return self.moments[-1].tick if self.moments else -1.0
+
+    def of(self, kind: str) -> list[Mapping[str, Any]]:
+        return [message for message in self.told if message["type"] == kind]
+
+    async def until(self, reached: Callable[[], bool]) -> None:
+        """Wait for a fact."""
+        async with asyncio.timeout(60):
+            while not reached():
+                self._more.clear()
+                await self._more.wait()
+
+
+@asynccontextmanager
+async def running(source: Source) -> AsyncIterator[Heard]:
+    heard = Heard()
+    task = asyncio.create_task(source.run(heard))
+    try:
+        yield heard
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
 
 
 @dataclass

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import shlex
-from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,62 +14,11 @@ from foosim.common.errors import BadValue, Refused
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.recording import Recording
-from foosim.console.shown.source import About, Curve, Moment, Source, Wanted
+from foosim.console.shown.source import Curve, Wanted
 from foosim.deployment.loader import apply_sets
 from foosim.replay.verify import Between
+from tests.console.memory import running
 from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, added_tick, damaged, replay
-
-
-class Heard:
-    """A feed that keeps what it is told."""
-
-    def __init__(self) -> None:
-        self.abouts: list[About] = []
-        self.scenes: list[Mapping[str, Any]] = []
-        self.moments: list[Moment] = []
-        self.told: list[Mapping[str, Any]] = []
-        self._more = asyncio.Event()
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        self.abouts.append(about)
-        self.scenes.append(scene)
-        self._more.set()
-
-    def show(self, moment: Moment) -> None:
-        assert len(moment.poses) == len(self.scenes[-1]["links"])
-        self.moments.append(moment)
-        self._more.set()
-
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self.told.append(message)
-        self._more.set()
-
-    @property
-    def tick(self) -> float:
-        """That of the last moment, -1 before there is one."""
-        return self.moments[-1].tick if self.moments else -1.0
-
-    def of(self, kind: str) -> list[Mapping[str, Any]]:
-        return [message for message in self.told if message["type"] == kind]
-
-    async def until(self, reached: Callable[[], bool]) -> None:
-        """Wait for a fact."""
-        async with asyncio.timeout(60):
-            while not reached():
-                self._more.clear()
-                await self._more.wait()
-
-
-@contextlib.asynccontextmanager
-async def running(source: Source) -> AsyncIterator[Heard]:
-    heard = Heard()
-    task = asyncio.create_task(source.run(heard))
-    try:
-        yield heard
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_stepped(run: Path) -> None:

@@ -18,9 +18,8 @@ from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory, PacketMark
 from foosim.console.recorded.recording import Recording
-from foosim.console.shown.asked import edit_text
 from foosim.console.shown.source import Curve
-from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
+from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents, edit_text
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
@@ -163,7 +162,7 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     assert timeline.news() == []
     for tick in range(MARKS_MAX + 5):
         timeline.take_edits(tick + 1, [push])
-    assert len(timeline.news()) == MARKS_MAX - 1 and timeline.left == {"push": 6}, "bounded, and what is left counted"
+    assert len(timeline.news()) == MARKS_MAX - 1, "bounded"
 
 
 def test_drops_of_a_long_run_are_counted_in_spans_that_get_longer(table: Deployment) -> None:
@@ -257,13 +256,13 @@ def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: Cap
     assert history.watched("nobody", "nobody", 0) == {"link": ["nobody", "nobody"], "rule": "", "drops": []}
 
 
-def test_packets_of_more_links_than_are_told_apart_are_counted(
-    history: CaptureHistory, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_many_links_the_first_are_counted(history: CaptureHistory, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("foosim.console.recorded.link_history.LINKS_MAX", 3)
-    few = opened(history.recording.path)
-    assert few.links.packets == history.links.packets and few.links.others > 0
-    assert few.links.totals(SECOND_NS)["offered"] == few.links.packets - few.links.others
+    few = opened(history.recording.path).links
+    windows = history.links.windows(SECOND_NS, 2 * SECOND_NS)
+    kept = few.windows(SECOND_NS, 2 * SECOND_NS)
+    assert len(kept) == 3 and all(window in windows for window in kept)
+    assert few.totals(SECOND_NS)["offered"] == sum(window["offered"] for window in kept)
 
 
 # --- curves ----------------------------------------------------------------------------------------------------------
@@ -281,7 +280,7 @@ def test_curves_of_a_run_are_what_the_capture_has(history: CaptureHistory) -> No
     score = curve_points(history, Curve("b", status="score.red"), TICKS)
     assert len(score) > 100 and {value for _, value in score} == {0.0}
     offered = curve_points(history, Curve("c", status="packets.offered"), TICKS)
-    assert offered[-1][1] == history.links.packets and offered == sorted(offered)
+    assert offered[-1][1] == history.links.totals(SECOND_NS)["offered"] and offered == sorted(offered)
     link = curve_points(history, Curve("d", link=("camera", "player-red"), figure="delivered"), TICKS)
     (window,) = history.links.windows(TICKS * TICK_NS, 5 * SECOND_NS, ("camera", "player-red"))
     assert [link[-1]] == [(TICKS, window["delivered"])]

@@ -8,7 +8,7 @@ import numpy as np
 from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
-from foosim.console.shown.rule_text import RuleTexts, rule_text
+from foosim.console.shown.rule_text import RuleTexts
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.initial_state import initial_frame
 
@@ -17,12 +17,12 @@ KEY = ("a", "b", "rule")
 
 def test_the_rule_of_a_link_is_told_in_words(fleet_text: Callable[..., str]) -> None:
     deployment = load_deployment(fleet_text(2), "hall")
-    rule, radio, meaning = rule_text(deployment, "pilot01", "pilot02").splitlines()
+    rule, radio, meaning = RuleTexts(deployment).text("pilot01", "pilot02").splitlines()
     assert rule.startswith("rule fleet, from pilot*, dispatch to ") and " via wifi: " in rule
     assert radio.startswith("radio wifi: preset wifi_") and "tx_power" in radio
     assert meaning.startswith("which is fleet via wifi: wifi, loss ")
-    assert rule_text(deployment, "pilot01", "nobody") == ""
-    perfect, meaning = rule_text(deployment, "rover01", "pilot01").splitlines()
+    assert RuleTexts(deployment).text("pilot01", "nobody") == ""
+    perfect, meaning = RuleTexts(deployment).text("rover01", "pilot01").splitlines()
     assert "perfect" in perfect and meaning == "which is on_board: no medium, loss 0, delay 0"
 
 
@@ -44,7 +44,7 @@ def test_a_rule_says_what_is_in_force_what_was_changed_by_whom_and_what_that_amo
         assert lines[0].startswith("rule fleet, ") and lines[1].startswith("radio wifi: ")
         return [line for line in lines[2:] if not line.startswith("which is ")]
 
-    base, tick = rule_text(deployment, "pilot01", "pilot02"), {at: at * 1_000_000_000 // tick_ns for at in (1, 2)}
+    base, tick = RuleTexts(deployment).text("pilot01", "pilot02"), {at: at * 1_000_000_000 // tick_ns for at in (1, 2)}
     planned = f"changed: delay 50 ms, since 1 s (tick {tick[1]}), by the deployment"
     by_plan = f"{planned} until 4 s"
     by_hand = f"changed: loss 30 %, since 2 s (tick {tick[2]}), asked for by browser 3 until 4 s"

@@ -14,45 +14,19 @@ from foosim.common.errors import BadValue
 from foosim.console.live import live_source
 from foosim.console.live.live_source import LiveSource
 from foosim.console.live.presence import how_ended
-from foosim.console.shown.source import About, Curve, Moment, Wanted
+from foosim.console.shown.source import Curve, Wanted
 from foosim.launcher.outcome import result_without_supervisor
 from foosim.launcher.run_options import RunOptions, launch_of
 from foosim.protocol.messages import Answer
 from foosim.runtime.run_folder import NoRun, create_run
 from foosim.runtime.transport.inbox import Inbox
+from tests.console.memory import Heard
 from tests.console.test_following import described, frame_of, status
 from tests.replay.conftest import TABLE
 
 
-class Heard:
-    """A feed that remembers notes."""
-
-    def __init__(self) -> None:
-        self.notes: list[str] = []
-        self.presences: list[tuple[str, str]] = []
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        raise AssertionError("there is no world")
-
-    def show(self, moment: Moment) -> None:
-        raise AssertionError("there is no world")
-
-    def tell(self, message: Mapping[str, Any]) -> None:
-        assert message["type"] in ("note", "presence")
-        if message["type"] == "note":
-            self.notes.append(message["text"])
-        else:
-            self.presences.append((message["state"], message["text"]))
-
-
-class Seen:
-    """A feed that takes all."""
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None: ...
-
-    def show(self, moment: Moment) -> None: ...
-
-    def tell(self, message: Mapping[str, Any]) -> None: ...
+def presences(heard: Heard) -> list[tuple[str, str]]:
+    return [(message["state"], message["text"]) for message in heard.of("presence")]
 
 
 def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,11 +45,12 @@ def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest
         await asyncio.wait((running,))
 
     asyncio.run(scene())
-    assert heard.notes == [
+    notes = [note["text"] for note in heard.of("note")]
+    assert notes == [
         "mine is not there: run mine is starting; it is looked for",
         "mine is not there: run mine is over; it is looked for",
     ]
-    assert heard.presences == [("away", note) for note in heard.notes], "it may be started again"
+    assert presences(heard) == [("away", note) for note in notes], "it may be started again"
 
 
 @pytest.mark.parametrize("first", ["the run", "the console"])
@@ -104,7 +79,7 @@ def test_how_a_run_has_ended_is_said_once_also_as_the_last_thing_that_a_console_
         await asyncio.wait((running,))
 
     asyncio.run(scene())
-    assert heard.presences == [("away", "mine is not there: run mine is over; it is looked for"), ("ended", "done")]
+    assert presences(heard) == [("away", "mine is not there: run mine is over; it is looked for"), ("ended", "done")]
 
 
 @pytest.mark.parametrize("ends", ["done", "stopped", "lost vhub: it was killed"])
@@ -161,7 +136,7 @@ def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: p
 
     async def scene() -> None:
         source = LiveSource("mine", lambda give_up: control, None)
-        running = asyncio.create_task(source.run(Seen()))
+        running = asyncio.create_task(source.run(Heard()))
         async with asyncio.timeout(30):
             while control.asked.count("status") < 4:
                 await asyncio.sleep(0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from foosim.console.live import history as kept
-from foosim.console.live.history import APART_NS, ROWS_MAX, History, Rows
+from foosim.console.live.history import APART_NS, History, Rows
 from foosim.console.shown.source import Curve, Wanted
 from tests.console.test_following import commit, following, frame_of, status
 
@@ -70,16 +70,15 @@ def test_what_nobody_looked_at_is_a_hole_and_time_that_goes_back_forgets_what_wa
 
 @pytest.mark.parametrize("count", [1, 1000, 100_000])
 def test_what_is_kept_is_bounded_and_reaches_as_far_back_in_a_large_world(count: int) -> None:
-    rows = Rows(kept.FRAMES_BYTES, np.float32)
+    rows = Rows(TICK_NS, kept.FRAMES_BYTES, np.float32)
     last = 0
-    for tick in range(0, 4 * ROWS_MAX * APART, APART // 2):
-        if rows.is_due(tick, TICK_NS, count):
+    for tick in range(0, 4 * kept.WINDOW_NS // TICK_NS, APART // 2):
+        if rows.is_due(tick, count):
             rows.keep(tick, "what", np.full(count, tick, np.float32))
             last = tick
-            assert rows._bytes <= kept.FRAMES_BYTES and len(rows._rows) <= ROWS_MAX
+    assert sum(row[2].nbytes + kept.ROW_BYTES for row in rows._rows) <= 1.01 * kept.FRAMES_BYTES
     points = rows.reader(lambda what: 0)()
     assert points[-1][0] == last and (last - points[0][0]) * TICK_NS > 0.9 * kept.WINDOW_NS
-    assert rows._bytes == sum(row[2].nbytes + kept.ROW_BYTES for row in rows._rows)
 
 
 def test_readings_that_come_after_nobody_plots_them_are_none_and_leave_a_hole() -> None:

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
-from foosim.console.shown.drawing import Drawing
-from foosim.console.shown.poses import Poser
+from foosim.console.shown.drawing import Drawing, Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
@@ -19,7 +19,15 @@ from tests.console.memory import table, table_with_spares
 from tests.forms.worlds import SOLIDS
 
 
-def check(deployment: Deployment) -> None:
+@pytest.mark.parametrize("world", ["table", "hall", "solids"])
+def test_poses_are_those_of_forward_kinematics(world: str, fleet_text: Callable[..., str]) -> None:
+    """Of two balls, of a hall, of bodies whose centre of mass is beside their origin."""
+    made: dict[str, Callable[[], Deployment]] = {
+        "table": table_with_spares,
+        "hall": lambda: load_deployment(fleet_text(4), "hall"),
+        "solids": lambda: load_deployment(SOLIDS.text(), "solids.yaml"),
+    }
+    deployment = made[world]()
     layout = build_layout(deployment)
     scene = build_scene(deployment, layout)
     values = np.linspace(-3.0, 3.0, layout.size)
@@ -35,10 +43,6 @@ def check(deployment: Deployment) -> None:
     assert [link["name"] for link in links] == [name for name, _ in expected]
     poses = Poser(layout, scene).poses(values)
     assert poses.tolist() == np.array([pose for _, pose in expected], np.float32).tolist()
-
-
-def test_poses_of_a_table_with_two_balls() -> None:
-    check(table_with_spares())
 
 
 def test_what_is_absent_has_neither_poses_nor_numbers(fleet_text: Callable[..., str]) -> None:
@@ -58,14 +62,6 @@ def test_what_is_absent_has_neither_poses_nor_numbers(fleet_text: Callable[..., 
         values = there.values.copy()
         values[entity.offsets[ABSENT]] = 0.0
         assert np.isfinite(drawing.moment(Frame(1, drawing.layout, values)).values[its]).all()
-
-
-def test_poses_of_a_hall(fleet_text: Callable[..., str]) -> None:
-    check(load_deployment(fleet_text(4), "hall"))
-
-
-def test_poses_of_bodies_with_their_centre_of_mass_elsewhere() -> None:
-    check(load_deployment(SOLIDS.text(), "solids.yaml"))
 
 
 def test_every_number_of_a_frame_belongs_to_one_field() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
-from typing import Any
 
 import pytest
 
@@ -13,27 +11,13 @@ from foosim.client.errors import ConnectionRefused
 from foosim.common.errors import BadValue, Failed
 from foosim.console.live.sending import VERBS, Sending
 from foosim.console.shown.drawing import Drawing
-from foosim.console.shown.source import About, Moment
 from foosim.deployment.loader import load_deployment
+from tests.console.memory import Heard
 from tests.console.test_desk import ROBOTS, TEXT
 from tests.kinematic_yard import yard_text
 
 GO = {"robot": "scout", "actuator": "drive", "numbers": {"x": 1.0, "y": 0.0}}
-WHY = "this console can send nobody, it is not connected: a client desk is already here"
-
-
-class Heard:
-    """A feed that remembers what is told."""
-
-    def __init__(self) -> None:
-        self.told: list[Mapping[str, Any]] = []
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None: ...
-
-    def show(self, moment: Moment) -> None: ...
-
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self.told.append(message)
+WHY = "this console cannot send robots, it is not connected: a client desk is already here"
 
 
 async def refused(sending: Sending) -> None:

@@ -214,17 +214,6 @@ def test_without_a_rebound_nothing_is_said_of_walls(typed: Typed, tmp_path: Path
     assert beside.code == 2 and beside.err.endswith(f": there is no folder {tmp_path / 'none'}\n")
 
 
-def test_what_tracks_do_not_tell_is_left_out(typed: Typed, tmp_path: Path) -> None:
-    """A ball that rolls from the start says nothing of sliding."""
-    times = np.arange(0.0, 0.3, 0.01)
-    noise = np.random.Generator(np.random.PCG64(SEED))
-    places = np.column_stack([-0.2 + 0.5 * times, 0.0 * times])
-    track = np.column_stack([times, places + noise.normal(0.0, NOISE_M, places.shape)])
-    done = run(typed, write(tmp_path / "tracks.csv", [track]), "--table", TABLE)
-    assert done.code == 1 and yaml.safe_load(done.out) == {}
-    assert "the tracks do not tell floor.friction (" in done.err and "floor.rolling_friction (" in done.err
-
-
 def test_scipy_is_asked_for(monkeypatch: pytest.MonkeyPatch, noisy: tuple[Table, list[Array]]) -> None:
     table, tracks = noisy
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)

@@ -94,15 +94,6 @@ def test_a_shape_covers_as_much_as_its_outline(geometry: Geometry, turned: Quate
     assert len(covered(geometry, turned=turned)) / 100**2 == pytest.approx(area, abs=0.02)
 
 
-def test_a_tilted_box_covers_what_its_corners_do() -> None:
-    """The three pairs of parallel lines, against the convex hull of the corners."""
-    half = (0.5, 0.3, 0.2)
-    corners = CUBE * 2 * half
-    found = covered(Box(half), turned=TILTED)
-    assert found.tolist() == sorted(covered(Hull(Mesh(corners, FACES, b"box")), turned=TILTED).tolist())
-    assert len(found) > 5000
-
-
 @pytest.mark.parametrize("turned", [UPRIGHT, TILTED, from_rpy(0.0, pi / 2, 0.3)])
 def test_what_moves_covers_as_much_as_what_stands_still(turned: Quaternion) -> None:
     """The outline of a box, against its faces, at many places within a pixel."""

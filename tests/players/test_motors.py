@@ -74,17 +74,6 @@ def test_a_reading_that_is_not_newer_changes_nothing() -> None:
     assert found.at(20) == found.at(10), "nobody has told it to move"
 
 
-def test_it_moves_from_the_tick_at_which_a_command_is_there() -> None:
-    found = motors("red.goal")
-    found.see(0, 0.0, 0.0)
-    found.tell(4, 0.02, 1.0)
-    assert found.at(4) == (Motion(0.0, 0.0), Motion(0.0, 0.0))
-    slide, spin = found.at(5)
-    assert slide.at > 0.0 and spin.at > 0.0
-    later = found.at(200)
-    assert later[0].at == pytest.approx(0.02, abs=1e-6) and later[1].at == pytest.approx(1.0, abs=1e-6)
-
-
 def test_how_long_a_swing_takes() -> None:
     """As many ticks as its motor needs step by step, and never more than what is asked for."""
     (rod,) = rods_of(DEPLOYMENT, "red", ["midfield"])

@@ -9,11 +9,9 @@ from typing import Any, Final
 import pytest
 
 from foosim.client.player import Sample
-from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
 from foosim.players.beacons import Beacon, decode_beacon, encode_beacon
 from foosim.players.roadmap import roadmap_of
-from foosim.players.warehouse_base import Dispatch
 from foosim.players.warehouse_rover import Patrol
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
@@ -205,32 +203,3 @@ def test_of_two_that_head_for_the_same_spot_the_smaller_number_goes(told: Told, 
     (packet,) = told.patrol.act(told.tick, told.samples).packets
     beacon = decode_beacon(packet.payload, 6, len(told.map.spots))
     assert beacon is not None and beacon.goal == (told.here if number == 0 else goal)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "what", "end"),
-    [
-        ({}, "parameter rover is no rover", "(there are: rover01, rover02), ''"),
-        ({"rover": "rover9"}, "parameter rover is no rover", "'rover9', nearest is 'rover01'"),
-        ({"rover": "rover01", "sped": 1.0}, "no parameter of a patrol", "'sped', nearest is 'speed'"),
-        ({"rover": "rover01", "speed": 0}, "parameter speed is not a number above 0", "0"),
-        ({"rover": "rover01", "speed": True}, "parameter speed is not a number above 0", "true"),
-        ({"rover": "rover01", "base": 7}, "parameter base is not a text", "7"),
-        ({"rover": "rover01", "base": "dispach"}, "parameter base is no player", "nearest is 'dispatch'"),
-        ({"rover": "rover01", "low": 0.9, "high": 0.8}, "parameter high is not above low, at most 1", "0.8"),
-    ],
-)
-def test_parameters_that_mean_nothing_are_refused(
-    fleet_text: Callable[..., str], parameters: dict[str, Any], what: str, end: str
-) -> None:
-    with pytest.raises(BadValue) as error:
-        Patrol(load_deployment(fleet_text(2), "hall.yaml"), parameters)
-    assert str(error.value).startswith(what) and str(error.value).endswith(end)
-
-
-def test_a_dispatch_has_one_parameter(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(2), "hall.yaml")
-    with pytest.raises(BadValue, match="no parameter of a dispatch but cell_m, 'cell'"):
-        Dispatch(deployment, {"cell": 2.5})
-    with pytest.raises(BadValue, match="parameter cell_m is not a number above 0, -1"):
-        Dispatch(deployment, {"cell_m": -1})

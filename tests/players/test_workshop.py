@@ -10,9 +10,6 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.common.errors import BadValue, UnknownName
-from foosim.deployment.loader import load_deployment
-from foosim.players.workshop import Foreman
 from foosim.rehearsal.check.component_check import _shuffle as shuffle
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.simulation import Simulation
@@ -82,21 +79,3 @@ def test_a_crate_that_is_missing_is_tried_again_until_it_is_there(capsys: pytest
         assert simulation.frame.at("porter", "gripper.failure") == 0.0
     out = capsys.readouterr().out.splitlines()
     assert len(out) >= 2 and all("porter/gripper: job" in line and "no object within reach" in line for line in out)
-
-
-@pytest.mark.parametrize(
-    ("changed", "error"),
-    [
-        ({"porter": "forklift"}, UnknownName),
-        ({"crates": ["crane-west"]}, UnknownName),
-        ({"cranes": ["crane-west"]}, BadValue),
-        ({"name": "nobody"}, UnknownName),
-        ({"speed": 1.0}, BadValue),
-    ],
-)
-def test_parameters_of_the_foreman_are_checked(changed: dict[str, Any], error: type[Exception]) -> None:
-    deployment = load_deployment(WORKSHOP.read_text(), WORKSHOP.name)
-    right = dict(deployment.players["foreman"].parameters)
-    Foreman(deployment, right)
-    with pytest.raises(error):
-        Foreman(deployment, {**right, **changed})

@@ -7,12 +7,11 @@ from __future__ import annotations
 from functools import cache
 from math import hypot
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 
 from foosim.client.player import Sample
-from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.players.yard_arm import NEAR_M, UPRIGHT, Arm
 from foosim.players.yard_quadrotor import Watch
@@ -26,7 +25,6 @@ from foosim.players.yard_reports import (
     encode_report,
     encode_watch,
 )
-from foosim.players.yard_scout import Scout
 from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings
 from foosim.world.actuators.joints.joint_position import JointPositions
@@ -181,23 +179,3 @@ def test_the_arm_stays_away_from_a_side_where_a_scout_is_or_may_be() -> None:
     assert side((0.6, 1.0), (0.6, -1.0), 30) == 0.0
     assert side((0.6, 1.0), far, 40) < 0.0
     assert arm.act(400, {}).commands["arm"] == JointPositions(UPRIGHT), "silence"
-
-
-@pytest.mark.parametrize(
-    ("changed", "error"),
-    [
-        ({"scout": "scout-wes"}, UnknownName),
-        ({"partner": "arm"}, UnknownName),
-        ({"crates": ["crate-9"], "goals": [1.0]}, UnknownName),
-        ({"crates": ["crate-1"], "goals": [1.0, 2.0]}, BadValue),
-        ({"goals": ["x"]}, BadValue),
-        ({"speed": "fast"}, BadValue),
-        ({"sped": 1.0}, UnknownName),
-    ],
-)
-def test_parameters_of_a_scout_are_checked(changed: dict[str, Any], error: type[Exception]) -> None:
-    deployment = load_deployment(text(), YARD.name)
-    right = {"scout": "scout-east", "partner": "scout-west", "goals": [3.0]}
-    Scout(deployment, right)
-    with pytest.raises(error):
-        Scout(deployment, {**right, **changed})

@@ -17,7 +17,7 @@ from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource
 from foosim.console.shown.source import Wanted
-from tests.console.test_capture_source import Heard, running
+from tests.console.memory import Heard, running
 from tests.replay.conftest import TICKS, foosim, replay
 from tests.replay.test_play import playing
 

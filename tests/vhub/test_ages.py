@@ -131,8 +131,8 @@ def test_a_capture_tells_each_second_and_whatif_and_report_have_it(tmp_path: Pat
     same = what_if(capture)
     assert same.changed == 0 and len(same.ages) == 10 and all(age.before == age.after for age in same.ages)
     found = gather(capture, "run")
-    (use,) = [use for use in found.uses if (use.source, use.destination) == ("camera", "player-red")]
-    assert (use.channel, use.delay_mean_ms, use.age.p99_ms, use.age.uses) == ("ball", 7.0, 10.0, 122)
+    (use,) = [use for use in found["uses"] if (use["source"], use["destination"]) == ("camera", "player-red")]
+    assert (use["channel"], use["delay_mean_ms"], use["p99_ms"], use["uses"]) == ("ball", 7.0, 10.0, 122)
     assert "<h2>Age at use</h2>" in page(found)
 
 

@@ -18,7 +18,7 @@ from foosim.capture.rows import ClientRow, PacketRow
 from foosim.common import limits
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.units import Pace
-from foosim.console.live.watched import Watched as Shown
+from foosim.console.live.watched import WatchList as Shown
 from foosim.console.live.watched import explain_drops
 from foosim.console.shown.source import Link
 from foosim.protocol import channels

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from foosim.client import connect, control
+from foosim.client import control
+from foosim.client.client import connect
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
 from foosim.world.sensors.encoder import RodPosition
@@ -102,7 +103,7 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
                 elif packet.source == "hand":
                     heard.append(packet.payload)
         assert {int(payload) for payload in back + heard} <= set(range(1, number + 1))
-        control.down()
+        control.request("down")
         with pytest.raises(RunEnded):
             while True:
                 client.receive(PATIENCE_S)

@@ -82,7 +82,7 @@ def assert_wrong_names_are_refused_with_the_nearest_one(house: House) -> None:
     code, _, err = house.ask("foosim", "status", "--run", "tabel")
     assert code == 1 and "no run 'tabel'" in err
     with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
-        control.move("red.goal", "green")
+        control.request("move", robot="red.goal", node="green")
 
 
 def assert_a_viewer_sees_and_cannot_touch() -> None:

@@ -37,7 +37,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     house.ticking()
     info = house.info()
     assert info.simulation.startswith("tls/127.0.0.1:") and info.radio.startswith("tls/127.0.0.1:")
-    assert control.push((0.01, 0.0, 0.0)).accepted, "the operator's certificate is found by the run file"
+    assert control.request("push", impulse=(0.01, 0.0, 0.0)).accepted, "the run file has the operator's certificate"
     with connect(info.radio, "hand", pki=folder, timeout_s=LIMIT_S) as client:
         client.subscribe("camera", "ball")
         client.listen()
@@ -49,7 +49,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     assert code == 2 and "needs certificates: give their folder by --pki DIR" in error
     code, _, error = house.ask(*node, "--name", "green", "--pki", folder)
     assert code == 3 and "has no certificate of node.green; it has: client.hand, node.blue" in error
-    control.down()
+    control.request("down")
     code, output, _ = house.end(running)
     assert code == 0, output
 
