@@ -20,7 +20,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Go, Join, Received, Up
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.actuators.rod_position import Command
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -19,8 +19,8 @@ from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import About, Curve, Moment, Source, Wanted
 from foosim.deployment.loader import apply_sets
-from foosim.replay.verify import Between
-from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, added_tick, damaged, replay
+from foosim.simulation.verify import Between
+from tests.simulation.conftest import SETS, TABLE, TICK_NS, TICKS, added_tick, damaged, replay
 
 
 class Heard:

@@ -23,7 +23,7 @@ from foosim.console.recorded.second import open_follower
 from foosim.console.shown.source import Moment, Wanted
 from tests.console.memory import MemorySource, table, table_with_spares
 from tests.console.test_capture_source import running
-from tests.replay.conftest import TICKS, replay
+from tests.simulation.conftest import TICKS, replay
 
 LOOKED_AT = Wanted(1, 50.0)
 

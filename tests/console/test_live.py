@@ -21,7 +21,7 @@ from foosim.protocol.messages import Answer
 from foosim.runtime.run_folder import NoRun, create_run
 from foosim.runtime.transport.inbox import Inbox
 from tests.console.test_following import described, frame_of, status
-from tests.replay.conftest import TABLE
+from tests.simulation.conftest import TABLE
 
 
 class Heard:

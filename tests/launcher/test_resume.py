@@ -19,11 +19,11 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.resume import check_journals, plan_again, supervisor_records
 from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.supervisor.main import serve
 from tests.conftest import Typed
 

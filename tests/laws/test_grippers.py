@@ -17,12 +17,12 @@ from foosim.capture.start_frame import read_branch
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.node.physics.mujoco_islands import CompositionEngine
-from foosim.rehearsal.check.component_check import ComponentCheck
-from foosim.rehearsal.check.component_check import _shuffle as shuffle
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify_capture
-from foosim.replay.what_if import what_if
+from foosim.simulation.check.component_check import ComponentCheck
+from foosim.simulation.check.component_check import _shuffle as shuffle
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
+from foosim.simulation.what_if import what_if
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.forms.jobs import NUMBERS, RUNNING, STATES, JobState
 from foosim.world.frame import Frame

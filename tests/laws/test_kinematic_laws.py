@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.frame import Frame
 from tests.forms.worlds import driver
 from tests.frames import broken_laws

@@ -17,8 +17,8 @@ import yaml
 from foosim.cli.rehearse import elsewhere
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.frame import Frame
 from tests.forms.test_forms import ALONE, HEADS, own

@@ -14,9 +14,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from foosim.common.keyed_random import draw_key, draw_words
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
 from foosim.runtime.roles.bus import Weather
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

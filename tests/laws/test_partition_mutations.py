@@ -17,8 +17,8 @@ from foosim.common.batched.noise import NoiseKeys
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame

@@ -17,10 +17,10 @@ from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import OPERATOR, Settings, System
-from foosim.rehearsal.trace import Traced
 from foosim.runtime.roles.bus import Weather
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import OPERATOR, Settings, System
+from foosim.simulation.trace import Traced
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.vhub.state.records import Closing
 

@@ -15,10 +15,10 @@ from foosim.capture.reader import open_capture
 from foosim.client.player import Player, Samples
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify_capture
 from foosim.runtime.roles.bus import Weather
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
 from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.frame import Frame
 from tests.swarm.campaign import fly

@@ -15,8 +15,8 @@ from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.failures import Stuck
-from foosim.rehearsal.run import deal_robots
+from foosim.simulation.failures import Stuck
+from foosim.simulation.run import deal_robots
 from foosim.world.assembly.rest import Rest, is_still
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.components.drives import Drives

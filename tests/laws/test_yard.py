@@ -10,9 +10,9 @@ import yaml
 
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import ComponentCheck
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.check.component_check import ComponentCheck
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings
 from tests.forms.worlds import DEPLOY, driver, still
 from tests.frames import Frames
 

@@ -20,9 +20,9 @@ from foosim.launcher.outcome import Outcome
 from foosim.node.physics.interface import Island
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.resimulation import Replica
+from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.system import Settings, System
 from foosim.vhub.state.records import Closing
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame

@@ -27,8 +27,8 @@ from foosim.players.yard_reports import (
     encode_watch,
 )
 from foosim.players.yard_scout import Scout
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings
 from foosim.world.actuators.joints.joint_position import JointPositions
 from foosim.world.frame import Frame
 from tests.forms.worlds import DEPLOY

@@ -20,13 +20,13 @@ from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
-from foosim.rehearsal.clock import Clock
-from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
 from foosim.runtime.roles.bus import CALM, Weather
+from foosim.simulation.clock import Clock
+from foosim.simulation.failures import Broken
+from foosim.simulation.resimulation import Replica
+from foosim.simulation.run import with_nodes
+from foosim.simulation.system import Settings, System
+from foosim.simulation.trace import Traced
 from foosim.supervisor.settings import RunSettings
 from foosim.world.actuators.gripper import GripperSettings
 from foosim.world.assembly.misfits import rigid_bodies

@@ -17,9 +17,9 @@ from foosim.protocol import channels
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.system import System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.resimulation import Replica
+from foosim.simulation.system import System
+from foosim.simulation.trace import Traced
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor

@@ -9,9 +9,9 @@ from foosim.client.core import ClientCore
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Done, Down, Go, Samples, Sent
-from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.system import System
+from foosim.simulation.failures import Broken
+from foosim.simulation.resimulation import Replica
+from foosim.simulation.system import System
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, TickRecord, world_packets

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from tests.wire.conftest import LONG
 
 if TYPE_CHECKING:

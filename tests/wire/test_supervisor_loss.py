@@ -14,8 +14,8 @@ from foosim.common.json_text import encode_json
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Request
-from foosim.rehearsal.run import rehearse
 from foosim.runtime.run_folder import open_run
+from foosim.simulation.run import rehearse
 from foosim.vhub.recording.recovery import recover_capture
 from tests.wire.conftest import LIMIT_S, LONG, in_process
 from tests.wire.test_run import last_json

@@ -9,7 +9,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
