@@ -23,11 +23,11 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.messages import Answer, Epoch
 from foosim.runtime.disk import Level
 from foosim.simulation.attendant import Attendant
+from foosim.simulation.stepped_world import deal_robots
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.records import Closing
-from foosim.world.forms.registry import model_of
 from foosim.world.frame import Frame
 from foosim.world.start import Start
 
@@ -39,16 +39,6 @@ class Rehearsed:
     json: dict[str, Any]
     digests: list[bytes] = field(default_factory=list)
     answers: dict[str, Answer] = field(default_factory=dict)
-
-
-def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
-    """Return the robots of n1 to nN, dealt in turn: first those that engines solve, then others, each in name order."""
-    rigid = sorted(name for name, robot in deployment.robots.items() if model_of(robot).is_rigid)
-    others = sorted(set(deployment.robots) - set(rigid))
-    dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
-    for place, name in enumerate([*rigid, *others]):
-        dealt[f"n{place % nodes + 1}"].append(name)
-    return dealt
 
 
 def with_nodes(text: str, name: str, nodes: int, sets: Sequence[str] = ()) -> str:

@@ -7,20 +7,30 @@ only where that is asked for, of a cut. Frames between the captured ones are com
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from foosim.capture.contents import library_versions
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.reader import About, CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
-from foosim.deployment.loader import load_deployment
+from foosim.capture.reader import (
+    About,
+    CaptureData,
+    CapturedTick,
+    beginning_of,
+    check_whole,
+    deployment_of,
+    open_capture,
+    read_about,
+)
+from foosim.common.errors import BadValue
+from foosim.common.limits import NODES_MAX
+from foosim.deployment.schema import Deployment
 from foosim.node.physics.mesh_trial import check_shapes
-from foosim.simulation.resimulation import Replica
-from foosim.simulation.run import with_nodes
-from foosim.world.assembly.initial_state import first_chain, start_with
-from foosim.world.frame import CHAIN_START, Frame, chain_next
+from foosim.simulation.stepped_world import SteppedWorld, deal_robots
+from foosim.world.assembly.initial_state import first_chain, first_frame, start_with
+from foosim.world.frame import Frame, chain_next
 from foosim.world.start import Start
 
 COMPUTING: Final = ("mujoco-core", "numpy", "pybullet")
@@ -68,8 +78,7 @@ def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool =
     about = capture.about
     capture.first_frame()  # numbers in another layout are not compared, since they mean something else
     start = start_of(capture)
-    text, name = about.deployment_text, about.deployment_name
-    found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)
+    found = verify(about, capture.captured_ticks(), nodes, start)
     kept = {epoch.arithmetic for epoch in capture.epochs}
     others = tuple(sorted(kept - {"", found.arithmetic}))
     here = library_versions()
@@ -94,48 +103,48 @@ def start_of(capture: CaptureData) -> Start | None:
     return start_with(first, origin.source, origin.chain)
 
 
-def verify(
-    text: str,
-    name: str,
-    ticks: Iterable[CapturedTick],
-    nodes: int = 1,
-    start: Start | None = None,
-    files: Mapping[str, bytes] | None = None,
-) -> Verified:
+def verify(about: About, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:
     """Simulate again the run of `ticks` (from 0, or from that of `start` on, in order) on `nodes` nodes, and compare.
 
-    `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
+    Raises CaptureError for a deployment that is not valid here, AssetError for a mesh that an engine refuses, BadValue
+    for another number of nodes.
     """
-    replica = replica_of(text, name, files or {}, start, nodes)
+    if not 1 <= nodes <= NODES_MAX:
+        raise BadValue(f"the number of nodes is 1 to {NODES_MAX}", nodes)
+    deployment = deployment_of(about)
+    world = captured_world(about, deployment, first_frame(deployment, start), nodes)
     chain = first_chain(None if start is None else start.origin)
     try:
-        first = replica.frame.tick
-        found = _compare(replica, ticks, nodes, chain)
-        return replace(found, arithmetic=replica.arithmetic.hex(), first_tick=first)
+        first = world.frame.tick
+        found = _compare(world, ticks, nodes, chain)
+        return replace(found, arithmetic=world.arithmetic().hex(), first_tick=first)
     finally:
-        replica.close()
+        world.close()
 
 
-def replica_of(text: str, name: str, files: Mapping[str, bytes], start: Start | None, nodes: int = 1) -> Replica:
-    """Return a deployment's world on so many nodes, at its start. Raises AssetError for a file of an unfit model."""
-    text = with_nodes(text, name, nodes)
-    deployment = load_deployment(text, name).with_assets(files)
-    check_shapes(deployment, name, text)
-    return Replica(text, name, deployment, start=start)
+def captured_world(about: About, deployment: Deployment, frame: Frame, nodes: int = 1) -> SteppedWorld:
+    """Return a capture's world at a frame, on so many nodes. Raises AssetError for a file of an unfit model."""
+    check_shapes(deployment, about.deployment_name, about.deployment_text)
+    return SteppedWorld(deployment, frame, deal_robots(deployment, nodes))
 
 
-def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:
-    first = expected = replica.frame.tick
+def frame_of(world: SteppedWorld, captured: CapturedTick) -> Frame:
+    """Return the present frame, or compute the next one, whichever a captured tick is of."""
+    return world.frame if captured.tick == world.frame.tick else world.step(captured.delivered, captured.edits)
+
+
+def _compare(world: SteppedWorld, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:
+    first = expected = world.frame.tick
     for captured in ticks:
         if captured.tick != expected:
-            return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
-        frame = replica.frame if expected == first else replica.step(captured.edits, captured.delivered)
+            return Verified(world.frame.tick, nodes, chain, missing_tick=expected)
+        frame = frame_of(world, captured)
         if frame.digest != captured.digest:
             return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
         if expected > first:
             chain = chain_next(chain, frame.digest)
         expected += 1
-    return Verified(replica.frame.tick, nodes, chain)
+    return Verified(world.frame.tick, nodes, chain)
 
 
 def _differing(frame: Frame, captured: CapturedTick) -> tuple[str, ...]:
@@ -155,34 +164,25 @@ class Between:
 
     def __init__(self, about: About) -> None:
         self._about = about
-        self._replica: Replica | None = None
+        self._world: SteppedWorld | None = None
 
     def __call__(self, frame: Frame, inputs: Iterable[CapturedTick]) -> Frame | None:
         """Return the frame that inputs lead to from a captured one; None where it is not what the capture had.
 
         Raises Refused where the capture cannot be computed again: its files do not fit.
         """
-        replica = self._at(frame)
+        if self._world is None:
+            self._world = captured_world(self._about, deployment_of(self._about), frame)
+        world = self._world
+        if (world.frame.tick, world.frame.digest) != (frame.tick, frame.digest):
+            world.go_to(frame)
         for captured in inputs:
-            found = replica.step(captured.edits, captured.delivered)
-            if found.digest != captured.digest:
-                self.close()
+            if frame_of(world, captured).digest != captured.digest:
                 return None
-        return replica.frame
-
-    def _at(self, frame: Frame) -> Replica:
-        """Return the node, standing at a frame."""
-        if self._replica is not None:
-            if self._replica.frame.digest != frame.digest or self._replica.frame.tick != frame.tick:
-                self._replica.set_back(frame)
-            return self._replica
-        about = self._about
-        start = start_with(frame, about.path.name, CHAIN_START)
-        self._replica = replica_of(about.deployment_text, about.deployment_name, about.files, start)
-        return self._replica
+        return world.frame
 
     def close(self) -> None:
-        """Give the node up; it is made again when it is needed."""
-        if self._replica is not None:
-            self._replica.close()
-            self._replica = None
+        """Free the engine; it is made again when it is needed."""
+        if self._world is not None:
+            self._world.close()
+            self._world = None

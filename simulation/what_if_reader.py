@@ -19,9 +19,10 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
 from foosim.capture.rows import AGES, CLIENTS, PACKETS, TICK, AgeRow, ClientRow, EditRow, PacketRow, TickRow
 from foosim.protocol.messages import Sent
-from foosim.simulation.resimulation import Replica
-from foosim.simulation.verify import start_of
+from foosim.simulation.stepped_world import SteppedWorld
+from foosim.simulation.verify import captured_world, frame_of, start_of
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT
+from foosim.world.assembly.initial_state import first_frame
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
 
@@ -185,12 +186,11 @@ def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered
             raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
         yield lambda offered: _later(first, offered)
     else:
-        about = capture.about
-        replica = Replica(about.deployment_text, about.deployment_name, capture.deployment, start=start_of(capture))
+        world = captured_world(capture.about, capture.deployment, first_frame(capture.deployment, start_of(capture)))
         try:
-            yield lambda offered: _computed(capture, replica, offered)
+            yield lambda offered: _computed(capture, world, offered)
         finally:
-            replica.close()
+            world.close()
 
 
 def _tick_of(offered: Offered) -> int:
@@ -210,10 +210,10 @@ def _captured(capture: CaptureData, offered: Offered) -> Frame:
     return offered.frame
 
 
-def _computed(capture: CaptureData, replica: Replica, offered: Offered) -> Frame:
+def _computed(capture: CaptureData, world: SteppedWorld, offered: Offered) -> Frame:
     assert isinstance(offered.row, TickRow)
     tick = captured_tick(offered.row)
-    frame = replica.frame if tick.tick == replica.frame.tick else replica.step(tick.edits, tick.delivered)
+    frame = frame_of(world, tick)
     if frame.tick != tick.tick or frame.digest != tick.digest:
-        raise CaptureError(f"{capture.path}: frame {tick.tick} is not there, and comes out otherwise here: verify it")
+        raise CaptureError(f"{capture.path}: frame {tick.tick} is missing, and is another one when computed: verify it")
     return frame

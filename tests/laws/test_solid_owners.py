@@ -16,7 +16,7 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.simulation.failures import Stuck
-from foosim.simulation.run import deal_robots
+from foosim.simulation.stepped_world import deal_robots
 from foosim.world.assembly.rest import Rest, is_still
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.components.drives import Drives

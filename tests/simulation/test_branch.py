@@ -16,8 +16,8 @@ from foosim.cli.rehearse import app as rehearse_app
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.simulation.resimulation import Replica
 from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.stepped_world import SteppedWorld, deal_robots
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.supervisor import records
@@ -112,19 +112,19 @@ def test_any_captured_frame_and_the_deliveries_behind_it_give_the_captured_diges
     """With players, whose programs have a memory that no capture has, the captured deliveries are the inputs."""
     ticks = list(open_capture(captured.played).captured_ticks())
     sets = ["engine=pure", "players={}"]
-    text = with_nodes(TEXT, TABLE.name, 2, sets)
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
     for at in (0, 70, 240):
         start = start_of(captured.played, f"{2 * at} ms")
-        replica = Replica(text, TABLE.name, load_deployment(text, TABLE.name), start=start)
+        world = SteppedWorld(deployment, first_frame(deployment, start), deal_robots(deployment, 2))
         try:
-            assert replica.frame.tick == at and replica.frame.digest == ticks[at].digest
+            assert world.frame.tick == at and world.frame.digest == ticks[at].digest
             delivered = 0
             for tick in ticks[at + 1 : at + 50]:
                 delivered += len(tick.delivered)
-                assert replica.step(tick.edits, tick.delivered).digest == tick.digest, tick.tick
+                assert world.step(tick.delivered, tick.edits).digest == tick.digest, tick.tick
             assert delivered > 50
         finally:
-            replica.close()
+            world.close()
 
 
 def test_a_branch_with_players_goes_on_and_repeats(captured: Captured, tmp_path: Path) -> None:

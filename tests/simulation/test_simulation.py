@@ -17,10 +17,11 @@ from foosim.deployment.event_requests import BadEvent
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.players.learning.table_rewards import with_ball
 from foosim.protocol.messages import Received
-from foosim.simulation.resimulation import Replica
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.simulation import LEARNER, Simulation, read_for_stepping
+from foosim.simulation.stepped_world import SteppedWorld
 from foosim.world.actuators.rod_position import Command
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.robot_packets import Delivered
 from tests.waving import PERFECT, PERIOD, PLAYERS, waved
 
@@ -90,14 +91,13 @@ def test_commands_of_an_agent_are_those_of_a_player_who_sends_the_same() -> None
     assert min(late) >= 1_000_000, "the links delay by 1 ms and more"
 
 
-def test_without_a_network_it_has_the_digests_of_a_node_that_gets_the_same_commands() -> None:
-    text = apply_sets(TABLE.read_text(), TABLE.name, [PLAYERS, WAIT, "nodes={n1: {launch: local, robots: ['*']}}"])
-    deployment = load_deployment(text, TABLE.name)
-    encoder, replica = CommandEncoder(deployment), Replica(text, TABLE.name, deployment)
+def test_without_a_network_commands_arrive_at_the_frame_at_which_they_are_sent() -> None:
+    deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [PLAYERS, WAIT]), TABLE.name)
+    encoder, world = CommandEncoder(deployment), SteppedWorld(deployment, initial_frame(deployment))
     number = 0
     try:
         with Simulation(deployment) as simulation:
-            assert simulation.frame.digest == replica.frame.digest
+            assert simulation.frame.digest == world.frame.digest
             for tick in range(TICKS):
                 commands = waved(tick) if tick % PERIOD == 0 else {}
                 delivered = []
@@ -107,9 +107,9 @@ def test_without_a_network_it_has_the_digests_of_a_node_that_gets_the_same_comma
                     (what,) = encoder.encode(robot, command)
                     delivered.append(Delivered(now_ns, "waver", number, 0, robot, *what))
                 simulation.step(commands)
-                assert simulation.frame.digest == replica.step([], delivered).digest, tick
+                assert simulation.frame.digest == world.step(delivered).digest, tick
     finally:
-        replica.close()
+        world.close()
 
 
 def test_from_a_captured_frame_it_goes_on_as_the_captured_run(tmp_path: Path) -> None:

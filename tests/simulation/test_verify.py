@@ -115,17 +115,16 @@ def flipped(ticks: Sequence[CapturedTick], at: int) -> list[CapturedTick]:
 def test_one_flipped_bit_of_one_command_is_found_at_its_tick(captured: Captured) -> None:
     capture = open_capture(captured("pure")[0])
     ticks = list(capture.captured_ticks())
-    name, text = capture.about.deployment_name, capture.about.deployment_text
     with_commands = [tick.tick for tick in ticks if tick.delivered]
     for at in (with_commands[0], with_commands[len(with_commands) // 2], with_commands[-1]):
-        found = verify(text, name, flipped(ticks, at), nodes=2)
+        found = verify(capture.about, flipped(ticks, at), nodes=2)
         assert (found.tick, found.entities) == (at, (ticks[at].delivered[0].destination,))
 
 
 def test_a_missing_tick_is_named(captured: Captured) -> None:
     capture = open_capture(captured("pure")[0])
     ticks = [tick for tick in capture.captured_ticks() if tick.tick != 77]
-    found = verify(capture.about.deployment_text, capture.about.deployment_name, ticks)
+    found = verify(capture.about, ticks)
     assert not found.equal and found.missing_tick == 77
 
 

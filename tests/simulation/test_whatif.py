@@ -57,7 +57,7 @@ def test_by_its_own_network_every_fate_is_the_captured_one(tmp_path: Path, netwo
 
 def test_frames_of_every_tick_are_read_and_not_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = open_capture(captured(tmp_path / "run.mcap", "wifi", "capture.frames_every=1 tick"))
-    monkeypatch.setattr("foosim.simulation.what_if_reader.Replica", None)
+    monkeypatch.setattr("foosim.simulation.what_if_reader.captured_world", None)
     assert what_if(capture).changed == 0
 
 

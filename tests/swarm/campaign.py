@@ -23,12 +23,13 @@ from foosim.protocol import channels
 from foosim.runtime.roles.bus import CALM, Weather
 from foosim.simulation.clock import Clock
 from foosim.simulation.failures import Broken
-from foosim.simulation.resimulation import Replica
 from foosim.simulation.run import with_nodes
+from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import Settings, System
 from foosim.simulation.trace import Traced
 from foosim.supervisor.settings import RunSettings
 from foosim.world.actuators.gripper import GripperSettings
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.misfits import rigid_bodies
 from foosim.world.frame import Frame
 from tests.swarm.faults import (
@@ -268,8 +269,9 @@ class Flight:
         self._healed_ns = -1
         self._last_commit_ns = 0
         contents = dict(files)
-        self._replica = Replica(alone, name, load_deployment(alone, name).with_assets(contents))
-        self.laws = Laws(self._replica, load_deployment(text, name).with_assets(contents))
+        one = load_deployment(alone, name).with_assets(contents)
+        self._world = SteppedWorld(one, initial_frame(one))
+        self.laws = Laws(self._world, load_deployment(text, name).with_assets(contents))
         chosen = replace(
             settings,
             node=WatchedNode if settings.node is NodeCore else settings.node,
@@ -304,7 +306,7 @@ class Flight:
     def close(self) -> None:
         """Free the engines."""
         self.system.close()
-        self._replica.close()
+        self._world.close()
 
     def _see(self, traced: Traced) -> None:
         self.seen += 1

@@ -10,7 +10,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Done, Down, Go, Samples, Sent
 from foosim.simulation.failures import Broken
-from foosim.simulation.resimulation import Replica
+from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import System
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
 from foosim.vhub.state.hub_state import HubState
@@ -148,11 +148,11 @@ class PacketLaws:
         self._reached.pop(tick - LOST_TICKS_MAX, None)
         self._received.pop(tick - LOST_TICKS_MAX, None)
 
-    def senses(self, frame: Frame, replica: Replica) -> None:
+    def senses(self, frame: Frame, world: SteppedWorld) -> None:
         """What robots sent at a frame is a function of it, whoever owned them."""
         samples = self._samples.pop(frame.tick, [])
         taken = world_packets(samples, frame.digest, frame, self._sampling)
-        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else replica.sense()
+        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else world.sense()
         hold(taken is None or taken == sensed, f"robots' packets at tick {frame.tick} are not those of their sensors")
 
     # --- the clients' side -------------------------------------------------------------------------------------------
