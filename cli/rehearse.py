@@ -28,8 +28,8 @@ from foosim.launcher.new_capture import check_rooms
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
+from foosim.simulation.attendant import Interrupts
 from foosim.simulation.check.component_check import ComponentCheck, used_form
-from foosim.simulation.interrupts import Interrupts
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.vhub.links.summary import summaries

@@ -1,13 +1,9 @@
-"""Errors of a rehearsal that are faults of foosim.
+"""The error of a rehearsal that is a fault of foosim.
 
-They have a module of their own, since a compiled module cannot define subclasses of AssertionError.
+It has a module of its own, since a compiled module cannot define subclasses of AssertionError.
 """
 
 from __future__ import annotations
-
-
-class Broken(AssertionError):
-    """A law does not hold."""
 
 
 class Stuck(AssertionError):

@@ -1,4 +1,4 @@
-"""The in-memory journal of a rehearsal's vHub, with its capture position, crashes during a write and machine loss."""
+"""The in-memory journal of a rehearsal's vHub, with its capture position, and crashes during a write."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Final, Literal, get_args
 
 from foosim.protocol.codec import decode_any
 from foosim.vhub.core import HubCore
-from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
+from foosim.vhub.state.records import HeadRecord, HubRecord
 from foosim.vhub.state.resume import Captured, Past, recall
 
 Ending = Literal["now", "torn", "unsaid"]
@@ -26,30 +26,17 @@ class HubJournal:
         """The machine that holds the journal; another one after a machine loss."""
         self.ending: Ending | None = None
         """How the vHub dies at its next record; None: it does not."""
-        self._heads: list[int] = []
+        self.heads: list[int] = []
 
     def append(self, record: bytes) -> None:
         """Write a record; drop those that no fold needs."""
         if isinstance(decode_any(HubRecord, record), HeadRecord):
-            self._heads.append(len(self.records))
-            if len(self._heads) > HEADS_KEPT:
-                gone = self._heads[1]
+            self.heads.append(len(self.records))
+            if len(self.heads) > HEADS_KEPT:
+                gone = self.heads[1]
                 del self.records[:gone]
-                self._heads = [at - gone for at in self._heads[1:]]
+                self.heads = [at - gone for at in self.heads[1:]]
         self.records.append(record)
-
-    def lose(self, count: int) -> int:
-        """Lose the machine with its last records, keeping at least one tick; return how many records were lost."""
-        found = [decode_any(HubRecord, raw) for raw in self.records]
-        ticks = [(at, record.tick) for at, record in enumerate(found) if isinstance(record, TickRecord)]
-        if not ticks:
-            return 0
-        left = max(ticks[0][0] + 1, len(found) - count)
-        lost = len(found) - left
-        del self.records[left:]
-        self.machine = f"machine-{int(self.machine.rpartition('-')[2]) + 1}"
-        self._heads = [at for at in self._heads if at < left]
-        return lost
 
     def past(self, hub: HubCore, run: str) -> Past | None:
         """Return the records that a new vHub resumes from; None for the first vHub."""

@@ -1,4 +1,4 @@
-"""Settings of a rehearsal, and its state of each process."""
+"""Settings of a rehearsal, and its state of each process: its clock, its inbox, what it did."""
 
 from __future__ import annotations
 
@@ -13,12 +13,50 @@ from foosim.node.physics.interface import EngineFactory
 from foosim.protocol.messages import Epoch
 from foosim.runtime.roles.bus import CALM, Message, Weather
 from foosim.runtime.roles.standstill import Standstill
-from foosim.simulation.clock import Clock
-from foosim.simulation.trace import Observer
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
+
+MILLION = 1_000_000
+
+
+@dataclass
+class Clock:
+    """One process's monotonic clock: its reading at virtual time 0, and its rate error.
+
+    Clocks of processes differ, as on separate machines, so times of two processes are not comparable.
+    """
+
+    offset_ns: int = 0
+    drift_ppm: int = 0
+
+    def at(self, virtual_ns: int) -> int:
+        """Return its reading at a virtual time."""
+        return virtual_ns + self.offset_ns + virtual_ns * self.drift_ppm // MILLION
+
+    def when(self, clock_ns: int) -> int:
+        """Return the first virtual time at which its reading is at least this."""
+        passed_ns = clock_ns - self.offset_ns
+        if not self.drift_ppm:
+            return passed_ns
+        return -(-passed_ns * MILLION // (MILLION + self.drift_ppm))
+
+
+@dataclass(frozen=True)
+class Traced:
+    """One action of a process: `what` is journal, publish or receive."""
+
+    now_ns: int
+    process: str
+    what: str
+    channel: str
+    payload: bytes
+    name: str = ""
+    """The process that the channel's key names."""
+
+
+Observer = Callable[[Traced], None]
 
 
 @dataclass

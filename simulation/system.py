@@ -24,12 +24,10 @@ from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.roles.bus import Bus, Message
-from foosim.simulation.clock import Clock
 from foosim.simulation.failures import Stuck
 from foosim.simulation.journals import Ending, HubJournal
 from foosim.simulation.people import OPERATOR, People
-from foosim.simulation.settings import AtWork, Process, Settings
-from foosim.simulation.trace import Traced
+from foosim.simulation.settings import AtWork, Clock, Process, Settings, Traced
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import ClosingCore, HubCore

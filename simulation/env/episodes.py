@@ -1,10 +1,10 @@
-"""Episodes of a deployment: what both environments are made of, without a library for learning."""
+"""Episodes of a deployment, on which both environments are built, without a library for learning."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.limits import COUNTER_MAX
 from foosim.deployment.schema import Deployment
 from foosim.painting.overhead import OverheadPainter
-from foosim.simulation.env.reward import Nothing, Reward, RewardFactory
 from foosim.simulation.simulation import Agent, Simulation, read_for_stepping
 from foosim.world.frame import Frame
 from foosim.world.start import Start
@@ -28,6 +27,49 @@ PIXELS_MAX: Final = 8192
 """The widest and the highest picture."""
 START: Final = "start"
 """The option of `reset` that names a frame to begin with."""
+
+
+Robots: TypeAlias = Mapping[str, tuple[str, ...]]
+"""The robots that each agent commands, by the agent's name."""
+
+
+class Reward(Protocol):
+    """What an episode begins with, what it is worth, and when it is over.
+
+    It is made for a deployment and its agents; `foosim.players.learning` has those of worlds that come with foosim.
+    """
+
+    def begin(self, frame: Frame, seed: int) -> Frame:
+        """Return the frame that an episode begins with, from that of its reset; draws are keyed by `seed`."""
+
+    def rate(self, before: Frame, after: Frame) -> Mapping[str, float]:
+        """Return what a step was worth to each agent."""
+
+    def is_over(self, frame: Frame) -> bool:
+        """Whether the episode ends with this frame."""
+
+
+RewardFactory: TypeAlias = Callable[[Deployment, Robots], Reward]
+"""Makes the reward of a deployment and its agents; usually the reward's class."""
+
+
+class Nothing:
+    """The reward of a world that has none: 0 for every step, and no end."""
+
+    def __init__(self, deployment: Deployment, robots: Robots) -> None:
+        self._rates = dict.fromkeys(robots, 0.0)
+
+    def begin(self, frame: Frame, seed: int) -> Frame:
+        """Begin with the frame as it is."""
+        return frame
+
+    def rate(self, before: Frame, after: Frame) -> Mapping[str, float]:
+        """Return 0 for each agent."""
+        return self._rates
+
+    def is_over(self, frame: Frame) -> bool:
+        """It never is."""
+        return False
 
 
 class Stepped(NamedTuple):

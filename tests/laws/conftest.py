@@ -18,8 +18,8 @@ from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import encode
 from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.supervisor.settings import RunSettings
 from foosim.world.frame import Frame
 

@@ -24,10 +24,9 @@ from foosim.protocol.messages import Deliveries, Go, Received, Sent
 from foosim.simulation.carriers import Bypass, Carrier
 from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import Rehearsed, rehearse, with_nodes
-from foosim.simulation.settings import Process
+from foosim.simulation.settings import Process, Traced
 from foosim.simulation.simulation import Resident, Simulation
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.supervisor.settings import RunSettings

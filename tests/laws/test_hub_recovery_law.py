@@ -22,8 +22,8 @@ from foosim.runtime.roles.bus import Weather
 from foosim.simulation import journals
 from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing

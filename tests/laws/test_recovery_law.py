@@ -19,8 +19,8 @@ from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
 from foosim.runtime.roles.bus import Weather
 from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import OPERATOR, Settings, System
-from foosim.simulation.trace import Traced
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.vhub.state.records import Closing
 

@@ -21,8 +21,8 @@ from foosim.protocol.codec import decode
 from foosim.protocol.messages import Deliveries, Go
 from foosim.simulation import journals
 from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.world.edits import Disrupt

@@ -17,8 +17,8 @@ from foosim.protocol.channels import PART
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part
 from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.world.actuators.rod_position import PositionActuator
 from foosim.world.layout import Entity, Layout, build_layout
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from foosim.protocol import channels
 from foosim.runtime.roles.bus import LATE_NS, Bus, Weather
-from foosim.simulation.clock import Clock
+from foosim.simulation.settings import Clock
 
 NOW_NS = 1_000
 UNTIL_NS = 5_000

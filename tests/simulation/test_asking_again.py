@@ -10,8 +10,7 @@ from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part, Want
 from foosim.runtime.roles.bus import Weather
 from foosim.simulation.run import rehearse
-from foosim.simulation.settings import Settings
-from foosim.simulation.trace import Traced
+from foosim.simulation.settings import Settings, Traced
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 40

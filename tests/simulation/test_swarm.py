@@ -20,8 +20,7 @@ from foosim.node.tick import Work
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries, Done, Sent
 from foosim.runtime.roles.bus import CALM
-from foosim.simulation.clock import Clock
-from foosim.simulation.failures import Broken
+from foosim.simulation.settings import Clock
 from foosim.simulation.system import Settings
 from foosim.vhub.state.records import TickRecord
 from tests.swarm.__main__ import fly_seeds, main
@@ -36,7 +35,7 @@ from tests.swarm.faults import (
     Dice,
     loses_players,
 )
-from tests.swarm.packet_invariants import PacketLaws
+from tests.swarm.packet_invariants import Broken, PacketLaws
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 LIVING: Final = Path(__file__).parents[1] / "swarm" / "living.yaml"

@@ -20,8 +20,8 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Epoch, Order, Request
 from foosim.simulation.run import with_nodes
+from foosim.simulation.settings import Traced
 from foosim.simulation.system import OPERATOR, Settings, System
-from foosim.simulation.trace import Traced
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame

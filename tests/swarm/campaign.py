@@ -21,12 +21,10 @@ from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.runtime.roles.bus import CALM, Weather
-from foosim.simulation.clock import Clock
-from foosim.simulation.failures import Broken
 from foosim.simulation.run import with_nodes
+from foosim.simulation.settings import Clock, Traced
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import Settings, System
-from foosim.simulation.trace import Traced
 from foosim.supervisor.settings import RunSettings
 from foosim.world.actuators.gripper import GripperSettings
 from foosim.world.assembly.initial_state import initial_frame
@@ -53,7 +51,7 @@ from tests.swarm.faults import (
 )
 from tests.swarm.invariants import Laws
 from tests.swarm.memory_bounds import too_large
-from tests.swarm.packet_invariants import hold
+from tests.swarm.packet_invariants import Broken, hold
 from tests.swarm.strikes import lose_owner, set_field, strike
 
 FAULTS: Final[tuple[int, ...]] = (8, 20)

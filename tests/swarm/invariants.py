@@ -17,9 +17,9 @@ from foosim.protocol import channels
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
+from foosim.simulation.settings import Traced
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import System
-from foosim.simulation.trace import Traced
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor

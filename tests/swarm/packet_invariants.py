@@ -9,7 +9,6 @@ from foosim.client.core import ClientCore
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Done, Down, Go, Samples, Sent
-from foosim.simulation.failures import Broken
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import System
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
@@ -25,6 +24,10 @@ LOST_TICKS_MAX: Final = 1000
 """Ticks for which the inputs of fates are kept: more than a machine loss undoes."""
 OPEN: Final[tuple[str, ...]] = ("", IN_FLIGHT)
 """The cause of a packet that was not dropped."""
+
+
+class Broken(AssertionError):
+    """A law does not hold."""
 
 
 def hold(law: bool, what: str) -> None:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import ctypes
-import faulthandler
 import json
-import os
 import re
 import signal
-import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar, Final
@@ -27,9 +24,8 @@ from foosim.common.errors import Refused
 from foosim.common.units import Pace
 from foosim.deployment.schema import Deployment
 from foosim.runtime.disk import free_bytes
-from foosim.simulation import attendant, onlooker
-from foosim.simulation.attendant import INTERRUPTS_MAX
-from foosim.simulation.onlooker import LOOK_S, STOOD_S, Onlooker
+from foosim.simulation import attendant
+from foosim.simulation.attendant import INTERRUPTS_MAX, LOOK_S, STOOD_S, Onlooker
 from foosim.simulation.run import rehearse
 from foosim.simulation.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
@@ -38,10 +34,12 @@ from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
-SETS: Final = ("engine=pure", "substeps=1", *BY_PERIOD, "players.player-red.class=tests.simulation.test_onlooker:Hangs")
-
-LONG_S: Final = 900
-LONG: Final = f"deadlines={{lockstep_fast: {LONG_S} s, start: {LONG_S} s}}"
+SETS: Final = (
+    "engine=pure",
+    "substeps=1",
+    *BY_PERIOD,
+    "players.player-red.class=tests.simulation.test_attendant:Hangs",
+)
 
 
 def looks_on() -> tuple[Onlooker, SupervisorCore]:
@@ -117,8 +115,6 @@ def only_hanging_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         return now_s
 
     monkeypatch.setattr(attendant, "time", SimpleNamespace(monotonic=monotonic))
-    monkeypatch.setattr(attendant, "WIND_S", 0.0)
-    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
 
 
 def rehearsed(*options: str) -> Any:
@@ -134,7 +130,7 @@ def test_the_command_shows_lines_of_progress(monkeypatch: pytest.MonkeyPatch) ->
         shown.set()
 
     monkeypatch.setattr(rehearse_command, "_note", note)
-    monkeypatch.setattr(onlooker, "LINE_S", 0.0)
+    monkeypatch.setattr(attendant, "LINE_S", 0.0)
     Hangs.how = shown.wait
     assert rehearsed("--for", "0.1 s").exit_code == 0
     what = r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, ball at [-+.0-9 ]+ m, waits for "
@@ -202,85 +198,6 @@ def test_one_that_cannot_be_interrupted_is_given_up(capfd: pytest.CaptureFixture
     assert (result["reason"], result["failed"], result["ticks"]) == (reason, True, HANGS_AT + 1)
     assert "locks_twice" in capfd.readouterr().err, f"after {INTERRUPTS_MAX} interrupts its stack is shown"
     assert run["reason"] == reason, "by the interrupts that waited for it"
-
-
-def forked(run: Callable[[], object]) -> int:
-    """Run something in a fork of this process, in a process group of its own; return its process id."""
-    child = os.fork()
-    if child == 0:
-        code = 7
-        try:
-            os.setpgid(0, 0)
-            run()
-            code = 0
-        finally:
-            os._exit(code)
-    return child
-
-
-def test_one_that_keeps_the_interpreter_ends_its_process_with_its_stack(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A pause in C that holds the interpreter's lock: no thread of Python runs any more, and no signal is handled."""
-    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
-    monkeypatch.setattr(attendant, "WIND_S", 0.0)
-    monkeypatch.setattr(sys, "__stderr__", None)
-    library, wound, wind = ctypes.PyDLL(None), threading.Event(), faulthandler.dump_traceback_later
-
-    def short(limit_s: float, **options: Any) -> None:
-        wind(1.0, **options)
-        wound.set()
-
-    def pauses() -> None:
-        monkeypatch.setattr(faulthandler, "dump_traceback_later", short)  # here, in the fork, from now on
-        wound.wait()
-        while True:
-            library.pause()
-
-    Hangs.how = pauses
-    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None))
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
-    assert re.search(r"Timeout .*in pauses\n.*in act\n", capfd.readouterr().err, re.DOTALL)
-
-
-def threads_of(process: int) -> int:
-    return len(os.listdir(f"/proc/{process}/task"))
-
-
-def await_threads_at_most(most: int) -> int:
-    """Return this process's threads once they are so few: one that is over is listed until the kernel has ended it."""
-    while (number := threads_of(os.getpid())) > most:
-        os.sched_yield()
-    return number
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
-def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """While it is stopped there is no timer, which is a thread of faulthandler's: so none is over when it goes on."""
-    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
-    counts, told = os.pipe()
-    cancel = faulthandler.cancel_dump_traceback_later
-
-    def cancel_and_see_it_gone() -> None:
-        """The thread ends after it has let go of what `cancel` waits for; a stop in between keeps it."""
-        cancel()
-        await_threads_at_most(2)
-
-    def stops() -> None:
-        before = await_threads_at_most(3)
-        monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel_and_see_it_gone)
-        signal.raise_signal(signal.SIGTSTP)
-        monkeypatch.setattr(faulthandler, "cancel_dump_traceback_later", cancel)
-        os.write(told, bytes([before, await_threads_at_most(3)]))
-
-    Hangs.how = stops
-    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None))
-    assert os.WIFSTOPPED(os.waitpid(child, os.WUNTRACED)[1])
-    stopped = threads_of(child)
-    os.kill(child, signal.SIGCONT)
-    assert stopped == 2, "the rehearsal's and the attendant's"
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-    assert os.read(counts, 2) == bytes([3, 3]), "there is one before, and again as soon as it goes on"
 
 
 def test_a_ctrl_c_ends_in_order_and_the_last_line_says_how_far_it_came(tmp_path: Path) -> None:
