@@ -24,7 +24,10 @@ from foosim.simulation.system import System
 AGAIN_NS: Final = 150_000_000
 """Period at which an unanswered request is repeated."""
 FORM: Final = "kill NAME [for TIME] at TIME, cut NODE for TIME at TIME, or move ROBOT to NODE at TIME"
-_EVENT: Final = re.compile(r"(kill|cut|move) (\S+)(?: to (\S+))?(?: for (.+?))? at (.+)")
+_EVENT: Final = re.compile(
+    r"(?:kill (?P<process>\S+)(?: for (?P<down>.+?))?|cut (?P<node>\S+) for (?P<gap>.+?)"
+    r"|move (?P<robot>\S+) to (?P<to>\S+)) at (?P<at>.+)"
+)
 
 
 class Events:
@@ -32,8 +35,14 @@ class Events:
 
     def __init__(self, texts: Sequence[str], deployment: Deployment, nodes: int) -> None:
         """Raises BadValue for a text that is no event, UnknownName for a name in it."""
-        self._nodes = [f"n{number + 1}" for number in range(nodes)]
-        self._deployment = deployment
+        here = [f"n{number + 1}" for number in range(nodes)]
+        self._names: dict[str, tuple[str, list[str]]] = {
+            "process": ("node or player", [*here, *deployment.players]),
+            "node": ("node", here),
+            "robot": ("robot", [*deployment.robots]),
+            "to": ("node", here),
+        }
+        self._tick_ns = deployment.tick_ns
         self._due = [(text, *self._read(text)) for text in texts]
         self._left = dict.fromkeys(texts, "the rehearsal ended before")
         """Why each that has not happened has not."""
@@ -43,29 +52,19 @@ class Events:
     def _read(self, text: str) -> tuple[int, Callable[[System, str], None]]:
         """Return the tick of an event, and what it does."""
         found = _EVENT.fullmatch(text)
-        verb, name, node, lasts, at = found.groups() if found else ("", "", None, None, "")
-        if (verb == "move") != (node is not None) or (verb, lasts is None) in (
-            ("cut", True),
-            ("move", False),
-            ("", True),
-        ):
+        if found is None:
             raise BadValue(f"no event: write {FORM}", text)
-        tick = max(1, -(-read_at(text, parse_ns, at) // self._deployment.tick_ns))
+        for group, (what, choices) in self._names.items():
+            if found[group] is not None and found[group] not in choices:
+                raise UnknownName(f"{text}: no such {what}", found[group], choices)
+        tick = max(1, -(-read_at(text, parse_ns, found["at"]) // self._tick_ns))
+        lasts = found["down"] or found["gap"]
         for_ns = None if lasts is None else read_at(text, parse_ns, lasts)
-        if node is not None:
-            self._check(text, "robot", name, self._deployment.robots)
-            self._check(text, "node", node, self._nodes)
-            return tick, partial(self._move, name, node)
-        if for_ns is not None and verb == "cut":
-            self._check(text, "node", name, self._nodes)
-            return tick, partial(self._cut, name, for_ns)
-        self._check(text, "node or player", name, [*self._nodes, *self._deployment.players])
-        return tick, partial(self._kill, name, for_ns)
-
-    @staticmethod
-    def _check(text: str, what: str, name: str, choices: Sequence[str] | Mapping[str, object]) -> None:
-        if name not in choices:
-            raise UnknownName(f"{text}: no such {what}", name, choices)
+        if found["robot"]:
+            return tick, partial(self._move, found["robot"], found["to"])
+        if found["node"]:
+            return tick, partial(self._cut, found["node"], for_ns or 0)
+        return tick, partial(self._kill, found["process"], for_ns)
 
     def prepare(self, system: System) -> None:
         """Schedule them."""

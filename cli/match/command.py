@@ -25,10 +25,8 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, JsonOption, new_app, print_json
-from foosim.simulation.match.chart import draw
-from foosim.simulation.match.entrants import entrant, seats
-from foosim.simulation.match.figures import figures
-from foosim.simulation.match.game import Fixture, Game, Link, Played, play, sets_of
+from foosim.simulation.match.figures import draw, figures
+from foosim.simulation.match.game import Fixture, Game, Link, Played, entrant, play, seats, sets_of
 from foosim.simulation.workers import in_processes
 
 TABLE: Final = Path("deploy/table.yaml")

@@ -100,24 +100,22 @@ class ComponentCheck:
         self.on_step(self.now)
 
     def broken(self) -> Iterator[str]:
-        """Yield which laws the deployment's forms break, in words, as each is found."""
+        """Yield which laws the deployment's components break, in words, as each is found."""
         self.begin("on one node")
-        first, alone = self._rehearsed(self.text, 1, is_watched=True)
-        self.first = first.json
-        self.has_failed = first.json["failed"]
+        self.first, alone = self._rehearsed(self.text, 1, is_watched=True)
+        self.has_failed = self.first["failed"]
         if self.has_failed:
-            yield str(first.json["reason"])
+            yield str(self.first["reason"])
             return
         for nodes in NODES:
             shared = f"on {nodes} nodes" if nodes > 1 else "on one node"
-            shared += ", with robots moved and objects made anew,"
-            self.begin(shared.removesuffix(","))
-            many, frames = self._rehearsed(self.text, nodes, partial(_shuffle, seed=self.seed, ticks=self.ticks))
-            if many.json["failed"] or many.digests != first.digests:
-                where = _first_difference(alone, frames) or str(many.json["reason"])
-                yield f"{shared} the world is another one: {where}"
+            yield from self._other(f"{shared}, with robots moved and objects made anew,", self.text, nodes, alone)
         if self._coming is not None:
-            yield from self._with_comings(self._coming)
+            self.begin("on one node, where everything leaves and comes back")
+            first, frames = self._rehearsed(self._coming, 1)
+            shared = f"on {NODES[-1]} nodes, where everything leaves and comes back,"
+            yield from [str(first["reason"])] if first["failed"] else []
+            yield from self._other(shared, self._coming, NODES[-1], frames)
         fitted, found = _Fitted(self.text, self.name, self.files), _Compared()
         try:
             for frame in alone:
@@ -131,32 +129,29 @@ class ComponentCheck:
         yield from found.broken()
         self.notes += found.notes()
         self.sensors, self.compared = fitted.count, sum(count > 0 for count in found.given.values())
-        for what, other in self._changed:
-            self.begin(what.removesuffix(","))
-            beside, frames = self._rehearsed(other, 1)
-            where = _first_difference(alone, frames)
-            where = where or _first_other_reading(fitted, alone, _Fitted(other, self.name, self.files), frames)
-            if beside.json["failed"] or where:
-                yield f"{what} the world is another one: {where or beside.json['reason']}"
+        for what, text in self._changed:
+            yield from self._other(what, text, 0, alone, fitted)
 
-    def _with_comings(self, text: str) -> Iterator[str]:
-        """Yield where the world on several nodes is another one than on one while everybody leaves and comes back."""
-        self.begin("on one node, where everything leaves and comes back")
-        first, alone = self._rehearsed(text, 1)
-        nodes = NODES[-1]
-        what = f"on {nodes} nodes, where everything leaves and comes back,"
+    def _other(
+        self, what: str, text: str, nodes: int, frames: Sequence[Frame], fitted: _Fitted | None = None
+    ) -> Iterator[str]:
+        """Yield where a rehearsal differs from frames: on some nodes, with robots moved and objects made anew (0: one,
+        undisturbed); and in readings, where `fitted` measures these frames."""
         self.begin(what.removesuffix(","))
-        many, frames = self._rehearsed(text, nodes, partial(_shuffle, seed=self.seed, ticks=self.ticks))
-        if first.json["failed"] or many.digests != first.digests:
-            where = _first_difference(alone, frames) or str(first.json["reason"])
-            yield f"{what} the world is another one: {where}"
+        shuffle = partial(_shuffle, seed=self.seed, ticks=self.ticks) if nodes else None
+        result, others = self._rehearsed(text, nodes or 1, shuffle)
+        where = _first_difference(frames, others)
+        if not where and fitted is not None:
+            where = _first_other_reading(fitted, frames, _Fitted(text, self.name, self.files), others)
+        if result["failed"] or where:
+            yield f"{what} the world is another one: {where or result['reason']}"
 
     def _rehearsed(
         self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_watched: bool = False
-    ) -> tuple[Rehearsed, list[Frame]]:
+    ) -> tuple[dict[str, Any], list[Frame]]:
         frames: list[Frame] = []
         settings = Settings(on_commit=frames.append, is_watched=is_watched)
-        return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare), frames
+        return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare).json, frames
 
 
 def _shuffle(system: System, *, seed: int, ticks: int) -> None:

@@ -27,8 +27,9 @@ from foosim.client.vectors import Column
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.players.learning.exercises import ENVIRONMENTS, TABLE
+from foosim.simulation.agents import agents_of
 from foosim.simulation.env.episodes import Episodes, Nothing, Reward
-from foosim.simulation.simulation import Simulation, agents_of, read_for_stepping
+from foosim.simulation.simulation import Simulation, read_for_stepping
 
 __all__ = ["TABLE", "FoosimEnv", "FoosimParallelEnv", "Nothing", "Reward", "parallel_env"]
 

@@ -18,7 +18,8 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.limits import COUNTER_MAX
 from foosim.deployment.schema import Deployment
 from foosim.painting.overhead import OverheadPainter
-from foosim.simulation.simulation import Agent, Simulation, read_for_stepping
+from foosim.simulation.agents import Agent
+from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.world.frame import Frame
 from foosim.world.start import Start
 

@@ -21,11 +21,12 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Deliveries, Go, Received, Sent
+from foosim.simulation.agents import Resident
 from foosim.simulation.carriers import Bypass, Carrier
 from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import Rehearsed, rehearse, with_nodes
 from foosim.simulation.settings import Process, Traced
-from foosim.simulation.simulation import Resident, Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if

@@ -72,15 +72,6 @@ class Course:
 
 
 @cache
-def short(nodes: int) -> Rehearsed:
-    return rehearse(text(), YARD.name, 200, nodes, folder=DEPLOY)
-
-
-def test_it_is_the_same_yard_on_any_number_of_nodes() -> None:
-    assert short(1).digests == short(2).digests == short(3).digests
-
-
-@cache
 def one_crate() -> Course:
     return Course(2_000, 2, sets=ONE_CRATE)
 

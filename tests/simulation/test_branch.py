@@ -17,7 +17,6 @@ from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.simulation.run import Rehearsed, rehearse, with_nodes
-from foosim.simulation.stepped_world import SteppedWorld, deal_robots
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.supervisor import records
@@ -106,25 +105,6 @@ def assert_journals(run: Rehearsed, told: list[tuple[str, bytes]], tick: int) ->
     closed = [closing for _, closing in fold(deployment, [record for process, record in told if process == "vhub"])]
     assert [closing.frame.tick for closing in closed] == list(range(tick, TICKS))
     assert [closing.digest for closing in closed[1:]] == run.digests[:-1]
-
-
-def test_any_captured_frame_and_the_deliveries_behind_it_give_the_captured_digests(captured: Captured) -> None:
-    """With players, whose programs have a memory that no capture has, the captured deliveries are the inputs."""
-    ticks = list(open_capture(captured.played).captured_ticks())
-    sets = ["engine=pure", "players={}"]
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
-    for at in (0, 70, 240):
-        start = start_of(captured.played, f"{2 * at} ms")
-        world = SteppedWorld(deployment, first_frame(deployment, start), deal_robots(deployment, 2))
-        try:
-            assert world.frame.tick == at and world.frame.digest == ticks[at].digest
-            delivered = 0
-            for tick in ticks[at + 1 : at + 50]:
-                delivered += len(tick.delivered)
-                assert world.step(tick.delivered, tick.edits).digest == tick.digest, tick.tick
-            assert delivered > 50
-        finally:
-            world.close()
 
 
 def test_a_branch_with_players_goes_on_and_repeats(captured: Captured, tmp_path: Path) -> None:

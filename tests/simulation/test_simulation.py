@@ -17,8 +17,9 @@ from foosim.deployment.event_requests import BadEvent
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.players.learning.table_rewards import with_ball
 from foosim.protocol.messages import Received
+from foosim.simulation.agents import LEARNER
 from foosim.simulation.run import Rehearsed, rehearse
-from foosim.simulation.simulation import LEARNER, Simulation, read_for_stepping
+from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.world.actuators.rod_position import Command
 from foosim.world.assembly.initial_state import initial_frame
@@ -43,16 +44,6 @@ def digests_of(simulation: Simulation, ticks: int) -> list[bytes]:
         simulation.step()
         found.append(simulation.frame.digest)
     return found
-
-
-@pytest.mark.parametrize(
-    ("name", "ticks", "sets"),
-    [("table.yaml", TICKS, [WAIT]), ("warehouse.yaml", 12, []), ("yard.yaml", 12, []), ("workshop.yaml", 40, [])],
-)
-def test_over_the_emulated_network_it_has_the_digests_of_a_rehearsal(name: str, ticks: int, sets: list[str]) -> None:
-    """All players act by themselves, at periods and at arrivals; links lose and delay."""
-    with Simulation(DEPLOY / name, agents=[], network=True, sets=sets) as simulation:
-        assert digests_of(simulation, ticks) == run_of(DEPLOY / name, ticks, *sets).digests
 
 
 def test_a_partition_that_is_called_for_is_that_of_the_deployment() -> None:
