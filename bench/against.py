@@ -36,8 +36,12 @@ RUNS: Final = 5
 OF_TICKS: Final = """
 import gc, sys, time
 from pathlib import Path
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+try:
+    from foosim.simulation.run import rehearse
+    from foosim.simulation.settings import Settings
+except ModuleNotFoundError:  # an earlier commit
+    from foosim.simulation.run import rehearse
+    from foosim.simulation.settings import Settings
 file, ticks, seeds, runs, skipped = Path(sys.argv[1]), *map(int, sys.argv[2:])
 if file.exists():
     text = file.read_text()

@@ -25,8 +25,8 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.making import make_engine
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.drives import NO_DRIVES
 from foosim.world.layout import Layout, build_layout
@@ -36,7 +36,7 @@ TICKS: Final = 300
 BUILDS: Final = 20
 DEPLOY: Final = ROOT / "deploy"
 PSS: Final = """
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from pathlib import Path
 file = Path("deploy/yard.yaml")
 rehearse(file.read_text(), file.name, 3000, 1, folder=file.parent)

@@ -19,7 +19,7 @@ import numpy as np
 from bench.bare_tick import BareTable
 from foosim.players.learning.exercises import PLAYER
 from foosim.players.learning.table_rewards import Goals
-from foosim.rehearsal.env import TABLE, FoosimEnv, FoosimParallelEnv, parallel_env
+from foosim.simulation.env import TABLE, FoosimEnv, FoosimParallelEnv, parallel_env
 
 RUNS: Final = 8
 BARE_TICKS: Final = 5

@@ -20,8 +20,8 @@ from bench.bare_tick import bare_tick_us
 from bench.meter import Meter
 from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.actuators.v_w import Motion
 from foosim.world.frame import Frame
 

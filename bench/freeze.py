@@ -27,8 +27,8 @@ from mcap.reader import make_reader
 from bench.against import checked_out, run_in
 from bench.runs import BenchError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.settings import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.settings import Settings
 from foosim.world.frame import Frame
 
 WORLDS: Final = ("table", "table_sensors", "warehouse", "yard")
@@ -126,9 +126,7 @@ def unequal(here: Mapping[str, str], there: Mapping[str, str], without: Sequence
 
 def rehearsed_in(tree: Path, world: str, seed: int, seconds: float) -> World:
     """Rehearse a deployment of a tree with that tree's foosim, in a process of its own."""
-    script = tree / "bench" / "freeze.py"
-    script = script if script.exists() else Path(__file__)  # a commit from before this command
-    command = [sys.executable, "-c", SIDE, str(script.parents[1]), str(tree / "deploy" / f"{world}.yaml")]
+    command = [sys.executable, "-c", SIDE, str(tree), str(tree / "deploy" / f"{world}.yaml")]
     return cast("World", json.loads(run_in(tree, [*command, str(seed), str(seconds)]).splitlines()[-1]))
 
 

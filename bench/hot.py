@@ -27,9 +27,9 @@ from bench import verdict
 from bench.runs import ROOT, TABLE
 from foosim.capture.reader import open_capture
 from foosim.protocol.fingerprint import is_compiled
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.replay.what_if import what_if
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
+from foosim.simulation.what_if import what_if
 from foosim.world.frame import Frame
 from tests.swarm.campaign import fly
 

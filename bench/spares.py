@@ -17,8 +17,8 @@ from statistics import median
 import yaml
 
 from bench.fleet import APART_M, fleet_text
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
 
 ROBOTS = 200

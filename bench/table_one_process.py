@@ -18,8 +18,8 @@ from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.channels import Channel
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
 from foosim.world.frame import Frame

@@ -26,11 +26,11 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, check_rooms, make_plan
 from foosim.launcher.run_options import RunOptions
-from foosim.rehearsal.check.component_check import ComponentCheck, used_form
-from foosim.rehearsal.interrupts import Interrupts
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
+from foosim.simulation.attendant import Interrupts
+from foosim.simulation.check.component_check import ComponentCheck, used_form
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 

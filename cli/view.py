@@ -37,10 +37,10 @@ from foosim.console.recorded.second import (
 from foosim.console.server.serving import ServeOptions, serve_sources
 from foosim.console.shown.source import Source
 from foosim.deployment.loader import load_deployment
-from foosim.replay.verify import Between
 from foosim.runtime.command import PkiOption, new_app
 from foosim.runtime.process import die_with_parent
 from foosim.runtime.run_folder import find_run, open_run
+from foosim.simulation.verify import Between
 
 ADDRESSES: Final = ("tcp/", "tls/")
 """How the address of a replay begins."""

@@ -26,8 +26,8 @@ from bench.runs import ROOT, TABLE, name_of
 from foosim.cli.view import open_sources
 from foosim.client import control
 from foosim.common.errors import Refused
-from foosim.rehearsal.run import rehearse
 from foosim.runtime.run_folder import find_run
+from foosim.simulation.run import rehearse
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.served import served
 

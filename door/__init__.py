@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from foosim.client.replay_listener import hear_replay
     from foosim.deployment.schema import Deployment
     from foosim.protocol.replay_messages import PlayedPacket, PlayedPoses
-    from foosim.rehearsal.simulation import Simulation
+    from foosim.simulation.simulation import Simulation
     from foosim.world.forms.jobs import JobState
 
 __all__ = [
@@ -55,7 +55,7 @@ _MODULES = {
     "foosim.client.replay_listener": ("hear_replay",),
     "foosim.deployment.schema": ("Deployment",),
     "foosim.protocol.replay_messages": ("PlayedPacket", "PlayedPoses"),
-    "foosim.rehearsal.simulation": ("Simulation",),
+    "foosim.simulation.simulation": ("Simulation",),
     "foosim.world.forms.jobs": ("JobState",),
 }
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from foosim.capture import reader
 from foosim.capture.info import CaptureInfo, capture_info
-from foosim.replay.verify import Verified, verify_capture
+from foosim.simulation.verify import Verified, verify_capture
 
 
 class Capture(reader.CaptureData):

@@ -9,10 +9,10 @@ from foosim.capture.start_frame import read_branch
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_deployment_text
-from foosim.rehearsal.events import Events
-from foosim.rehearsal.run import Rehearsed
-from foosim.rehearsal.run import rehearse as rehearse_text
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.events import Events
+from foosim.simulation.run import Rehearsed
+from foosim.simulation.run import rehearse as rehearse_text
+from foosim.simulation.simulation import read_for_stepping
 
 
 def load_deployment(path: str | Path, sets: Sequence[str] = ()) -> Deployment:

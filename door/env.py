@@ -6,7 +6,7 @@ To import this registers its environments with Gymnasium: `gymnasium.make("foosi
 from foosim.client.vectors import Column
 from foosim.painting.overhead import OverheadPainter
 from foosim.players.learning.table_rewards import DefendShot, Goals
-from foosim.rehearsal.env import TABLE, FoosimEnv, FoosimParallelEnv, Nothing, Reward, parallel_env
+from foosim.simulation.env import TABLE, FoosimEnv, FoosimParallelEnv, Nothing, Reward, parallel_env
 
 __all__ = [
     "TABLE",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from mypy_extensions import mypyc_attr
@@ -20,10 +20,10 @@ from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.node.inputs import Inputs, PendingEpochMessages, check_near
-from foosim.node.tick import Stepper, Work
+from foosim.node.tick import Stepper, Term, Work
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
-from foosim.protocol.barrier import BadParts, Barrier, Slots, input_digest_of
+from foosim.protocol.barrier import BadParts, Barrier, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
@@ -45,7 +45,6 @@ from foosim.protocol.messages import (
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import RetryTimer
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import Entity, Layout
@@ -63,33 +62,6 @@ class NodeStatistics:
     repeated: int
     diverged: int
     held: int
-
-
-Groups: TypeAlias = tuple[tuple[Entity, ...], ...]
-"""Entities that a node solves together, or that are in the way of such."""
-
-
-@dataclass
-class _Term:
-    """The state that changes with an epoch: solvers and writers."""
-
-    stepper: Stepper
-    slots: Slots
-    assignment: Assignment
-    mine: tuple[Entity, ...]
-    _share: Share | None = None
-    _members: tuple[Groups, Groups] = ((), ())
-
-    def members(self, share: Share) -> tuple[Groups, Groups]:
-        """Return the entities of a share's islands, and those in the way of each; a share is often that of before."""
-        if share is not self._share:
-            entities = self.assignment.layout.entities
-            islands, movers = (
-                tuple([tuple([entities[index] for index in group]) for group in groups])
-                for groups in (share.islands, share.movers)
-            )
-            self._share, self._members = share, (islands, movers)
-        return self._members
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -115,7 +87,7 @@ class NodeCore:
         self.owners: dict[str, str] = {}
         self.ended: End | None = None
         self._stepper: Stepper | None = None
-        self._term: _Term | None = None
+        self._term: Term | None = None
         self._history: dict[int, Frame] = {}
         self._awaited_epoch: Epoch | None = None
         self._inputs = Inputs()
@@ -323,16 +295,9 @@ class NodeCore:
             return False
         raw, deliveries = delivered
         term = self._term
-        numbers, self._remembered = term.stepper.edited(frame, edits, self._remembered)
-        is_edited = edits or frame.tick in term.stepper.events.by_tick or term.stepper.world.has_rules
-        values = None if is_edited else frame.values
-        share: Share = term.assignment.shares(numbers, values)[self.name]
-        start = numbers.copy()
-        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers, frame.tick, start)
+        self.work, self._remembered = term.work(frame, edits, deliveries.packets, self._remembered)
         self._input_digest = input_digest_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
-        islands, movers = term.members(share)
-        self.work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
         return True
 
     def _collect(self, now_ns: int) -> bool:
@@ -541,13 +506,8 @@ class NodeCore:
         for channel, name, payload in self._pending.take():
             self.receive(channel, name, payload, now_ns)
 
-    def _make_term(self) -> _Term:
-        stepper = self.stepper
-        layout = stepper.layout
-        assert self.deployment is not None
-        assignment = Assignment(layout, reach_of(self.deployment, layout), self.roster, self.owners)
-        mine = tuple(robot for robot in layout.robots if self.owners.get(robot.name) == self.name)
-        return _Term(stepper, Slots(layout, self.owners), assignment, mine)
+    def _make_term(self) -> Term:
+        return Term(self.stepper, self.name, self.roster, self.owners)
 
     def _on_end(self, end: End, payload: bytes, now_ns: int) -> None:
         self.ended = end

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final, NamedTuple, cast
+from typing import Final, NamedTuple, TypeAlias, cast
 
 import msgspec
 import numpy as np
@@ -21,8 +21,10 @@ from foosim.node.due_sensors import DueSensors, Turn
 from foosim.node.edited_frame import edit, kept
 from foosim.node.physics.interface import AnyEngine, Engine, Island, IslandEngine, Weld
 from foosim.node.physics.touch_log import clear_touches
+from foosim.protocol.barrier import Slots
 from foosim.world.assembly.body_limits import BodyLimits
 from foosim.world.assembly.grippers import Gripper, grippers_of, release
+from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.assembly.rest import Rest, stop, wake_edited
 from foosim.world.assembly.standing import Standing
 from foosim.world.assembly.world import World
@@ -51,6 +53,10 @@ _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()
 
 
+Groups: TypeAlias = tuple[tuple[Entity, ...], ...]
+"""Entities that a node solves together, or that are in the way of such."""
+
+
 @dataclass
 class Work:
     """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`.
@@ -62,12 +68,12 @@ class Work:
 
     tick: int
     layout: Layout
-    islands: tuple[tuple[Entity, ...], ...]
+    islands: Groups
     solved: tuple[int, ...]
     numbers: list[float]
     outboxes: dict[int, bytes]
     start: list[float] = field(default_factory=list)
-    movers: tuple[tuple[Entity, ...], ...] = ()
+    movers: Groups = ()
     values: NDArray[np.float64] | None = None
 
 
@@ -101,10 +107,10 @@ class Stepper:
         """By the indices of their robots."""
         for one in grippers_of(deployment, layout):
             self._grippers.setdefault(one.robot, []).append(one)
-        self._divided: tuple[tuple[tuple[Entity, ...], ...], list[_RigidIsland]] = (), []
+        self._divided: tuple[Groups, list[_RigidIsland]] = (), []
         """The islands of the last tick, and what is solved of them."""
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
-        self._islands: tuple[tuple[Entity, ...], ...] | None = None
+        self._islands: Groups | None = None
         self._bodies: list[Entity] = []
         self._quarantined: list[int] = []
         """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
@@ -377,6 +383,48 @@ class Stepper:
     def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
         """Return in words why an entity's new state cannot be; empty where it can."""
         return _not_finite(entity, work.numbers) or self._problem(entity, before, work)
+
+
+class Term:
+    """What one node computes of each tick, with the roster and the owners of an epoch."""
+
+    def __init__(self, stepper: Stepper, node: str, roster: Sequence[str], owners: Mapping[str, str]) -> None:
+        """`roster` has the nodes in name order, `owners` the node of each robot."""
+        layout = stepper.layout
+        self.stepper = stepper
+        self.node = node
+        self.slots = Slots(layout, owners)
+        self.mine = tuple(robot for robot in layout.robots if owners.get(robot.name) == node)
+        self.assignment = Assignment(layout, reach_of(stepper.deployment, layout), roster, owners)
+        self._share: Share | None = None
+        self._members: tuple[Groups, Groups] = ((), ())
+
+    def work(
+        self, frame: Frame, edits: Sequence[Edit], packets: Sequence[Delivered], remembered: dict[int, float]
+    ) -> tuple[Work, dict[int, float]]:
+        """Edit the frame, deliver the packets, and return the node's share of the tick; and what the sensors that are
+        still present remember of the frame, by place."""
+        stepper = self.stepper
+        numbers, remembered = stepper.edited(frame, edits, remembered)
+        is_edited = edits or frame.tick in stepper.events.by_tick or stepper.world.has_rules
+        values = None if is_edited else frame.values
+        share = self.assignment.shares(numbers, values)[self.node]
+        start = numbers.copy()
+        outboxes = stepper.deliver(packets, share.solved, numbers, frame.tick, start)
+        islands, movers = self._groups(share)
+        work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
+        return work, remembered
+
+    def _groups(self, share: Share) -> tuple[Groups, Groups]:
+        """Return the entities of a share's islands, and those in the way of each; a share is often the last one."""
+        if share is not self._share:
+            entities = self.stepper.layout.entities
+            islands, movers = (
+                tuple([tuple([entities[index] for index in group]) for group in groups])
+                for groups in (share.islands, share.movers)
+            )
+            self._share, self._members = share, (islands, movers)
+        return self._members
 
 
 def _welds(grippers: Sequence[Gripper], bodies: Sequence[Entity], numbers: Sequence[float]) -> tuple[Weld, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from foosim.rehearsal.check.component_check import ComponentCheck
+from foosim.simulation.check.component_check import ComponentCheck
 from foosim.world.frame import Frame
 
 

@@ -28,7 +28,7 @@ def processor_s() -> float:
     return sum(os.times()[:4])
 
 
-TOGETHER: Final = ("tests/replay/", "tests/vhub/", "tests/wire/")
+TOGETHER: Final = ("tests/vhub/", "tests/wire/")
 """Folders whose files share runs, and tests/wire, whose runs would starve one another of cores."""
 SECONDS: Final = Path(__file__).parent / "seconds.json"
 """The wall time of the scopes that take the longest, as `make test ARGS=--record-seconds` measures it."""

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from foosim.analysis.diff import diff_captures
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from tests.world.test_guide import PACKAGE, USES, examples
 
 ROOT = Path(__file__).parent.parent
@@ -35,7 +35,7 @@ RUNS = {
 REHEARSALS = """
 import json, sys
 from pathlib import Path
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 for name, (file, ticks, sets) in json.loads(sys.argv[2]).items():
     path = Path(sys.argv[1], file)
     rehearse(path.read_text(), file, ticks, None, sets, capture=Path(f"{name}.mcap"), folder=path.parent)

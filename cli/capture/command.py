@@ -21,9 +21,9 @@ from foosim.cli.capture.report import report
 from foosim.cli.capture.what_if import what_if
 from foosim.common import limits
 from foosim.common.errors import BadValue, Failed
-from foosim.replay.verify import Verified, verify_capture
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.runtime.journal import JournalError
+from foosim.simulation.verify import Verified, verify_capture
 from foosim.vhub.recording.recovery import check_finished, recover_capture
 
 app = new_app()

@@ -16,12 +16,12 @@ from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue, UnknownName, read_at
 from foosim.common.limits import LAG_ANCHOR_NS
 from foosim.common.units import TIME, parse_ns, parse_pace
-from foosim.replay.address_file import newest_place
-from foosim.replay.main import PlayOptions, PlayResult, Stopper, play_capture
-from foosim.replay.requests import ARGUMENTS, SEEK, STEP
-from foosim.replay.terminal import Lines
 from foosim.runtime.command import DONE, FAILED, PKI_VARIABLE, JsonOption, PkiOption, print_json
 from foosim.runtime.process import Stop
+from foosim.simulation.play.address_file import newest_place
+from foosim.simulation.play.main import PlayOptions, PlayResult, Stopper, play_capture
+from foosim.simulation.play.requests import ARGUMENTS, SEEK, STEP
+from foosim.simulation.play.terminal import Lines
 
 
 def play(  # noqa: PLR0913, PLR0917  # a command's options

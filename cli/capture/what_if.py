@@ -17,10 +17,10 @@ from foosim.common.errors import BadValue
 from foosim.deployment.loader import Text, load_deployment, with_network
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_files, read_source_file
-from foosim.replay import what_if as calculation
-from foosim.replay.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf
-from foosim.replay.what_if_chart import draw
 from foosim.runtime.command import JsonOption, print_json
+from foosim.simulation import what_if as calculation
+from foosim.simulation.what_if import CHANGED_KEPT, LinkChange, PacketChange, WhatIf
+from foosim.simulation.what_if_chart import draw
 from foosim.vhub.network.custom_models import check_link_models, differing_models
 
 LINKS_SHOWN = 40

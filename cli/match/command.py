@@ -24,12 +24,10 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.rehearsal.match.chart import draw
-from foosim.rehearsal.match.entrants import entrant, seats
-from foosim.rehearsal.match.figures import figures
-from foosim.rehearsal.match.game import Fixture, Game, Link, Played, play, sets_of
-from foosim.rehearsal.workers import in_processes
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, JsonOption, new_app, print_json
+from foosim.simulation.match.figures import draw, figures
+from foosim.simulation.match.game import Fixture, Game, Link, Played, entrant, play, seats, sets_of
+from foosim.simulation.workers import in_processes
 
 TABLE: Final = Path("deploy/table.yaml")
 SIDES: Final = {"a": (0,), "b": (1,), "both": (0, 1)}

@@ -10,9 +10,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from foosim.rehearsal.match.entrants import Entrant
-from foosim.rehearsal.match.figures import Figures, Interval
-from foosim.rehearsal.match.game import Fixture, Game, Link, Played
+from foosim.simulation.match.figures import Figures, Interval
+from foosim.simulation.match.game import Entrant, Fixture, Game, Link, Played
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.cli.match import command as match
-from foosim.rehearsal.match.game import Fixture, Game, Played
+from foosim.simulation.match.game import Fixture, Game, Played
 from tests.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

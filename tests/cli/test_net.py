@@ -19,8 +19,8 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.overrides import nested
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.stages import STAGES
 from tests.conftest import Command, Typed
 

@@ -12,8 +12,8 @@ import pytest
 from foosim.client.client import Client
 from foosim.client.errors import JobCancelled, JobFailed, JobPreempted, JobUnfinished, RunEnded
 from foosim.common.units import Pace
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.forms.jobs import JobState
 from foosim.world.frame import Frame
 from tests.client.scripted import Program, refused

@@ -22,7 +22,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.actuators.rod_position import Command
 from foosim.world.parameters.table import LINE_NAMES
 from foosim.world.sensors.ball import BallPosition

@@ -14,7 +14,7 @@ from foosim.client.vectors import CommandVector, ReadingVector, chosen
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.protocol.messages import Received
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.simulation import read_for_stepping
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from foosim.rehearsal.run import rehearse
-from tests.replay.conftest import SETS, TABLE, TICKS, bad_files, disturb, run
+from foosim.simulation.run import rehearse
+from tests.simulation.conftest import SETS, TABLE, TICKS, bad_files, disturb, run
 
 __all__ = ["bad_files", "run", "split_run"]
 

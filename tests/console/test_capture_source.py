@@ -16,9 +16,9 @@ from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import Curve, Wanted
 from foosim.deployment.loader import apply_sets
-from foosim.replay.verify import Between
+from foosim.simulation.verify import Between
 from tests.console.memory import running
-from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, added_tick, damaged, replay
+from tests.simulation.conftest import SETS, TABLE, TICK_NS, TICKS, added_tick, damaged, replay
 
 
 def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_stepped(run: Path) -> None:

@@ -13,9 +13,9 @@ from foosim.client.client import Client
 from foosim.common.units import Pace
 from foosim.console.live.desk import Desk
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.replay.verify import verify_capture
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
+from foosim.simulation.verify import verify_capture
 from foosim.world.forms.jobs import JobState
 from foosim.world.layout import build_layout
 from tests.client.scripted import Program, refused

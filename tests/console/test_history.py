@@ -27,7 +27,7 @@ from foosim.world.frame import Frame
 from foosim.world.kits.table import BALL
 from foosim.world.layout import WORLD
 from foosim.world.rules.football import kickoff_ticks
-from tests.replay.conftest import TABLE, TICK_NS, TICKS, added_tick
+from tests.simulation.conftest import TABLE, TICK_NS, TICKS, added_tick
 
 SECOND_NS = 1_000_000_000
 

@@ -22,7 +22,7 @@ from foosim.console.recorded.recording import Recording
 from foosim.console.recorded.second import open_follower
 from foosim.console.shown.source import Moment, Wanted
 from tests.console.memory import MemorySource, running, table, table_with_spares
-from tests.replay.conftest import TICKS, replay
+from tests.simulation.conftest import TICKS, replay
 
 LOOKED_AT = Wanted(1, 50.0)
 

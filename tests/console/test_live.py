@@ -22,7 +22,7 @@ from foosim.runtime.run_folder import NoRun, create_run
 from foosim.runtime.transport.inbox import Inbox
 from tests.console.memory import Heard
 from tests.console.test_following import described, frame_of, status
-from tests.replay.conftest import TABLE
+from tests.simulation.conftest import TABLE
 
 
 def presences(heard: Heard) -> list[tuple[str, str]]:

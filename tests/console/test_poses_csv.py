@@ -10,7 +10,7 @@ import pytest
 
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
 from foosim.console.recorded.poses_source import load_tracks
-from tests.replay.conftest import replay
+from tests.simulation.conftest import replay
 
 
 def read(text: str) -> dict[str, tuple[list[int], list[list[float]]]]:

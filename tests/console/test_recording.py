@@ -15,9 +15,9 @@ from foosim.capture.reader import open_capture
 from foosim.capture.rows import FRAME, ROW_TYPES
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.recorded.recording import TOPICS, Recording
-from foosim.replay.verify import Between
+from foosim.simulation.verify import Between
 from foosim.world.frame import Frame
-from tests.replay.conftest import TICKS, added_tick, damaged, messages_of, rewritten
+from tests.simulation.conftest import TICKS, added_tick, damaged, messages_of, rewritten
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from tests.frames import broken_laws
 
 PATH: Final = Path(__file__).parents[2] / "deploy" / "table_sensors.yaml"

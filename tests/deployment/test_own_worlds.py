@@ -17,8 +17,8 @@ from foosim.common.errors import DeploymentError
 from foosim.common.names import NAME_RULE
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout

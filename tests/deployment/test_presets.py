@@ -14,7 +14,7 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema_text
 from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.parameters.table import Table, places_between_lines, table_of
 from foosim.world.parameters.table_presets import PRESETS
 

@@ -15,7 +15,7 @@ import pytest
 
 from foosim.client.player import Sample
 from foosim.players.learning.exercises import TABLE
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.simulation import read_for_stepping
 from foosim.world.sensors.ball import BallPosition
 
 EXAMPLES: Final = Path(__file__).parents[2] / "examples"

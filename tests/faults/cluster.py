@@ -25,9 +25,9 @@ from foosim.common.units import parse_pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.launcher.processes import Child, Launcher
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.rehearsal.run import rehearse
-from foosim.replay.verify import verify_capture
 from foosim.runtime.run_folder import RunFolder, open_run, run_exists
+from foosim.simulation.run import rehearse
+from foosim.simulation.verify import verify_capture
 from tests.wire.proxy import Proxy, Weather
 
 TABLE: Final = Path(__file__).resolve().parents[2] / "deploy" / "table.yaml"

@@ -17,9 +17,9 @@ import pytest
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.check.component_check import ComponentCheck
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.check.component_check import ComponentCheck
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import FORMS, own_module

@@ -30,13 +30,13 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import End
 from foosim.protocol.run_status import UNFINISHED
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.roles.shell import Process
 from foosim.runtime.run_folder import RunFolder, create_run
 from foosim.runtime.transport.session import Session
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.main import SupervisorShell
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.records import Record, fold

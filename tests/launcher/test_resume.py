@@ -18,8 +18,6 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.resume import check_journals, plan_again
 from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run

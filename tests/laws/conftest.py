@@ -17,9 +17,9 @@ from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import encode
-from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.frame import Frame
 

@@ -22,9 +22,9 @@ from foosim.client.player import Packet, Player, Samples, Turn
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.journals import ENDINGS, Ending
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.journals import ENDINGS, Ending
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.world.frame import Frame

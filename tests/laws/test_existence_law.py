@@ -21,15 +21,15 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Deliveries, Go, Received, Sent
-from foosim.rehearsal.journals import ENDINGS, Ending
-from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.settings import Process
-from foosim.rehearsal.simulation import Resident, Simulation
-from foosim.rehearsal.stepping.carriers import Bypass, Carrier
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
-from foosim.replay.verify import verify_capture
-from foosim.replay.what_if import what_if
+from foosim.simulation.agents import Resident
+from foosim.simulation.carriers import Bypass, Carrier
+from foosim.simulation.journals import ENDINGS, Ending
+from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.settings import Process, Traced
+from foosim.simulation.simulation import Simulation
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
+from foosim.simulation.what_if import what_if
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.stages.receiver import RECEIVER_DOWN

@@ -19,7 +19,7 @@ from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Part
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.settings import Traced
 from foosim.world.edits import Add, Push
 from foosim.world.robot_packets import Outbox
 

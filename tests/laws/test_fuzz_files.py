@@ -24,10 +24,10 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
 from foosim.runtime.journal import Journal, read_records
 from foosim.runtime.run_folder import RunFolder, RunInfo
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.vhub.state.records import fold
 from foosim.world.matter.mesh import AssetError
 from foosim.world.mesh_files import read_mesh

@@ -18,12 +18,12 @@ from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Epoch, Go
-from foosim.rehearsal import journals
-from foosim.rehearsal.journals import ENDINGS, Ending
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
 from foosim.runtime.roles.bus import Weather
+from foosim.simulation import journals
+from foosim.simulation.journals import ENDINGS, Ending
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing

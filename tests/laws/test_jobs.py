@@ -16,9 +16,9 @@ from foosim.capture.reader import open_capture
 from foosim.client.jobs import Job, Jobs
 from foosim.client.player import Commands, Player, Samples
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.replay.verify import verify_capture
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
+from foosim.simulation.verify import verify_capture
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
 from foosim.world.frame import Frame

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.messages import Sent
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.state.hub_state import HubState

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from foosim.capture.rows import EPOCHS, RECOVERIES
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.journals import ENDINGS, Ending
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify_capture
+from foosim.simulation.journals import ENDINGS, Ending
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt

@@ -55,8 +55,8 @@ from foosim.protocol.messages import (
     Want,
     Watched,
 )
-from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import with_nodes
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.edits import Edit, Push
 from foosim.world.robot_packets import Delivered, RobotPacket

@@ -19,10 +19,10 @@ from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.verify import verify_capture
-from foosim.replay.what_if import what_if
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
+from foosim.simulation.what_if import what_if
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
 from tests.turns import BY_PERIOD

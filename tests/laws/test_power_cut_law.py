@@ -13,11 +13,10 @@ import pytest
 from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.hub_messages import ResumeGrant
-from foosim.rehearsal.machine_loss import lose_hub, lose_supervisor
-from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.settings import Settings
-from foosim.rehearsal.system import System
 from foosim.runtime.roles.bus import CALM, Weather
+from foosim.simulation.run import with_nodes
+from foosim.simulation.settings import Settings
+from foosim.simulation.system import System
 from foosim.supervisor import core as supervisor_core
 from foosim.supervisor import failover
 from foosim.supervisor.records import fold
@@ -25,6 +24,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Past
+from tests.machine_loss import lose_hub, lose_supervisor
 from tests.swarm.faults import ask
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -15,8 +15,8 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.node.edited_frame import edit
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Remove
 from foosim.world.forms.forms import NO_ENTITY

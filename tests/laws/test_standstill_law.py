@@ -24,14 +24,14 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.node.main import NodeShell
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
 from foosim.runtime.journal import Journal
 from foosim.runtime.roles import loop as loops
 from foosim.runtime.roles.shell import Process, Runnable
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.supervisor_timeout import SupervisorTimeout
 from foosim.runtime.transport.session import Session
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.main import SupervisorShell
 from foosim.vhub.core import HubCore

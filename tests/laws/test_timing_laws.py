@@ -19,12 +19,12 @@ from foosim.players.football import Team
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Deliveries, Go
-from foosim.rehearsal import journals
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
-from foosim.replay.verify import verify_capture
-from foosim.replay.what_if import what_if
+from foosim.simulation import journals
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings, System
+from foosim.simulation.verify import verify_capture
+from foosim.simulation.what_if import what_if
 from foosim.world.edits import Disrupt
 from tests.laws.test_hub_recovery_law import SETS, TABLE, Fault, Seen, assert_the_same, fly, kill_hub
 from tests.swarm.campaign import fly as fly_seed

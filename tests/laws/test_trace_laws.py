@@ -15,9 +15,9 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Epoch, Go, Part
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.run import rehearse
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import CommitRecord
 from foosim.supervisor.records import Record as SupervisorRecord

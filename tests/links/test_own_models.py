@@ -20,9 +20,9 @@ from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.settings_text import impairments_text, radio_text
 from foosim.protocol.messages import Sent
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.what_if import what_if
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.what_if import what_if
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.custom_models import ModelError, Passage, check_link_models, differing_models, model_versions
 from foosim.vhub.recording.rows_of_closing import packet_row
@@ -34,7 +34,7 @@ from tests.links.offered import MS, TABLE, Hub, deployment_of, every, fates, rul
 from tests.links.packages import ALL, install
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z
-from tests.replay.conftest import replay
+from tests.simulation.conftest import replay
 
 LATE_NS: Final = 3 * MS
 FOG: Final = f"model: {{name: fog, parameters: {{lost_per_m: 0.05, every: 4, late_ns: {LATE_NS}}}}}"

@@ -17,7 +17,7 @@ from foosim.capture.rows import PACKETS, PacketRow
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_airtime_ns

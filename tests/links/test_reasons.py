@@ -13,8 +13,8 @@ from foosim.analysis.explain import PacketName, Step, explain_packet
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.vhub.recording.model_hash import model_hash
 from foosim.vhub.recording.rows_of_closing import DECIDING
 from foosim.vhub.stages import STAGES as PIPELINE

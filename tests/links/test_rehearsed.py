@@ -11,8 +11,8 @@ import msgspec
 import pytest
 
 from foosim.common.units import Pace
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.state.records import Closing
 from tests.links.offered import TABLE

@@ -16,9 +16,9 @@ from foosim.node.physics.pure_engine import PureEngine
 from foosim.protocol.channels import PART
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings, System
 from foosim.world.actuators.rod_position import PositionActuator
 from foosim.world.layout import Entity, Layout, build_layout
 

@@ -16,9 +16,9 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
-from foosim.rehearsal.check.component_check import ComponentCheck
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.check.component_check import ComponentCheck
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame

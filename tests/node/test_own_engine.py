@@ -16,7 +16,7 @@ from foosim.cli.components import as_json, chosen, lines
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.assembly import world
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms import registry

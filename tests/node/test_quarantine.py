@@ -20,10 +20,11 @@ from foosim.launcher.outcome import Outcome
 from foosim.node.physics.interface import Island
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import Rehearsed, rehearse, with_nodes
+from foosim.simulation.stepped_world import SteppedWorld, deal_robots
+from foosim.simulation.system import Settings, System
 from foosim.vhub.state.records import Closing
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
@@ -223,11 +224,11 @@ def test_quarantine_is_part_of_the_step() -> None:
     assert all(rod[i] != rod[i - 1] for i in range(1, TICKS) if marks[i] and marks[i - 1] and i > 60), "rods went on"
     many, _, _ = spoiled_run(3)
     assert many.digests == alone.digests
-    text = with_nodes(TEXT, TABLE.name, 2, SETS)
-    replica = Replica(text, TABLE.name, load_deployment(text, TABLE.name), spoiling)
+    deployment = load_deployment(with_nodes(TEXT, TABLE.name, 2, SETS), TABLE.name)
+    world = SteppedWorld(deployment, initial_frame(deployment), deal_robots(deployment, 2), spoiling)
     for closing in closings[1:]:
-        assert replica.step(closing.edits, closing.delivered).digest == closing.digest, closing.frame.tick
-    replica.close()
+        assert world.step(closing.delivered, closing.edits).digest == closing.digest, closing.frame.tick
+    world.close()
 
 
 # --- bodies of any kind ----------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from foosim.common.errors import BadValue
 from foosim.painting.outlines import covered_by_corners, hull_of
 from foosim.painting.overhead import BEYOND, OverheadPainter, Picture
 from foosim.painting.shapes import Shapes, View, covered_by_surface
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.simulation import read_for_stepping
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame

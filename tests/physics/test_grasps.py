@@ -13,7 +13,7 @@ from foosim.client.jobs import Jobs
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.simulation import Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.world.actuators.gripper import GraspFailure, Grip
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.components.grasping import grasp_of

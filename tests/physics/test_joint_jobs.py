@@ -20,7 +20,7 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.simulation import Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.world.actuators.joints.joint_trajectory import JointTrajectory, TrajectoryFailure
 from foosim.world.components.fitted import actuators_of
 from foosim.world.forms.jobs import JobState

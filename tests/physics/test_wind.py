@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.simulation import Simulation
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.simulation import Simulation
+from foosim.simulation.system import Settings
 from foosim.world.frame import Frame
 from tests.kinematic_yard import TICK_S, yard_text
 

@@ -15,7 +15,7 @@ from foosim.players.football import Keeper, Passive, Striker, Team
 from foosim.players.table.rod import TURN, Rod, Sight, View
 from foosim.players.table.senses import Senses, rods_of
 from foosim.players.table.shot import FULL, LIFTED, Shots
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.actuators.rod_position import Command
 from foosim.world.modifiers.delay import delay_ns
 from foosim.world.parameters.table import LINE_NAMES, table_of

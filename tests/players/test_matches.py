@@ -1,6 +1,6 @@
 """Matches of the shipped players on the table as deployed: who wins, who is equal, whether the ball stays on it.
 
-`make play` plays them; `make test` has seconds of play in tests/rehearsal/test_a_minute_of_play.py.
+`make play` plays them; `make test` has seconds of play in tests/simulation/test_a_minute_of_play.py.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.players import OF_THE_TABLE
-from foosim.rehearsal.match.figures import chance
-from foosim.rehearsal.match.game import Fixture, Game, Played, play
+from foosim.simulation.match.figures import chance
+from foosim.simulation.match.game import Fixture, Game, Played, play
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

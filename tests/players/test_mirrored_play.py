@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from foosim.players.football import Playing
-from foosim.rehearsal.simulation import Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.world.frame import Frame
 from foosim.world.parameters.table import LINE_NAMES
 from tests.placing import place_ball

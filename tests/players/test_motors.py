@@ -11,7 +11,7 @@ import pytest
 from foosim.deployment.loader import load_deployment
 from foosim.players.table.motors import Motion, Motors
 from foosim.players.table.senses import rods_of
-from foosim.rehearsal.simulation import Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.world.actuators.rod_position import Command
 from foosim.world.components.entities import mounting_of
 from foosim.world.layout import build_layout

@@ -10,7 +10,7 @@ import pytest
 from foosim.client.loading import load_player
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.simulation import read_for_stepping
 from tests.forms.worlds import DEPLOY
 
 FILES: Final = ("table.yaml", "warehouse.yaml", "yard.yaml", "workshop.yaml")

@@ -13,8 +13,8 @@ from foosim.deployment.loader import load_deployment
 from foosim.players.beacons import Beacon, decode_beacon, encode_beacon
 from foosim.players.roadmap import roadmap_of
 from foosim.players.warehouse_rover import Patrol
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
 from foosim.world.models.station import StationRobot
 from foosim.world.parameters.hall import hall_of

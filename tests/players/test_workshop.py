@@ -10,10 +10,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.rehearsal.check.component_check import _shuffle as shuffle
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.simulation import Simulation
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.check.component_check import _shuffle as shuffle
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.simulation import Simulation
+from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
 from tests.forms.worlds import DEPLOY
 from tests.frames import Frames

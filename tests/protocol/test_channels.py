@@ -22,7 +22,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 
 ROOT: Final = Path(__file__).parents[2]
-PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = ("client", "console", "node", "protocol", "simulation", "supervisor", "vhub")
 READS: Final[Mapping[str, Sequence[tuple[Channel, bool]]]] = {
     "node": channels.NODE_READS,
     "vhub": channels.VHUB_READS,

@@ -11,8 +11,8 @@ import pytest
 
 from foosim.common.units import Pace
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.world.frame import Frame
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from foosim.common.units import Pace
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.load_balancing import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -18,8 +18,8 @@ from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import CAPTURE, DONE_OF, SAMPLES_OF, Heartbeat, Request, Want
-from foosim.rehearsal.run import rehearse, with_nodes
-from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
+from foosim.simulation.run import rehearse, with_nodes
+from foosim.simulation.system import IDLE_NS_MAX, OPERATOR, Settings, System
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.state import RunState

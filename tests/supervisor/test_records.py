@@ -10,7 +10,7 @@ from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings

@@ -19,9 +19,9 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Epoch, Order, Request
-from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.system import OPERATOR, Settings, System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.run import with_nodes
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import OPERATOR, Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame

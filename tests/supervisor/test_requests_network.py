@@ -13,8 +13,8 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.deployment.network.settings_text import event_words
 from foosim.protocol.messages import Answer
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
 from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -23,7 +23,7 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Part, Ready, Request
-from foosim.rehearsal.run import with_nodes
+from foosim.simulation.run import with_nodes
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 

@@ -13,8 +13,8 @@ from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import Epoch
-from foosim.rehearsal.run import Rehearsed, with_nodes
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import Rehearsed, with_nodes
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings

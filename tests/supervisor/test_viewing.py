@@ -15,7 +15,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Commit, Inquiry, Request
-from foosim.rehearsal.system import OPERATOR, Settings, System
+from foosim.simulation.system import OPERATOR, Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings

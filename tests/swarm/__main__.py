@@ -25,8 +25,8 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.rehearsal.onlooker import LINE_S
-from foosim.rehearsal.workers import in_processes
+from foosim.simulation.attendant import LINE_S
+from foosim.simulation.workers import in_processes
 from tests.swarm.campaign import Files, Flown, fly
 from tests.swarm.faults import TICKS
 

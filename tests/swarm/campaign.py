@@ -20,15 +20,14 @@ from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
-from foosim.rehearsal.clock import Clock
-from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.run import with_nodes
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
 from foosim.runtime.roles.bus import CALM, Weather
+from foosim.simulation.run import with_nodes
+from foosim.simulation.settings import Clock, Traced
+from foosim.simulation.stepped_world import SteppedWorld
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.actuators.gripper import GripperSettings
+from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.misfits import rigid_bodies
 from foosim.world.frame import Frame
 from tests.swarm.faults import (
@@ -52,7 +51,7 @@ from tests.swarm.faults import (
 )
 from tests.swarm.invariants import Laws
 from tests.swarm.memory_bounds import too_large
-from tests.swarm.packet_invariants import hold
+from tests.swarm.packet_invariants import Broken, hold
 from tests.swarm.strikes import lose_owner, set_field, strike
 
 FAULTS: Final[tuple[int, ...]] = (8, 20)
@@ -268,8 +267,9 @@ class Flight:
         self._healed_ns = -1
         self._last_commit_ns = 0
         contents = dict(files)
-        self._replica = Replica(alone, name, load_deployment(alone, name).with_assets(contents))
-        self.laws = Laws(self._replica, load_deployment(text, name).with_assets(contents))
+        one = load_deployment(alone, name).with_assets(contents)
+        self._world = SteppedWorld(one, initial_frame(one))
+        self.laws = Laws(self._world, load_deployment(text, name).with_assets(contents))
         chosen = replace(
             settings,
             node=WatchedNode if settings.node is NodeCore else settings.node,
@@ -304,7 +304,7 @@ class Flight:
     def close(self) -> None:
         """Free the engines."""
         self.system.close()
-        self._replica.close()
+        self._world.close()
 
     def _see(self, traced: Traced) -> None:
         self.seen += 1

@@ -15,8 +15,8 @@ from typing import Final, TypeVar
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
-from foosim.rehearsal.journals import ENDINGS
-from foosim.rehearsal.system import System
+from foosim.simulation.journals import ENDINGS
+from foosim.simulation.system import System
 
 TICKS: Final = 208
 HEALED_TICK: Final = 180

@@ -1,8 +1,8 @@
 """Checks the laws on every journal record and message of a rehearsal, and raises at the first breach.
 
 The checker keeps its own history, from records and messages alone, and checks each new one against it: the permitted
-writer, finality, and journal before publication. A replica computes each committed tick again. At the end the journals
-are folded and compared with the state of their writers.
+writer, finality, and journal before publication. A stepped world computes each committed tick again. At the end the
+journals are folded and compared with the state of their writers.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from foosim.protocol import channels
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.system import System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.settings import Traced
+from foosim.simulation.stepped_world import SteppedWorld
+from foosim.simulation.system import System
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
@@ -36,15 +36,15 @@ from tests.swarm.world_bounds import strays
 class Laws:
     """Checks a run; raises Broken at the first breach. `ticks` counts those that it saw complete."""
 
-    def __init__(self, replica: Replica, deployment: Deployment) -> None:
+    def __init__(self, world: SteppedWorld, deployment: Deployment) -> None:
         self.ticks = 0
         self.packets = PacketLaws(deployment)
         self.epoch = 0
         self.flipped: Collection[str] = ()
         """Nodes whose memory a fault has changed."""
-        self._replica = replica
+        self._world = world
         self._deployment = deployment
-        self._living = LivingLaws(deployment, replica.frame.layout)
+        self._living = LivingLaws(deployment, world.frame.layout)
         self._chains = {0: CHAIN_START}
         """By tick, over all frames up to it."""
         self._digests = {0: initial_frame(deployment).digest}
@@ -239,13 +239,13 @@ class Laws:
         told = self._told.get(frame.tick, [])
         self._captured_told.add(frame.tick)
         hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, not with {told}")
-        if frame.tick != self._replica.frame.tick + 1:
+        if frame.tick != self._world.frame.tick + 1:
             return  # frame 0, or the last one of a run that ended before all was closed
-        before = self._replica.frame
-        again = self._replica.step(closing.edits, closing.delivered)
+        before = self._world.frame
+        again = self._world.step(closing.delivered, closing.edits)
         hold(again.digest == closing.digest, f"frame {frame.tick} is not the one that its inputs give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
-        self.packets.senses(again, self._replica)
+        self.packets.senses(again, self._world)
         self._living.check(closing, before)
         stray = strays(self._deployment, again)
         hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")

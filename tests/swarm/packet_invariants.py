@@ -9,9 +9,8 @@ from foosim.client.core import ClientCore
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Done, Down, Go, Samples, Sent
-from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.resimulation import Replica
-from foosim.rehearsal.system import System
+from foosim.simulation.stepped_world import SteppedWorld
+from foosim.simulation.system import System
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, TickRecord, world_packets
@@ -25,6 +24,10 @@ LOST_TICKS_MAX: Final = 1000
 """Ticks for which the inputs of fates are kept: more than a machine loss undoes."""
 OPEN: Final[tuple[str, ...]] = ("", IN_FLIGHT)
 """The cause of a packet that was not dropped."""
+
+
+class Broken(AssertionError):
+    """A law does not hold."""
 
 
 def hold(law: bool, what: str) -> None:
@@ -148,11 +151,11 @@ class PacketLaws:
         self._reached.pop(tick - LOST_TICKS_MAX, None)
         self._received.pop(tick - LOST_TICKS_MAX, None)
 
-    def senses(self, frame: Frame, replica: Replica) -> None:
+    def senses(self, frame: Frame, world: SteppedWorld) -> None:
         """What robots sent at a frame is a function of it, whoever owned them."""
         samples = self._samples.pop(frame.tick, [])
         taken = world_packets(samples, frame.digest, frame, self._sampling)
-        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else replica.sense()
+        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else world.sense()
         hold(taken is None or taken == sensed, f"robots' packets at tick {frame.tick} are not those of their sensors")
 
     # --- the clients' side -------------------------------------------------------------------------------------------

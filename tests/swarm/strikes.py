@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
 
-from foosim.rehearsal.system import System
+from foosim.simulation.system import System
 from foosim.world.forms.jobs import RUNNING
 from foosim.world.setting.settable import AT, settable
 from tests.swarm.faults import Dice, Fault, ask, end_node, random_tick, revive

@@ -36,7 +36,7 @@ from foosim.protocol.messages import (
     Tempo,
     Up,
 )
-from foosim.rehearsal.journals import HubJournal
+from foosim.simulation.journals import HubJournal
 from foosim.vhub.core import HubCore
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.state.capture_queue import RecordClosing

@@ -17,9 +17,9 @@ from foosim.console.report.collect import gather
 from foosim.console.report.page import page
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Farewell
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.replay.what_if import what_if
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings, System
+from foosim.simulation.what_if import what_if
 from foosim.vhub.network.ages import Ages, quantile
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import HubRecord, TickRecord

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 
 FORMS: Final = """
 import sys

@@ -17,7 +17,7 @@ from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
-from foosim.rehearsal.simulation import read_for_stepping
+from foosim.simulation.simulation import read_for_stepping
 from foosim.vhub.links.offered_load import warnings_of
 from foosim.vhub.links.summary import (
     SharedSettings,

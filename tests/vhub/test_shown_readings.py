@@ -17,7 +17,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from foosim.analysis.export import export_capture
 from foosim.capture.cut import cut_capture
 from foosim.capture.reader import CaptureData, open_capture
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of

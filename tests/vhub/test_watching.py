@@ -24,8 +24,8 @@ from foosim.console.shown.source import Link
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Heartbeat, Watched
-from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.trace import Traced
+from foosim.simulation.settings import Traced
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub import status
 from foosim.vhub.network.packet import DROPPED, Flight

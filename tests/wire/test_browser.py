@@ -14,8 +14,8 @@ from urllib.parse import urlsplit
 import pytest
 
 from foosim.cli.view import open_sources
-from foosim.rehearsal.run import rehearse
-from tests.replay.conftest import SPARE, TICKS, capture_to
+from foosim.simulation.run import rehearse
+from tests.simulation.conftest import SPARE, TICKS, capture_to
 from tests.wire.chromium import Page, chromium, find_chromium
 from tests.wire.conftest import in_process
 from tests.wire.served import served

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 from foosim.client.control import Control
 from foosim.common.units import parse_pace
 from foosim.deployment.loader import apply_sets
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from tests.deploy.processes import Declared, from_compose, from_kubernetes, from_units
 from tests.wire.conftest import LONG
 from tests.wire.test_run import free_port

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from foosim.capture.reader import open_capture
 from foosim.client.client import connect
 from foosim.client.control import Control
-from foosim.replay.verify import verify_capture
+from foosim.simulation.verify import verify_capture
 from tests.kinematic_yard import yard_text
 from tests.wire.conftest import LIMIT_S, LONG, in_process
 from tests.wire.test_run import last_json

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from foosim.capture.reader import open_capture
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from tests.apart import apart
 from tests.wire import namespaces
 from tests.wire.conftest import LONG, command_path

@@ -10,10 +10,10 @@ import pytest
 from foosim.capture.reader import open_capture
 from foosim.common.units import parse_pace
 from foosim.launcher import pki as certificates
-from foosim.rehearsal.run import rehearse
-from foosim.replay.verify import verify_capture
+from foosim.simulation.run import rehearse
+from foosim.simulation.verify import verify_capture
 from tests.apart import apart
-from tests.replay.test_verify import messages_of
+from tests.simulation.test_verify import messages_of
 from tests.wire.conftest import ONE, in_process
 from tests.wire.test_run import last_json
 

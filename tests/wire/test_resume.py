@@ -19,10 +19,10 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.resume import plan_again
 from foosim.launcher.run_options import RunOptions
 from foosim.protocol import channels
-from foosim.rehearsal.run import rehearse
-from foosim.replay.verify import verify_capture
 from foosim.runtime.journal import journal_files, read_records
 from foosim.runtime.run_folder import RunFolder, open_run
+from foosim.simulation.run import rehearse
+from foosim.simulation.verify import verify_capture
 from tests.wire.conftest import LONG, SLOW, in_process
 from tests.wire.test_run import NO_HUB, last_json
 

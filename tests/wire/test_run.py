@@ -23,9 +23,9 @@ from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
-from foosim.replay.verify import verify_capture
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.inbox import Inbox
+from foosim.simulation.verify import verify_capture
 from foosim.world.frame import frame_from_bytes
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import LINE_NAMES, TEAMS

@@ -9,8 +9,8 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.common.units import parse_pace
-from foosim.rehearsal.run import rehearse
-from tests.replay.test_verify import messages_of
+from foosim.simulation.run import rehearse
+from tests.simulation.test_verify import messages_of
 from tests.wire.test_run import assert_finished, last_json
 
 if TYPE_CHECKING:

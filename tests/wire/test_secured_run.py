@@ -11,9 +11,9 @@ from foosim.client import control
 from foosim.client.client import connect
 from foosim.client.control import Control
 from foosim.launcher import pki
-from foosim.rehearsal.run import rehearse
 from foosim.runtime.closed import CLOSED
 from foosim.runtime.transport.certificates import operator_credentials
+from foosim.simulation.run import rehearse
 from tests.wire.conftest import LIMIT_S, House, in_process
 from tests.wire.test_run import last_json
 

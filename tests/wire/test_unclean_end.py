@@ -11,9 +11,9 @@ import pytest
 from foosim.capture.info import capture_info
 from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
-from foosim.rehearsal.run import rehearse
-from foosim.replay.verify import verify_capture
 from foosim.runtime import disk
+from foosim.simulation.run import rehearse
+from foosim.simulation.verify import verify_capture
 from foosim.vhub.recording.recovery import UNCLEAN
 from tests.wire.conftest import ONE, House
 from tests.wire.test_run import last_json

@@ -17,8 +17,8 @@ import pytest
 from yaml import safe_load
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.assembly.world import WorldMarks
 from tests.conftest import Command, Typed

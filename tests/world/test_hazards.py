@@ -14,9 +14,9 @@ import pytest
 
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.run import rehearse
-from foosim.rehearsal.simulation import Simulation
-from foosim.rehearsal.system import Settings, System
+from foosim.simulation.run import rehearse
+from foosim.simulation.simulation import Simulation
+from foosim.simulation.system import Settings, System
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.surroundings import Surroundings

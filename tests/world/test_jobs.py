@@ -13,7 +13,7 @@ from msgspec import Meta, Struct
 from foosim.client.player import Packet, Player
 from foosim.common.errors import DeploymentError, Refused
 from foosim.deployment.loader import load_deployment
-from foosim.rehearsal.simulation import Simulation
+from foosim.simulation.simulation import Simulation
 from foosim.world.actuators.go_to import Place
 from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.forms import registry

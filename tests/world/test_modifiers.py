@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing

@@ -25,8 +25,8 @@ from foosim.common.errors import BadValue, DeploymentError, Malformed, Refused, 
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
-from foosim.rehearsal.run import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings
+from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.system import Settings
 from foosim.world.forms import registry
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of

@@ -11,7 +11,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import read_deployment
-from foosim.rehearsal.run import rehearse
+from foosim.simulation.run import rehearse
 from tests.forms.worlds import HALL, ROVERS, World
 
 NAME: Final = "own.yaml"

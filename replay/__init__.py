@@ -1,1 +1,0 @@
-"""Plays a capture again, verifies it, and judges it under another network."""

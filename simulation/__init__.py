@@ -1,0 +1,1 @@
+"""Everything in one process: worlds stepped, rehearsed, learned from; captures simulated again and played."""

@@ -1,0 +1,1 @@
+"""Plays a capture to its listeners, at its pace or another one."""

@@ -1,0 +1,463 @@
+"""The check of a form's laws: what obeys them passes, and each way to break them is found and named."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from importlib import invalidate_caches
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from numpy.typing import NDArray
+
+from foosim.cli.rehearse import elsewhere
+from foosim.common.errors import BadValue, DeploymentError
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.simulation.check.component_check import ComponentCheck, used_form
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
+from foosim.world.components.view import View
+from foosim.world.moving.asked import MotionsAsked
+from tests.conftest import Command, Typed
+from tests.frames import Frames, broken_laws
+from tests.kinematic_yard import yard_text
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS: Final = 40
+HEAD: Final = """
+import random, time
+from msgspec import Struct
+from foosim.common.keyed_random import draw_key, draw_words
+from foosim.world.components.entities import RuleMounting
+from foosim.world.components.view import Mounting
+from foosim.world.forms.forms import ENTITY
+from foosim.world.forms.quantities import Metres
+from foosim.world.forms.registry import rule, sensor
+from foosim.world.forms.settings import RuleSettings, SensorSettings
+
+
+class Number(Struct, frozen=True):
+    value: Metres
+
+
+class Settings(SensorSettings):
+    pass
+"""
+SENSOR: Final = """
+
+@sensor("own", Settings, Number, slots={{"kept": 1}}, needs=("joint_positions",))
+class Own:
+    def __init__(self, settings, at):
+        self.at, self.kept, self.joints = at, at.slot("kept"), at.slot("joint_positions")
+        self.count = 0
+        self.random = random.Random(1)
+
+    def sample(self, view):
+        self.count += 1
+        view.write(self.kept, {value})
+        return Number({value})
+"""
+RULE: Final = """
+
+class OwnSettings(RuleSettings):
+    pass
+
+
+@rule("own", OwnSettings, slots={"sum": 16})
+class Own:
+    def __init__(self, settings, at):
+        self.sum = at.slot("sum")
+        self.joints = [at.of(rod, "joint_positions") for rod in at.layout.of("rod")]
+        self.ball = at.of(at.layout["ball"], "position")
+        self.index, self.robots = at.layout["ball"].index, list(at.spec.robots)
+
+    def apply(self, view):
+        APPLY
+"""
+GOOD: Final = "view.read(self.joints)[0] + view.read(self.kept)[0]"
+BAD: Final = {
+    "memory in an object": ("float(self.count)", "red.goal own.kept"),
+    "a running generator": ("self.random.random()", "red.goal own.kept"),
+    "a clock": ("time.perf_counter()", "red.goal own.kept"),
+}
+BESIDE: Final = "beside a robot that does nothing and comes first the world is another one"
+SETS: Final = ("engine=pure", "substeps=1", "players={}", "table.rules.kickoff_delay=20 ms")
+TETRAHEDRON: Final = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+OF_ROD: Final = "robots.red.goal.sensors.own={kind: 'own_form:Own', rate: 100 Hz}"
+OF_WORLD: Final = "rules={own: {kind: 'own_form:Own'}}"
+
+
+@pytest.fixture
+def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path, and on that of further processes."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return tmp_path
+
+
+def broken(planted: Path, source: str, sets: str, *, processes: bool = False, ticks: int = TICKS) -> list[str]:
+    (planted / "own_form.py").write_text(HEAD + source)
+    sys.modules.pop("own_form", None)
+    invalidate_caches()
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, sets])
+    check = ComponentCheck(text, TABLE.name, ticks)
+    return [*check.broken(), *(elsewhere(text, TABLE.name, ticks, check.first) if processes else ())]
+
+
+def test_what_obeys_passes_also_in_another_process(planted: Path) -> None:
+    assert broken(planted, SENSOR.format(value=GOOD), OF_ROD, processes=True) == []
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_what_a_sensor_has_outside_of_the_frame_is_found_and_named(planted: Path, what: str) -> None:
+    value, slot = BAD[what]
+    found = broken(planted, SENSOR.format(value=value), OF_ROD)
+    assert any("moved and objects made anew" in line and slot in line for line in found), found
+
+
+def test_a_sum_in_the_order_of_hashes_is_found_by_another_process(planted: Path) -> None:
+    """Two orders of one set give the same sum once in ten times; of 16 sets, never."""
+    one = "sum((-1.1) ** (int(name) % 301) for name in {f'{k}' for k in range(400 + n)})"
+    apply = f"view.write(self.sum, *({one} for n in range(16)))"
+    found = broken(planted, RULE.replace("APPLY", apply), OF_WORLD, processes=True, ticks=20)
+    assert found == ["another process computes another world"]
+
+
+def test_a_draw_by_the_place_among_others_is_found_beside_one_more(planted: Path) -> None:
+    value = "draw_words(draw_key(1, str(self.at.robot.index)), view.tick)[0] / 2.0 ** 32"
+    found = broken(planted, SENSOR.format(value=value), OF_ROD)
+    assert found == [f"{BESIDE}: tick 1, red.goal own.kept"]
+
+
+def test_a_reading_by_the_place_among_others_is_found_beside_one_more(planted: Path) -> None:
+    """Nothing of it is in the frame."""
+    source = SENSOR.format(value="float(self.at.robot.index)").replace("view.write(self.kept", "(self.kept")
+    found = broken(planted, source, OF_ROD)
+    assert found == [f"{BESIDE}: tick 5, the reading of own of red.goal"]
+
+
+def test_an_entity_that_is_kept_as_a_number_is_found_beside_one_more(planted: Path) -> None:
+    """A slot that refers to entities is compared by names."""
+    found = broken(planted, RULE.replace("APPLY", "view.write(self.sum, *[float(self.index)] * 16)"), OF_WORLD)
+    (line,) = found
+    assert line.startswith(BESIDE) and line.endswith("world own.sum")
+    declared = RULE.replace('slots={"sum": 16}', 'slots={"sum": ENTITY}')
+    assert broken(planted, declared.replace("APPLY", "view.write(self.sum, float(self.index))"), OF_WORLD) == []
+
+
+def test_a_sum_in_the_order_of_the_file_is_found_by_another_order(planted: Path) -> None:
+    one = "sum(10.0 ** (ord(name[-1]) % 17) / 3.0 * (-1) ** len(name) for name in self.robots)"
+    line, *_ = broken(planted, RULE.replace("APPLY", f"view.write(self.sum, *[{one}] * 16)"), OF_WORLD)
+    assert line.startswith("named in another order, the world is another one") and line.endswith("world own.sum")
+
+
+def test_a_sensor_that_counts_its_like_is_found_beside_a_second_one(planted: Path) -> None:
+    value = "float(len([slot for slot in self.at.robot.offsets if slot.endswith('.samples')]))"
+    (line,) = broken(planted, SENSOR.format(value=value), OF_ROD)
+    assert line.startswith("beside a second one of each sensor the world is another one")
+    assert "red.goal own.kept" in line
+
+
+def test_a_write_to_anothers_slot_ends_the_run_with_both_names(planted: Path) -> None:
+    (line,) = broken(planted, RULE.replace("APPLY", "view.write(self.ball, 0.0, 0.0, 1.0)"), OF_WORLD)
+    assert "rule own of the world failed" in line and "ball position, which is not its own" in line
+
+
+def test_a_reading_that_is_another_beside_its_like_is_found(planted: Path) -> None:
+    together = """
+    @staticmethod
+    def together(sensors):
+        return Together(sensors)
+
+
+class Together:
+    def __init__(self, sensors):
+        self.sensors = sensors
+
+    def sample(self, view):
+        import numpy as np
+        for one in self.sensors:
+            view.write(one.kept, 0.0)
+        return np.array([[float(len(self.sensors))] for _ in self.sensors])
+"""
+    more = "robots.red.attack.sensors.own={kind: 'own_form:Own', rate: 100 Hz}"
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value="0.0") + together)
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, more])
+    found = list(broken_laws(text, TABLE.name, TICKS))
+    assert any("sensor own of red.attack gives another reading alone than with others" in line for line in found)
+
+
+def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three robots, which a run asks one after the other."""
+    right = MotionsAsked.command
+
+    def wrong(self: MotionsAsked, view: View) -> NDArray[Any]:
+        asked = right(self, view)
+        asked[-1, 0, 0] += 1e-9 * len(asked)
+        return asked
+
+    robots = {f"r{n}": {"model": "differential_drive", "at": {"x": f"{n} m"}} for n in range(3)}
+    text = yard_text(robots)
+    assert list(broken_laws(text, "yard.yaml", 3)) == []
+    monkeypatch.setattr(MotionsAsked, "command", wrong)
+    (found,) = broken_laws(text, "yard.yaml", 3)
+    assert found == "actuator motion of r0 asks for something else alone than with others, at tick 1"
+    monkeypatch.setattr(MotionsAsked, "command", lambda self, view: right(self, view)[1:])
+    (found,) = broken_laws(text, "yard.yaml", 3)
+    assert "actuators motion of r0, motion of r1, motion of r2" in found and "of the shape (3, motors, 2)" in found
+
+
+def test_a_form_is_named_as_deployments_do() -> None:
+    text = TABLE.read_text()
+    assert used_form(text, TABLE.name, "encoder").form == "sensor"
+    assert used_form(text, TABLE.name, "rule football").name == "football"
+    assert used_form(text, TABLE.name, "foosim.world.models.rod:Rod").form == "model"
+    assert used_form(text, TABLE.name, "model foosim.world.models.rod:Rod").form == "model"
+
+
+WRONG: Final = {
+    "encodr": "table.yaml uses no form called this (there are: ball, camera, delay, encoder, football, "
+    "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
+    "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
+    "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
+    "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
+    "own_gone:Own": "no module own_gone (it is neither beside the deployment nor on PYTHONPATH), 'own_gone:Own'",
+}
+
+
+@pytest.mark.parametrize("wanted", WRONG)
+def test_a_wrong_name_says_what_there_is_and_the_nearest(wanted: str) -> None:
+    text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure"])
+    with pytest.raises(BadValue) as error:
+        used_form(text, TABLE.name, wanted)
+    assert WRONG[wanted] in str(error.value) and error.value.exit_code == 2
+
+
+def test_a_name_of_several_forms_says_which(planted: Path) -> None:
+    (planted / "own_form.py").write_text(
+        HEAD + SENSOR.format(value=GOOD) + "\n\nFirst = Own\n" + RULE.replace("APPLY", "pass")
+    )
+    text = apply_sets(TABLE.read_text(), TABLE.name, [OF_ROD.replace(":Own", ":First"), OF_WORLD])
+    with pytest.raises(BadValue, match=r"several forms of table\.yaml are called this: rule own or sensor own, 'own'"):
+        used_form(text, TABLE.name, "own")
+    assert used_form(text, TABLE.name, "rule own").form == "rule"
+
+
+def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
+    """Wherever it was imported from, in the deployment and in the question."""
+    (planted / "mine.py").write_text("from foosim.world.sensors.encoder import Encoder as Mine\n")
+    text = apply_sets(TABLE.read_text(), TABLE.name, ["robots.red.goal.sensors.encoder.kind=mine:Mine"])
+    assert used_form(text, TABLE.name, "mine:Mine").name == "encoder"
+    assert used_form(TABLE.read_text(), TABLE.name, "sensor mine:Mine").name == "encoder"
+
+
+SPEAKS: Final = """
+
+@sensor("own", Settings, Number, needs=("contacts",), speaks="contacts")
+class Own:
+    def __init__(self, settings, at):
+        self.contacts = at.slot("contacts")
+
+    def sample(self, view):
+        return Number(view.read(self.contacts)[1])
+"""
+
+
+def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) -> None:
+    """Beside its rate, at which it says the impulse, whatever it is; with three nodes as with one."""
+    (planted / "own_form.py").write_text(HEAD + SPEAKS)
+    rods = [name for name in load_deployment(TABLE.read_text(), TABLE.name).robots if name != "camera"]
+    sensors = [f"robots.{rod}.sensors.own={{kind: 'own_form:Own', rate: 1 Hz}}" for rod in rods]
+    fast = ["table.rules.kickoff_speed=4 m/s", "substeps=4"]
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, *fast, *sensors])
+    assert list(broken_laws(text, TABLE.name, 400)) == []
+    frames = Frames()
+    rehearse(text, TABLE.name, 400, 2, settings=Settings(on_commit=frames))
+    touched = {rod: sum(frame.at(rod, "contacts") != 0.0 for frame in frames.frames[:-1]) for rod in rods}
+    assert sum(touched.values()) > 0, "the ball meets a rod"
+    last = frames.frames[-1]
+    assert {rod: last.at(rod, "own.samples") for rod in rods} == {rod: 1.0 + touched[rod] for rod in rods}
+
+
+ALARMS: Final = """
+
+@sensor("own", Settings, Number, slots={"alarm": 1}, speaks="SPEAKS")
+class Own:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def sample(self, view):
+        view.write(self.alarm, float(view.tick % 10 == 0))
+        return Number(0.0)
+
+
+class Alarming(EntityRuleSettings):
+    pass
+
+
+@entity_rule("own", Alarming, slots={"alarm": 1})
+class Alarms:
+    def __init__(self, settings, at):
+        self.alarm = at.slot("alarm")
+
+    def apply(self, view):
+        view.write(self.alarm, float(view.tick % 7 == 0))
+"""
+HEARD: Final = {
+    "alarm": [*range(0, 31, 5), 1, 11, 21],
+    "beeps.alarm": [*range(0, 31, 5), 1, 8, 15, 22, 29],
+}
+
+
+@pytest.mark.parametrize("speaks", HEARD)
+def test_a_sensor_speaks_by_a_slot_of_its_own_or_of_a_rule(planted: Path, speaks: str) -> None:
+    """Its own slot is set for the tick after the one at which it measures, a rule's for the tick after it applied."""
+    head = HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+        "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+    )
+    (planted / "own_form.py").write_text(head + ALARMS.replace("SPEAKS", speaks))
+    rules = "robots.red.goal.rules={beeps: {kind: 'own_form:Alarms'}}"
+    frames = Frames()
+    done = rehearse(TABLE.read_text(), TABLE.name, 31, 2, [*SETS, OF_ROD, rules], Settings(on_commit=frames))
+    assert not done.json["failed"]
+    measured = [frame.at("red.goal", "own.samples") for frame in frames.frames]
+    ticks = [tick for tick, (before, now) in enumerate(zip([0.0, *measured], measured, strict=False)) if now > before]
+    assert ticks == sorted(set(HEARD[speaks]))
+
+
+def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path) -> None:
+    (planted / "own_form.py").write_text(
+        HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
+            "import RuleSettings", "import EntityRuleSettings, RuleSettings"
+        )
+        + ALARMS.replace("SPEAKS", "beeps.alarm")
+    )
+    with pytest.raises(
+        DeploymentError, match=r"speaks by beeps\.alarm, which red\.goal does not have: it is a slot of"
+    ):
+        load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "seed=5"]), TABLE.name)
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+COMMAND: Final = "from foosim.cli import main; main()"
+
+
+@pytest.fixture
+def command(typed: Typed, planted: Path) -> Command:
+    """Runs `foosim`."""
+    return typed()
+
+
+def checking(*sets: str, ticks: int = 60) -> list[str]:
+    words = [word for setting in (*SETS, *sets) for word in ("--set", setting)]
+    return [
+        "check-component",
+        "own",
+        "--in",
+        str(TABLE),
+        *words,
+        "--ticks",
+        str(ticks),
+    ]
+
+
+NEVER: Final = ["sensor own of red.goal has a number that is not finite in each of its 8 readings"]
+
+
+@pytest.mark.parametrize(("value", "said"), [("float('inf')", NEVER), ("1.0 if view.tick else float('inf')", [])])
+def test_a_sensor_without_one_finite_reading_is_found(planted: Path, value: str, said: list[str]) -> None:
+    """One that has none at times is as it should be."""
+    source = SENSOR.format(value=value).replace("view.write(self.kept", "(self.kept")
+    assert broken(planted, source, OF_ROD) == said
+
+
+def test_readings_that_were_not_finite_or_none_are_noted(planted: Path) -> None:
+    """They may be meant, so that nothing is broken; a sensor that gives none was not compared."""
+    source = SENSOR.format(value="1.0 if view.tick % 10 else float('inf')").replace(
+        "view.write(self.kept", "(self.kept"
+    )
+    (planted / "own_form.py").write_text(HEAD + source)
+    drops = "robots.red.attack.sensors.encoder.modifiers=[{kind: drop_out, probability: 100 %}]"
+    check = ComponentCheck(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, drops]), TABLE.name, 40)
+    assert list(check.broken()) == [] and check.compared == check.sensors - 1
+    assert check.notes == [
+        "sensor encoder of red.attack never gives a reading: its modifiers drop each of 8",
+        "sensor own of red.goal has a number that is not finite in 4 of its 8 readings",
+    ]
+
+
+def test_the_end_says_how_many_sensors_were_compared(planted: Path, command: Command) -> None:
+    """One at 1 Hz measures once in a second, and not at tick 0 where it has an offset."""
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    rare = OF_ROD.replace("100 Hz", "1 Hz, offset: 500 ms")
+    done = command(*checking(rare))
+    assert (done.code, done.err) == (0, "")
+    there = sum(len(robot.sensors) for robot in load_deployment(TABLE.read_text(), TABLE.name).robots.values())
+    *_, last = done.out.splitlines()
+    assert last == f"sensor own: {there} of {there + 1} sensors measured, and were compared alone and with others"
+
+
+FAILS_ELSEWHERE: Final = """
+import os, sys
+print("said at import")
+if os.environ.get("PYTHONHASHSEED") == "4711":
+    for number in range(30):
+        print(f"line {number} of what it says, none of which is cut in the middle", file=sys.stderr)
+    sys.exit("that was it")
+"""
+
+
+def test_the_last_words_of_another_process_are_whole_lines(planted: Path) -> None:
+    found = broken(planted, FAILS_ELSEWHERE + SENSOR.format(value=GOOD), OF_ROD, processes=True, ticks=20)
+    (line,) = found
+    first, *said = line.splitlines()
+    assert first.startswith("in another process it fails, with exit code ") and len(said) == 10
+    assert said[0].strip() == "line 21 of what it says, none of which is cut in the middle"
+    assert "that was it" in said[-1] or "SystemExit" in said[-1]
+
+
+def test_what_modules_print_is_not_the_result_of_another_process(planted: Path) -> None:
+    source = 'print("said at import")\n' + SENSOR.format(value=GOOD)
+    assert broken(planted, source, OF_ROD, processes=True, ticks=20) == []
+
+
+def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) -> None:
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-P", "-c", COMMAND, *checking(OF_ROD, ticks=1_000_000)],
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
+    ) as process:
+        os.close(theirs)
+        with os.fdopen(ours, "rb", buffering=0) as terminal:
+            shown = b""
+            while b"rehearsal 1 of 10: on one node\r\n" not in shown:
+                shown += terminal.read(4096)
+            process.send_signal(signal.SIGINT)
+            with suppress(OSError):  # the other end is closed
+                while more := terminal.read(4096):
+                    shown += more
+        assert process.wait() == 130
+    first = "rehearsal 1 of 10: on one node"
+    assert shown.decode().splitlines() == [first, f"sensor own: interrupted, {first}"]
+
+
+def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path, command: Command) -> None:
+    """Meshes are relative to the folder of the deployment."""
+    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
+    folder = planted / "elsewhere"
+    folder.mkdir()
+    (folder / "thing.obj").write_text(TETRAHEDRON)
+    thing = "scenery={thing: {shape: mesh, file: thing.obj, x: 3 m, z: 1 m, radio: wood}}"
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "engine=bullet", thing])
+    (folder / "table.yaml").write_text(text)
+    done = command("check-component", "own", "--in", folder / "table.yaml", "--ticks", "20")
+    assert done.code == 0, done

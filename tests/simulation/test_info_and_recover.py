@@ -1,0 +1,161 @@
+"""What a capture holds in short, and the exit codes by which a recovery says what it could save."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections import Counter
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foosim.analysis.diff import diff_captures
+from foosim.capture import contents as capture_contents
+from foosim.capture.info import capture_info
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import BadBranch, read_branch
+from foosim.common.units import parse_ns
+from foosim.deployment.loader import load_deployment
+from foosim.runtime.journal import Journal
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
+from foosim.vhub.recording import writer as capture_writer
+from tests.simulation.conftest import TABLE, damaged, messages_of, replay
+
+
+def test_info_counts_what_the_capture_has(run: Path) -> None:
+    info, capture = capture_info(run), open_capture(run)
+    packets = capture.packets
+    assert info.packets["offered"] == len(packets)
+    assert dict(info.channels) == Counter(packets.channel.tolist())
+    assert dict(info.causes) == Counter(packets.cause[packets.fate == "dropped"].tolist()) != {}
+    assert info.payload_bytes == int(packets.size.sum()) and info.clients == ("player-blue", "player-red")
+    assert dict(info.topics) == Counter(message.topic for message in messages_of(run))
+    shown = replay("info", run)
+    assert shown.code == 0 and "\n  dropped by " in shown.out and "\n  clients player-blue, player-red\n" in shown.out
+    content = msgspec.json.decode(replay("info", run, "--json").out)
+    assert content["causes"] == dict(info.causes) and content["channels"] == dict(info.channels)
+
+
+def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
+    left = tmp_path / "left.mcap"
+    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
+    shown = replay("info", left)
+    assert shown.code == 0 and "not finished, " in shown.out
+
+
+def test_what_is_no_capture_is_refused_before_anything_is_simulated(bad_files: list[Path]) -> None:
+    deployment = load_deployment(TABLE.read_text(), TABLE.name)
+    for bad in bad_files:
+        for command in ("info", "verify", "what-if"):
+            done = replay(command, bad)
+            assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1, command
+        with pytest.raises(BadBranch, match=f"--from: {bad}: "):
+            read_branch(f"{bad}@0.1s", deployment)
+
+
+def test_a_finished_capture_is_clean(run: Path) -> None:
+    before = run.read_bytes()
+    done = replay("recover", run)
+    assert done.code == 0 and done.out == f"capture {run} is finished already\n" and run.read_bytes() == before
+
+
+def test_without_a_journal_something_is_lost(run: Path, tmp_path: Path) -> None:
+    left = tmp_path / "left.mcap"
+    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
+    done = replay("recover", left, "--json")
+    content = msgspec.json.decode(done.out)
+    assert done.code == 3 and not content["whole"] and content["torn_bytes"] > 0
+    assert content["problem"] == "there is no journal of it" and content["added_ticks"] == 0
+    made = tmp_path / "left.recovered.mcap"
+    assert content["path"] == str(made) and open_capture(made).finished and replay("recover", made).code == 0
+    assert not open_capture(left).finished
+
+
+def test_with_its_journal_nothing_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 100)
+    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
+    path, left, journals = tmp_path / "run.mcap", tmp_path / "left.mcap", tmp_path / "journals"
+    records: list[bytes] = []
+
+    def note(process: str, record: bytes) -> None:
+        if process == "vhub":
+            records.append(record)
+
+    settings = Settings(on_journal=note)
+    rehearse(TABLE.read_text(), TABLE.name, 60, 1, ["engine=pure"], settings, capture=path)
+    with Journal(journals, "vhub") as journal:
+        for record in records:
+            journal.append(record)
+    left.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    made = tmp_path / "made.mcap"
+    done = replay("recover", left, "--journals", journals, "-o", made)
+    assert done.code == 0, done
+    assert "of them from its journal" in done.out
+    found = diff_captures(path, made)
+    differing = {topic for topic, channel in found.channels.items() if channel.first is not None}
+    assert differing <= {"/tick", "/tf", "/frame"}, "the last frame was committed only"
+    assert found.channels["/packets"].first is None, "each has its fate again"
+    assert int(open_capture(made).ticks[-1]) == 59, "the journal ends with the last closed tick"
+
+
+def spoiled(run: Path, out: Path, place: int, bit: int = 1) -> bytes:
+    """Write a capture with one wrong bit; return what is written."""
+    content = bytearray(run.read_bytes())
+    content[place] ^= bit
+    out.write_bytes(content)
+    return bytes(content)
+
+
+def chunk_starts(path: Path) -> list[int]:
+    content = path.read_bytes()
+    starts = [found.start() - 37 for found in re.finditer(rb"\x04\x00\x00\x00zstd", content)]
+    return [start for start in starts if content[start] == 6]  # the summary names it, too
+
+
+@pytest.mark.parametrize("within", [80, 5, 0, 12, 30])
+def test_a_finished_capture_with_a_damaged_chunk_says_where_and_how_to_cut_out_what_precedes_it(
+    run: Path, tmp_path: Path, within: int
+) -> None:
+    """A wrong bit in the rows of a chunk, in its length, its kind, its times, its checksum."""
+    bad, part = tmp_path / "bad.mcap", tmp_path / "part.mcap"
+    starts = chunk_starts(run)
+    start, after = starts[len(starts) // 2 : len(starts) // 2 + 2]
+    before = spoiled(run, bad, start + within)
+    done = replay("recover", bad)
+    assert done.code == 1 and bad.read_bytes() == before, done
+    lines = done.err.splitlines()
+    told = re.fullmatch(f"capture {bad} is finished and damaged; it is left as it is: {bad}: byte (\\d+): .+", lines[0])
+    assert told is not None and start <= int(told[1]) < after, done.err
+    words = shlex.split(lines[-1].partition("  what is before the damage: foosim capture ")[2])
+    until_ns = parse_ns(words[3])
+    assert words[:3] == ["cut", str(bad), "--to"] and replay(*words[:-1], part).code == 0
+    cut, whole = open_capture(part), open_capture(run)
+    assert cut.ticks.tolist() == list(range(until_ns // 2_000_000 + 1)) and len(cut.ticks) > 30
+    assert (cut.digests == whole.digests[: len(cut.ticks)]).all()
+
+
+@pytest.mark.parametrize("text", [b"loss: 0.5 %", b"fingerprint", b"/packets", b"before_crc32", b"foosim.end"])
+def test_a_finished_capture_with_a_damaged_description_or_end_says_where(
+    run: Path, tmp_path: Path, text: bytes
+) -> None:
+    bad = tmp_path / "bad.mcap"
+    before = spoiled(run, bad, run.read_bytes().index(text) + len(text) - 1, 2)
+    done = replay("recover", bad)
+    assert done.code == 1 and bad.read_bytes() == before
+    where = "a damaged summary, metadata 'foosim.enf'" if text == b"foosim.end" else "byte"
+    assert f"{bad}: {where}" in done.err, done.err
+
+
+def test_what_cannot_be_recovered_fails_and_stays_as_it_is(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:
+    for bad in bad_files:
+        before = bad.read_bytes() if bad.is_file() else b""
+        done = replay("recover", bad)
+        assert done.code == (1 if bad.name.startswith("wrong") else 2) and str(bad) in done.err, done
+        assert not bad.is_file() or bad.read_bytes() == before
+    torn = damaged(run, tmp_path / "torn.mcap")
+    torn.write_bytes(torn.read_bytes()[:-100])
+    before = torn.read_bytes()
+    done = replay("recover", torn)
+    assert done.code == 3 and "a damaged record" in done.out and torn.read_bytes() == before
