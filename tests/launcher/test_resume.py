@@ -21,6 +21,8 @@ from foosim.protocol import channels
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import Journal, journal_files, read_records
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
+from foosim.simulation.run import rehearse
+from foosim.simulation.system import Settings
 from tests.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

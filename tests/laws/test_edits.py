@@ -14,11 +14,11 @@ from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch
 from foosim.common.errors import BadValue, DeploymentError, UnknownName
 from foosim.deployment.loader import load_deployment
+from foosim.runtime.roles.bus import Weather
 from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
-from foosim.runtime.roles.bus import Weather
 from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.components.view import ComponentError

@@ -26,6 +26,7 @@ from foosim.deployment.schema import Deployment
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
+from foosim.runtime.roles.bus import CALM, Weather
 from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.check.component_check import _shuffle as shuffle
 from foosim.simulation.failures import Stuck
@@ -34,7 +35,6 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
-from foosim.runtime.roles.bus import CALM, Weather
 from foosim.vhub.state.records import Closing
 from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.rest import Rest

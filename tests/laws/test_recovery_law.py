@@ -16,8 +16,8 @@ from foosim.protocol.channels import SUPERVISOR
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
 from foosim.simulation.run import Rehearsed, rehearse
-from foosim.simulation.system import OPERATOR, Settings, System
 from foosim.simulation.settings import Traced
+from foosim.simulation.system import OPERATOR, Settings, System
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.vhub.state.records import Closing
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from foosim.capture.reader import open_capture
-from foosim.simulation.run import rehearse
 from foosim.runtime.run_folder import open_run
 from foosim.simulation.run import rehearse
 from foosim.vhub.recording.recovery import recover_capture
